@@ -22,7 +22,7 @@ from memory_logs import MACHINE_CHANNELS, write_log
 from timing import main, table
 
 import cdtool
-from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.channel_assembly import assemble_recording
 from cdtool.ingest.reading import mapped_source
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
@@ -74,7 +74,7 @@ def _prepare(folder: Path) -> Recording:
         learn = ["learn-signature", *free, "--machine", str(GATE / "machine.toml"), "--detector", detector]
         _peak([*learn, "-o", str(folder / f"{detector}.json")])
     source, channels = mapped_source(GATE / "free" / "01.mcap", known)
-    recording: Recording = as_logged(source, channels, known.machine)
+    recording: Recording = assemble_recording(source, channels, known.machine)
     return recording
 
 

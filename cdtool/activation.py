@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.clock.coarse import recent_medians
+from cdtool.clock.coarse_clock import recent_medians
 from cdtool.detection import Alarm, Band, Signal, Status, StatusArray
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel

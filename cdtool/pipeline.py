@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.activation import Activation
 from cdtool.clock import previous_value
-from cdtool.clock.lost import lost_samples
+from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import REASONS, Alarm, Band, Signal, Status, Verdict
 from cdtool.detectors.base import Detector
 from cdtool.detectors.contract import checked_signal

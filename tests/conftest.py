@@ -15,7 +15,7 @@ from cdtool.recording import Recording
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
 from tests import markers
-from tests.made_up.machines import ARM, GATE, arm_of, machine_of
+from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 
 # Tests have no deadline: a busy machine takes longer for an example.
 settings.register_profile("untimed", deadline=None)

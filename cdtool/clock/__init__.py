@@ -1,7 +1,7 @@
-"""Causal alignment of channels to a detector's clock, and what is odd about time stamps.
+"""Causal alignment of channels to a detector's clock, and the correction of faulty time stamps.
 
-Nothing here looks at a later sample: a value at time t comes from samples at or before t. stamps.py makes a log's
-stamps strictly increase, coarse.py those of a clock that is coarser than the samples.
+No function uses later samples: a value at time t is computed from samples at or before t. stamps.py makes the time
+stamps of a log strictly increasing; coarse_clock.py does so for a clock that is coarser than the samples.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from cdtool.clock.coarse import recent_medians
+from cdtool.clock.coarse_clock import recent_medians
 from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start, gap_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Series
@@ -28,12 +28,12 @@ __all__ = [
     "previous_value",
 ]
 
-# A held value older than this many of its own periods is missing, not valid.
+# A held value older than this many periods of its channel is missing.
 HOLD_PERIODS = 5.0
 
 
 def previous_value(series: Series, clock: FloatArray) -> FloatArray:
-    """(m, J): at each time of `clock` [s] the last sample at or before it; NaN where there is none or it is too old."""
+    """Return the last sample at or before each time of `clock` [s] (m, J); NaN if it is missing or too old."""
     if series.time is clock or (len(series.time) == len(clock) and np.array_equal(series.time, clock)):
         return series.values
     if not len(series.time):
@@ -46,7 +46,7 @@ def previous_value(series: Series, clock: FloatArray) -> FloatArray:
 
 
 def _recent_period(time: FloatArray) -> FloatArray:
-    """At each sample the median of its last steps [s]; infinite at the first, which has none."""
+    """Return the median of the last steps [s] at each sample; infinite at the first sample."""
     period = np.full(len(time), np.inf)
     if len(time) > 1:
         steps = np.diff(time)
@@ -55,20 +55,21 @@ def _recent_period(time: FloatArray) -> FloatArray:
 
 
 def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:
-    """Causal derivative of a position: backward difference, then two first-order low-passes at `low_pass_hz`.
+    """Return the causal derivative of a position.
 
-    A missing sample is skipped: the difference runs over the longer step. The first sample is NaN.
+    It is a backward difference, filtered by two first-order low-passes at `low_pass_hz`. Across missing samples the
+    difference is taken over the longer step. The first sample is NaN.
     """
     rates = np.full(series.values.shape, np.nan)
     for joint in range(series.joint_count):
-        # Copies: a Series is read-only, and the kernel's signature is of arrays that are not.
+        # A copy, as a Series is read-only and the kernel's signature requires a writable array.
         column = series.values[:, joint].copy()
         _differentiate(series.time, column, 2.0 * np.pi * low_pass_hz, rates[:, joint])
     return Series(series.time, rates, unit)
 
 
 def integrate(series: Series, unit: str) -> Series:
-    """Causal integral of a speed from 0 (trapezoid); over a missing sample the last speed is held."""
+    """Return the causal integral of a speed from 0 (trapezoidal rule); a missing sample repeats the last speed."""
     speed = np.where(np.isfinite(series.values), series.values, np.nan)
     filled = _hold_last(speed)
     steps = np.diff(series.time)[:, np.newaxis] * 0.5 * (filled[1:] + filled[:-1])

@@ -1,7 +1,7 @@
-"""Does a clock's unit fit its values? Stamps since 1970 and steps that no log has contradict a unit, whoever states it.
+"""Check a clock's stated unit against its values: time stamps since 1970 and impossible steps contradict a unit.
 
-Conventions: only what cannot be otherwise is a contradiction. A log at 1 Hz is honest, and so is a counter of
-milliseconds since power-on; a stamp 3,000 years after its zero is neither.
+Only an impossible value is a contradiction. A log at 1 Hz and a counter of milliseconds since power-on are valid; a
+time stamp 3,000 years after its zero is not.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from cdtool.recording import FloatArray
 # A clock that counts from 1970 in one of these units lies between the years 2001 and 2100.
 EPOCHS = ((1e9, 4.1e9, "s"), (1e12, 4.1e12, "ms"), (1e15, 4.1e15, "us"), (1e18, 4.1e18, "ns"))
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-# No clock counts more than this many seconds, whatever its zero: the year 0 lies 6.4e10 s back.
+# No clock counts more than this many seconds, whatever its zero: the year 0 was 6.4e10 s ago.
 _LONGEST = 1e11
-# Steps [s] that no log of a machine has: above a minute, below half a microsecond.
+# No log of a machine has longer or shorter steps [s]: a minute, half a microsecond.
 _LONGEST_STEP, _SHORTEST_STEP = 60.0, 5e-7
-# Rates [Hz] that a log has in the unit that is meant instead.
+# Plausible sample rates [Hz] of a log in the likely unit.
 _SLOWEST, _FASTEST = 0.5, 500e3
-# Stamps from whose steps the usual one is taken.
+# Number of time stamps that the median step is computed from.
 _ENOUGH = 100_000
 _YEAR = 365.2425 * 86400.0
 
 
 def unit_since_1970(stamp: float) -> str:
-    """The unit in which a stamp counted from 1970 lies between 2001 and 2100; empty where there is none.
+    """Return the unit in which a time stamp, counted from 1970, is between 2001 and 2100; empty if no unit fits.
 
     >>> unit_since_1970(1.6e12), unit_since_1970(12.5)
     ('ms', '')
@@ -37,7 +37,9 @@ def unit_since_1970(stamp: float) -> str:
 
 
 def contradicted_by_epoch(stamp: float, factor: float) -> str:
-    """The unit that a first stamp counts since 1970, where in the stated unit (`factor` s) it cannot be a time.
+    """Return the unit of a first time stamp since 1970 if it cannot be a time in the stated unit (`factor` s).
+
+    Otherwise, the result is empty.
 
     >>> contradicted_by_epoch(1.6e12, 1.0), contradicted_by_epoch(1.6e12, 1e-3), contradicted_by_epoch(1.6e9, 1e-3)
     ('ms', '', '')
@@ -46,16 +48,16 @@ def contradicted_by_epoch(stamp: float, factor: float) -> str:
 
 
 def both_readings(stamp: float, factor: float, stated: str, meant: str) -> TwoReadings:
-    """Return a first stamp as read in the stated unit (`factor` s), and as `meant` since 1970."""
+    """Return a first time stamp as read in the stated unit (`factor` s), and in the unit `meant` since 1970."""
     day = datetime.fromtimestamp(stamp * SECONDS[meant], tz=UTC).date().isoformat()
     return TwoReadings(stamp, stated, stamp * factor / _YEAR, meant, day)
 
 
 def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float]:
-    """The likely unit of stamps (n,) whose median step in the stated unit (`factor` s) no log has, and that step [s].
+    """Return the likely unit of time stamps (n,) if their median step is implausible in the stated one, and that step.
 
-    Of the units in which the steps are those of a log, the one nearest to 1 kHz; empty where the stated unit may be
-    right, or none is better.
+    `factor` converts the stated unit to seconds; the step is in s. The likely unit is the one that yields a plausible
+    sample rate nearest to 1 kHz. It is empty if the stated unit may be right, or no unit yields a plausible rate.
     """
     some = stamps[:_ENOUGH]
     steps = np.diff(some[np.isfinite(some)])

@@ -1,7 +1,7 @@
-"""A log's time stamps -> strictly increasing times, whole or piece by piece, and what is wrong with them.
+"""A log's time stamps -> strictly increasing times, for a whole log or piece by piece, and the findings on them.
 
-Wild stamps lie far off those around them: a clock that leaps ahead for some rows and returns costs these rows, no
-others. Which they are is decided by what comes before and by the next 100 rows at most, never by the rest of a log.
+A stray time stamp is far from its neighbours. If a clock jumps ahead for some rows and returns, only these rows are
+dropped. Whether a row is stray depends on the rows before it and at most the next 100, not on the rest of the log.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.clock.coarse import line_through
+from cdtool.clock.coarse_clock import fit_line
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
@@ -33,31 +33,30 @@ from cdtool.findings.clocks import (
 )
 from cdtool.recording import BoolArray, FloatArray, Series
 
-# A pause of more than this many periods between samples is a gap.
+# A step longer than this many periods is a gap.
 GAP_PERIODS = 2.5
-# Above this share of repeated stamps the clock is coarse, not faulty.
+# Above this share of repeated time stamps, the clock is coarse and not faulty.
 COARSE_SHARE = 0.2
-# Stamps that are dropped are a loss above this share, and where so many consecutive ones run backward: the clock
-# restarts.
-_STRAY_SHARE, _RESTART_ROWS = 0.01, 3
-# Counters are this wide, in bits, where they wrap within a log.
-_COUNTERS = (16, 32)
-# So many rows or gaps are named, the others counted.
-_SHOWN = 3
-# A leap ahead spans at most so many rows; at the edges of a log, where one side is unknown, so many.
-WILD_ROWS, EDGE_ROWS = 50, 3
-# A step of 3 years [s] at an edge of a log is no pause: the stamps beyond it are of another clock.
+# Dropped rows are a loss if they exceed this share, or if this many consecutive ones run backward: the clock restarted.
+_LOSS_SHARE, _RESTART_ROWS = 0.01, 3
+# Widths [bits] of counters that may wrap within a log.
+_COUNTER_BITS = (16, 32)
+# The first rows or gaps, up to this many, are listed; the others are only counted.
+_LISTED = 3
+# A jump ahead spans at most this many rows; fewer at the edges of a log, where one side is unknown.
+STRAY_ROWS, EDGE_ROWS = 50, 3
+# A step of about 3 years [s] at an edge of a log is not a pause: the time stamps beyond it are from another clock.
 EPOCH = 1e8
-# A leap is longer than this many usual steps; these are looked for among so many rows before it.
-_LEAP, _STEPS_BEFORE = 2.5, 9
-# So many stamps in order show where a log that begins with wild ones really begins; shorter logs show nothing.
+# A jump is longer than this many usual steps; the usual step is taken from this many rows before it.
+_JUMP, _STEPS_BEFORE = 2.5, 9
+# The start of a log can be stray if this many time stamps in order follow it; logs below 8 rows are not checked.
 _IN_ORDER, _SHORTEST = 3, 8
-_AHEAD, _BEHIND = 2 * WILD_ROWS, 4 * WILD_ROWS
+_AHEAD, _BEHIND = 2 * STRAY_ROWS, 4 * STRAY_ROWS
 
 
 @dataclass(frozen=True)
 class CleanTime:
-    """Strictly increasing stamps [s], the rows kept, and what was found."""
+    """Strictly increasing times [s], which rows are kept, and the findings."""
 
     time: FloatArray
     keep: BoolArray
@@ -72,18 +71,20 @@ def clean_time(
     counted: npt.ArrayLike | None = None,
     sampled: bool = True,
 ) -> CleanTime:
-    """Drop stamps [s] that are missing, wild (WildStamps), repeated or run backward; regularise a coarse clock.
+    """Drop time stamps [s] that are missing, stray, repeated or run backward; regularise a coarse clock.
 
-    `first_row` is the number of the first sample in the file, for messages; `counted` (n,) are the stamps as the file
-    has them, in which a counter's wrap shows. A coarse clock (more than 20 % repeated stamps) is replaced by the
-    straight line through (index, stamp) fitted to the stamps so far, recursively: coarse.line_through. Without
-    `sampled` the stamps are those of events, which lie on no line. Dropped rows are reported with their share: as a
-    loss where they are more than strays. Raises RecordingError where no stamp is above the first.
+    Stray time stamps are defined by StrayStampMarker. A coarse clock (more than 20 % repeated time stamps) is replaced
+    by a straight line that is fitted recursively to (index, stamp): coarse_clock.fit_line. Dropped rows are reported
+    with their share; they are a loss if they are more than single stray rows.
+
+    `first_row` is the number of the first sample in the file, for messages. `counted` (n,) are the time stamps as in
+    the file, in which the wrap of a counter is recognised. `sampled` is False for the times of events, which are not
+    on a line. Raises RecordingError if no time stamp is above the first.
     """
     stamps = np.asarray(time, dtype=np.float64)
     known = np.isfinite(stamps)
-    dropped = _DroppedRows()
-    index, repeated, backward = dropped.sort_out(stamps, WildStamps().add(stamps[known], final=True))
+    dropped = _DroppedStampCounts()
+    index, repeated, backward = dropped.sort_out(stamps, StrayStampMarker().add(stamps[known], final=True))
     if not len(index):
         return CleanTime(np.empty(0), np.zeros(len(stamps), dtype=bool), tuple(dropped.findings(first_row, row_name)))
     kept = stamps[index]
@@ -93,22 +94,22 @@ def clean_time(
             f"none of the {len(kept)} time stamps is above {kept[0]:g} s: the clock stands still",
             "name another clock in [channels] time, or the sample rate: time = { rate_hz = ... }",
         )
-    restart = _Restart()
+    restart = _RestartDetector()
     raw = kept if counted is None else np.asarray(counted, dtype=np.float64)[index]
     if backward.any():
         restart.add(raw, backward)
-    findings = dropped.findings(first_row, row_name, restart.found(lambda: _median_step(raw)))
+    findings = dropped.findings(first_row, row_name, restart.cause(lambda: _median_step(raw)))
     if sampled and dropped.is_coarse:
         index = index[~backward]
-        line, on_line = line_through(rising)
+        line, on_line = fit_line(rising)
         step = 1e3 * _median_step(rising)
         findings.append(Finding(CoarseClock(float(repeated.mean()), step), "time"))
-        stuck = _Dropped(StuckStamps)
+        stuck = _RowCount(StuckStamps)
         stuck.add(index[~on_line], 0)
-        findings += stuck.finding(len(stamps), first_row, row_name)
+        findings += stuck.findings(len(stamps), first_row, row_name)
         index, kept = index[on_line], line[on_line]
     else:
-        findings += dropped.repeated.finding(len(stamps), first_row, row_name)
+        findings += dropped.repeated.findings(len(stamps), first_row, row_name)
         good = ~(repeated | backward)
         index, kept = index[good], kept[good]
     keep = np.zeros(len(stamps), dtype=bool)
@@ -116,45 +117,45 @@ def clean_time(
     return CleanTime(np.ascontiguousarray(kept), keep, tuple(findings))
 
 
-class CleanPieces:
-    """Stamps [s] -> strictly increasing times; what is missing, wild, repeated or runs backward is dropped.
+class ClockCleaner:
+    """Cleans time stamps [s] piece by piece; drops those that are missing, stray, repeated or run backward.
 
-    The last rows of a piece wait for the next one, or for `final`: whether they are wild shows behind them. Of a coarse
-    clock, whose stamps repeat, clean_time makes a straight line: this says only that it `is_coarse`.
+    The last rows of a piece are returned with the next one, or with `final`, as later rows determine whether they are
+    stray. A coarse clock, whose time stamps repeat, is not regularised as in clean_time; `is_coarse` reports it.
     """
 
     def __init__(self) -> None:
-        self._dropped, self._restart = _DroppedRows(), _Restart()
-        self._wild_stamps = WildStamps()
+        self._dropped, self._restart = _DroppedStampCounts(), _RestartDetector()
+        self._stray_marker = StrayStampMarker()
         self._steps, self._last = Distribution(), np.empty(0)
         self._waiting: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
     def times(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> FloatArray:
-        """The times of those rows that are decided and kept; `counted` are the stamps as the file has them."""
+        """Return the times of the rows that are decided and kept; `counted` are the time stamps as in the file."""
         return self.rows(stamps, counted, np.empty((len(stamps), 0)), final)[0]
 
     def rows(
         self, stamps: FloatArray, counted: FloatArray, values: FloatArray, final: bool = False
     ) -> tuple[FloatArray, FloatArray]:
-        """The times of those rows that are decided and kept, and their (n, J) values."""
-        is_wild = self._wild_stamps.add(stamps[np.isfinite(stamps)], final)
+        """Return the times of the rows that are decided and kept, and their values (n, J)."""
+        is_stray = self._stray_marker.add(stamps[np.isfinite(stamps)], final)
         if self._waiting is not None:
-            held = self._waiting
-            stamps, counted = np.concatenate((held[0], stamps)), np.concatenate((held[1], counted))
-            values = np.concatenate((held[2], values))
+            waiting = self._waiting
+            stamps, counted = np.concatenate((waiting[0], stamps)), np.concatenate((waiting[1], counted))
+            values = np.concatenate((waiting[2], values))
         known = np.flatnonzero(np.isfinite(stamps))
-        decided = len(stamps) if len(is_wild) == len(known) else int(known[len(is_wild)])
+        decided = len(stamps) if len(is_stray) == len(known) else int(known[len(is_stray)])
         if final:
             self._waiting = None
-        else:  # copies: a view would keep all of the piece
+        else:  # copies, as a view would keep the whole piece in memory
             self._waiting = stamps[decided:].copy(), counted[decided:].copy(), values[decided:].copy()
         stamps, values = stamps[:decided], values[:decided]
-        keep = self._keep(stamps, counted[:decided], is_wild)
+        keep = self._keep(stamps, counted[:decided], is_stray)
         return stamps[keep], values if keep.all() else values[keep]
 
-    def _keep(self, stamps: FloatArray, counted: FloatArray, is_wild: BoolArray) -> BoolArray:
-        """Which of the decided rows are kept; `is_wild` is of those with a stamp."""
-        index, repeated, backward = self._dropped.sort_out(stamps, is_wild)
+    def _keep(self, stamps: FloatArray, counted: FloatArray, is_stray: BoolArray) -> BoolArray:
+        """Return which of the decided rows are kept; `is_stray` is for the rows with a finite time stamp."""
+        index, repeated, backward = self._dropped.sort_out(stamps, is_stray)
         raw = counted[index]
         steps = np.diff(np.concatenate((self._last, raw)))
         self._steps.add(steps[steps > 0.0])
@@ -166,129 +167,130 @@ class CleanPieces:
 
     @property
     def is_coarse(self) -> bool:
-        """So many stamps repeat that clean_time would make a straight line of the clock."""
+        """True if so many time stamps repeat that clean_time would replace the clock by a straight line."""
         return self._dropped.is_coarse
 
     def findings(self, first_row: int) -> list[Finding]:
-        """What was dropped; `first_row` is the file's line of the first sample (0: not known)."""
+        """Return the findings on dropped rows; `first_row` is the file's line of the first sample (0: unknown)."""
         row_name = "line" if first_row else "sample"
-        restart = self._restart.found(lambda: self._steps.median if self._steps.count else 0.0)
-        found = self._dropped.findings(first_row, row_name, restart)
-        return found + self._dropped.repeated.finding(self._dropped.rows, first_row, row_name)
+        restart = self._restart.cause(lambda: self._steps.median if self._steps.count else 0.0)
+        dropped = self._dropped.findings(first_row, row_name, restart)
+        return dropped + self._dropped.repeated.findings(self._dropped.rows, first_row, row_name)
 
 
 def epoch_start(stamps: FloatArray, factor: float) -> float:
-    """The first stamp, in its own unit, where the clock counts from an epoch (3 years or more), else 0.
+    """Return the first time stamp, in its own unit, if the clock counts from an epoch (3 years or more ago), else 0.
 
-    `factor` leads to seconds. To be taken off before scaling, so that no digit is lost; a wild stamp is not the first.
+    `factor` converts to seconds. Subtract the result before scaling, so that no digit is lost. Stray time stamps are
+    skipped.
     """
     finite = stamps[np.isfinite(stamps)]
-    first = finite[leading_wild(finite, EPOCH / factor) :][:1]
+    first = finite[count_leading_strays(finite, EPOCH / factor) :][:1]
     return float(first[0]) if len(first) and first[0] * factor > EPOCH else 0.0
 
 
 def gap_findings(series: Series, channel: str, masked: int = 0) -> list[Finding]:
-    """Gaps and jitter of one channel's clock, and its missing values, of which `masked` are reported elsewhere."""
+    """Return the findings on gaps, jitter and missing values of a channel; `masked` values are reported elsewhere."""
     absent = int(np.count_nonzero(~np.isfinite(series.values)))
     gaps = gaps_in([series.time], series.period, channel)
     return gaps + missing_findings(absent, series.values.size, channel, masked)
 
 
 def missing_findings(absent: int, values: int, channel: str, masked: int = 0) -> list[Finding]:
-    """Of so many values those that are `absent`; what is `masked` among these has a finding of its own."""
+    """Return the finding on `absent` ones of `values`, without the `masked` ones, which have a separate finding."""
     missing = absent - masked
     return [Finding(MissingValues(missing, values), channel)] if missing else []
 
 
-class Gaps:
-    """Gaps and jitter of strictly increasing times [s] whose median step is `period` [s]."""
+class GapStatistics:
+    """The gaps and the jitter of strictly increasing times [s] whose median step is `period` [s]."""
 
     def __init__(self, period: float, channel: str) -> None:
         self._period, self._channel = period, channel
         self._last, self._total, self._count = np.empty(0), 0, 0
         self._first: list[Gap] = []
-        self._regular, self._mean, self._squares = 0, 0.0, 0.0  # steps that are no gaps, and their spread so far
+        self._regular, self._mean, self._squares = 0, 0.0, 0.0  # steps without gaps: count, mean, sum of squares
 
     def add(self, times: FloatArray) -> None:
-        """The times of a piece."""
+        """Add the times of a piece."""
         self._total += len(times)
         time = np.concatenate((self._last, times))
         steps = np.diff(time)
         gaps = np.flatnonzero(steps > GAP_PERIODS * self._period)
         self._count += len(gaps)
-        self._first += [Gap(float(time[i]), float(steps[i])) for i in gaps[: _SHOWN - len(self._first)]]
+        self._first += [Gap(float(time[i]), float(steps[i])) for i in gaps[: _LISTED - len(self._first)]]
         usual = steps[steps <= GAP_PERIODS * self._period]
         if len(usual):
             share = len(usual) / (self._regular + len(usual))
-            off = float(usual.mean()) - self._mean
-            self._squares += float(usual.var()) * len(usual) + off * off * self._regular * share
-            self._regular, self._mean = self._regular + len(usual), self._mean + off * share
+            shift = float(usual.mean()) - self._mean
+            self._squares += float(usual.var()) * len(usual) + shift * shift * self._regular * share
+            self._regular, self._mean = self._regular + len(usual), self._mean + shift * share
         self._last = time[-1:]
 
     def findings(self) -> list[Finding]:
-        """What is odd about the steps."""
-        found: list[Finding] = []
-        if self._total <= 2:  # fewer stamps have no usual step
-            return found
+        """Return the findings on gaps and jitter."""
+        findings: list[Finding] = []
+        if self._total <= 2:  # too few for a usual step
+            return findings
         if self._count:
-            found.append(Finding(SampleGaps(self._count, tuple(self._first)), self._channel))
+            findings.append(Finding(SampleGaps(self._count, tuple(self._first)), self._channel))
         jitter = float(np.sqrt(self._squares / self._regular)) / self._period if self._regular else 0.0
         if jitter > 0.1:
-            found.append(Finding(Jitter(jitter, self._period), self._channel))
-        return found
+            findings.append(Finding(Jitter(jitter, self._period), self._channel))
+        return findings
 
 
 def gaps_in(times: Iterable[FloatArray], period: float, channel: str) -> list[Finding]:
-    """Gaps and jitter of a clock whose times [s] come piece by piece."""
-    gaps = Gaps(period, channel)
+    """Return the findings on gaps and jitter of a clock whose `times` [s] are given piece by piece."""
+    gaps = GapStatistics(period, channel)
     for piece in times:
         gaps.add(piece)
     return gaps.findings()
 
 
-class _Dropped:
-    """Rows that were dropped for one reason, the `kind` of fact: how many, and which the first were."""
+class _RowCount:
+    """The rows dropped for one reason, the `kind` of fact: their number, and the first ones."""
 
     def __init__(self, kind: type[DroppedStamps]) -> None:
         self.kind, self.count = kind, 0
         self._first: list[int] = []
 
     def add(self, rows: npt.NDArray[np.intp], before: int) -> None:
-        """Some rows of a piece that begins behind `before` others."""
+        """Add rows of a piece; `before` is the number of rows before the piece."""
         self.count += len(rows)
-        self._first += (rows[: _SHOWN - len(self._first)] + before).tolist()
+        self._first += (rows[: _LISTED - len(self._first)] + before).tolist()
 
-    def finding(self, rows: int, first_row: int, row_name: str, restart: ClockRestart | None = None) -> list[Finding]:
-        """Of `rows` in all those that were dropped: a loss where there is a cause, or where they are many."""
+    def findings(self, rows: int, first_row: int, row_name: str, restart: ClockRestart | None = None) -> list[Finding]:
+        """Return the finding, given the total of `rows`: a loss if there is a cause, or if many rows are dropped."""
         if not self.count:
             return []
         known = self.count, rows, tuple(row + first_row for row in self._first), row_name
         fact = BackwardStamps(*known, restart) if restart else self.kind(*known)
-        is_loss = bool(fact.cause) or self.count / rows > _STRAY_SHARE
+        is_loss = bool(fact.cause) or self.count / rows > _LOSS_SHARE
         return [Finding(fact, "time", "loss" if is_loss else "warning")]
 
 
-class _DroppedRows:
-    """The rows of a clock that are dropped, by reason; `rows` have been looked at so far."""
+class _DroppedStampCounts:
+    """The dropped rows of a clock, by reason; `rows` is the total so far."""
 
     def __init__(self) -> None:
         self.rows = 0
-        self.repeated = _Dropped(RepeatedStamps)
-        self._unknown, self._wild = _Dropped(UnknownStamps), _Dropped(StrayStamps)
-        self._backward = _Dropped(BackwardStamps)
+        self.repeated = _RowCount(RepeatedStamps)
+        self._unknown, self._stray = _RowCount(UnknownStamps), _RowCount(StrayStamps)
+        self._backward = _RowCount(BackwardStamps)
         self._highest = -np.inf
 
-    def sort_out(self, stamps: FloatArray, is_wild: BoolArray) -> tuple[npt.NDArray[np.intp], BoolArray, BoolArray]:
-        """The rows of a piece that are neither missing nor wild, and which of them repeat, which run backward.
+    def sort_out(self, stamps: FloatArray, is_stray: BoolArray) -> tuple[npt.NDArray[np.intp], BoolArray, BoolArray]:
+        """Return the rows of a piece that are neither missing nor stray, and which of them repeat or run backward.
 
-        `is_wild` is of those with a stamp.
+        `is_stray` is for the rows with a finite time stamp.
         """
         known = np.isfinite(stamps)
         before, self.rows = self.rows, self.rows + len(stamps)
         self._unknown.add(np.flatnonzero(~known), before)
         index = np.flatnonzero(known)
-        self._wild.add(index[is_wild], before)
-        index = index[~is_wild]
+        self._stray.add(index[is_stray], before)
+        index = index[~is_stray]
         kept = stamps[index]
         highest = np.maximum.accumulate(np.concatenate(([self._highest], kept)))
         repeated, backward = kept == highest[:-1], kept < highest[:-1]
@@ -299,34 +301,37 @@ class _DroppedRows:
 
     @property
     def is_coarse(self) -> bool:
-        """So many stamps repeat that the clock is coarse."""
-        known = self.rows - self._unknown.count - self._wild.count
+        """True if so many time stamps repeat that the clock is coarse."""
+        known = self.rows - self._unknown.count - self._stray.count
         return known > 0 and self.repeated.count / known > COARSE_SHARE
 
     def findings(self, first_row: int, row_name: str, restart: ClockRestart | None = None) -> list[Finding]:
-        """What was dropped but repeated stamps, which a coarse clock keeps; `restart`: why stamps run backward."""
-        kinds = ((self._unknown, None), (self._wild, None), (self._backward, restart))
-        return [found for rows, why in kinds for found in rows.finding(self.rows, first_row, row_name, why)]
+        """Return the findings, except on repeated time stamps, which a coarse clock keeps.
+
+        `restart` is the cause of time stamps that run backward.
+        """
+        kinds = ((self._unknown, None), (self._stray, None), (self._backward, restart))
+        return [finding for rows, cause in kinds for finding in rows.findings(self.rows, first_row, row_name, cause)]
 
 
-class _Restart:
-    """Why stamps run backward where that is no stray one: a counter wraps, or the clock starts again."""
+class _RestartDetector:
+    """Determines why many time stamps run backward: a counter wraps, or the clock restarts."""
 
     def __init__(self) -> None:
         self._last = np.empty(0)
         self._whole, self._largest = True, 0.0
-        self._fall: tuple[float, float] | None = None
-        self._run = self._longest = 0  # of rows that run backward
+        self._step_back: tuple[float, float] | None = None  # time stamps before and after the first one
+        self._run = self._longest = 0  # consecutive rows that run backward: at present, at most
 
     def add(self, stamps: FloatArray, backward: BoolArray) -> None:
-        """The finite stamps of a piece as the file has them, and which of them run backward."""
+        """Add the finite time stamps of a piece as in the file, and which of them run backward."""
         known = np.concatenate((self._last, stamps))
         self._whole = self._whole and bool(np.all(stamps == np.floor(stamps)))
         self._largest = max(self._largest, float(np.max(np.abs(stamps), initial=0.0)))
-        falls = np.flatnonzero(backward)
-        if len(falls) and self._fall is None:
-            at = int(falls[0]) + len(self._last)
-            self._fall = float(known[at - 1]), float(known[at])
+        rows = np.flatnonzero(backward)
+        if len(rows) and self._step_back is None:
+            at = int(rows[0]) + len(self._last)
+            self._step_back = float(known[at - 1]), float(known[at])
         edges = np.flatnonzero(np.diff(np.concatenate(([False], backward, [False])).astype(np.int8)))
         runs = (edges[1::2] - edges[::2]).tolist()
         if len(backward) and not backward[0]:
@@ -337,109 +342,115 @@ class _Restart:
         self._run = (runs[-1] if runs and edges[-1] == len(backward) else 0) if len(backward) else self._run
         self._last = known[-1:]
 
-    def found(self, usual_step: Callable[[], float]) -> ClockRestart | None:
-        """None where there is no more to say; `usual_step` returns the median step forward, 0 where there is none."""
-        if self._fall is None:
+    def cause(self, usual_step: Callable[[], float]) -> ClockRestart | None:
+        """Return the cause; None for stray time stamps. `usual_step` returns the median forward step, 0 if unknown."""
+        if self._step_back is None:
             return None
-        for bits in _COUNTERS if self._whole else ():
-            wide = 2.0**bits
-            if self._largest < wide and 0.0 < self._fall[1] - self._fall[0] + wide <= GAP_PERIODS * usual_step():
+        before, after = self._step_back
+        for bits in _COUNTER_BITS if self._whole else ():
+            modulus = 2.0**bits
+            if self._largest < modulus and 0.0 < after - before + modulus <= GAP_PERIODS * usual_step():
                 return ClockRestart(wrapped_bits=bits)
         return ClockRestart() if self._longest >= _RESTART_ROWS else None
 
 
 def _median_step(stamps: FloatArray) -> float:
-    """The median of the steps forward; 0 where there is none."""
+    """Return the median of the forward steps; 0 if there are no forward steps."""
     steps = np.diff(stamps)
     forward = steps[steps > 0.0]
     return float(np.median(forward)) if len(forward) else 0.0
 
 
-class WildStamps:
-    """Marks the wild stamps of a clock that comes piece by piece; those of a row are known 100 rows later.
+class StrayStampMarker:
+    """Marks the stray time stamps of a clock piece by piece; the mark of a row is known 100 rows later.
 
-    Wild are up to 50 rows between a stamp g and the next one n >= g that they all lie above, by more than 2.5 usual
-    steps, where at least as many rows follow below them: then fewer rows are lost than by taking n to run backward.
-    Wild are up to 3 rows at the start of a log that lie above the next ones, and at either edge those that lie 3 years
-    off.
+    Stray rows are up to 50 rows between a time stamp g and the next one n >= g if all of them are above n by more than
+    2.5 usual steps, and at least as many rows with time stamps below them follow: dropping n and its successors instead
+    would lose more rows. Up to 3 rows at the start of a log are stray if they are above the next ones, and up to 3 rows
+    at either edge if they are 3 years off.
     """
 
     def __init__(self) -> None:
-        self._stamps, self._wild = np.empty(0), np.empty(0, dtype=bool)
-        self._next = 1  # the first row whose step has not been looked at
-        self._given = self._total = 0  # rows held that are decided, rows so far
+        self._stamps, self._stray = np.empty(0), np.empty(0, dtype=bool)
+        self._next = 1  # the first row whose step has not been checked
+        self._returned = self._total = 0  # buffered rows that were already returned, rows so far
 
     def add(self, stamps: FloatArray, final: bool = False) -> BoolArray:
-        """The next finite stamps [s]; returns which are wild of the rows that are decided now, in their order."""
+        """Add the next finite time stamps [s]; return which of the rows decided now are stray, in their order."""
         starts = self._total < _SHORTEST
         self._stamps = np.concatenate((self._stamps, stamps))
-        self._wild = np.concatenate((self._wild, np.zeros(len(stamps), dtype=bool)))
+        self._stray = np.concatenate((self._stray, np.zeros(len(stamps), dtype=bool)))
         self._total += len(stamps)
         count = len(self._stamps)
         if starts and (final or self._total >= _SHORTEST):
-            leading = leading_wild(self._stamps, EPOCH)
-            self._wild[:leading] = True
+            leading = count_leading_strays(self._stamps, EPOCH)
+            self._stray[:leading] = True
             self._next = max(self._next, leading + 1)
-        until = count if final else max(count - WILD_ROWS, self._next)
+        until = count if final else max(count - STRAY_ROWS, self._next)
         if starts and self._total < _SHORTEST and not final:
             until = self._next
-        for fall in (np.flatnonzero(np.diff(self._stamps[self._next - 1 : until]) < 0.0) + self._next).tolist():
-            self._mark(fall)
+        for row in (np.flatnonzero(np.diff(self._stamps[self._next - 1 : until]) < 0.0) + self._next).tolist():
+            self._mark_before(row)
         self._next = max(self._next, until)
         if final and self._total >= _SHORTEST:
-            rows = np.flatnonzero(~self._wild)[-EDGE_ROWS - 1 :]
-            self._wild[rows[len(rows) - _trailing_wild(self._stamps[rows]) :]] = True
-        return self._decided(count if final else max(count - _AHEAD, self._given))
+            rows = np.flatnonzero(~self._stray)[-EDGE_ROWS - 1 :]
+            self._stray[rows[len(rows) - _count_trailing_strays(self._stamps[rows]) :]] = True
+        return self._take_decided(count if final else max(count - _AHEAD, self._returned))
 
-    def _decided(self, until: int) -> BoolArray:
-        decided = self._wild[self._given : until].copy()
+    def _take_decided(self, until: int) -> BoolArray:
+        decided = self._stray[self._returned : until].copy()
         forget = max(0, until - _BEHIND)
-        self._stamps, self._wild = self._stamps[forget:], self._wild[forget:]
-        self._next, self._given = max(self._next - forget, 1), until - forget
+        self._stamps, self._stray = self._stamps[forget:], self._stray[forget:]
+        self._next, self._returned = max(self._next - forget, 1), until - forget
         return decided
 
-    def _mark(self, fall: int) -> None:
-        """Mark the rows before a step back that the clock had leapt ahead in."""
-        first = max(0, fall - 2 * WILD_ROWS)
-        before = self._stamps[first:fall].tolist()
-        wild = self._wild[first:fall].tolist()
-        back = float(self._stamps[fall])
+    def _mark_before(self, step_back: int) -> None:
+        """Mark the rows before the row `step_back` in which the clock had jumped ahead."""
+        first = max(0, step_back - 2 * STRAY_ROWS)
+        before = self._stamps[first:step_back].tolist()
+        stray = self._stray[first:step_back].tolist()
+        back = float(self._stamps[step_back])
         lowest, rows, i = np.inf, 0, len(before) - 1
-        while i >= 0 and (wild[i] or before[i] > back):
-            if not wild[i]:
+        while i >= 0 and (stray[i] or before[i] > back):
+            if not stray[i]:
                 lowest, rows = min(lowest, before[i]), rows + 1
             i -= 1
-        if i < 0 or not 0 < rows <= WILD_ROWS or first + i < 0:
+        if i < 0 or not 0 < rows <= STRAY_ROWS or first + i < 0:
             return
-        usual = _usual_step([x for x, off in zip(before[: i + 1], wild[: i + 1], strict=True) if not off])
-        if lowest - before[i] <= _LEAP * max(back - before[i], usual):
+        usual = _usual_step([x for x, off in zip(before[: i + 1], stray[: i + 1], strict=True) if not off])
+        if lowest - before[i] <= _JUMP * max(back - before[i], usual):
             return
-        after = self._stamps[fall : fall + rows]
+        after = self._stamps[step_back : step_back + rows]
         if len(after) == rows and bool(np.all(after < lowest)):
-            self._wild[first + i + 1 : fall] = True
+            self._stray[first + i + 1 : step_back] = True
 
 
-def leading_wild(stamps: FloatArray, years: float) -> int:
-    """How many finite stamps at the start of a log, up to 3, are wild; `years`: a step that is no pause."""
+def count_leading_strays(stamps: FloatArray, years: float) -> int:
+    """Return how many finite time stamps at the start of a log, up to 3, are stray.
+
+    `years` is a step, in the unit of the time stamps, that is too long for a pause.
+    """
     begin = stamps[: 2 * EDGE_ROWS + _IN_ORDER]
     for rows in range(1, EDGE_ROWS + 1):
-        then = begin[rows : rows + _IN_ORDER]
-        if len(then) < _IN_ORDER or np.any(np.diff(then) < 0.0):
+        following = begin[rows : rows + _IN_ORDER]
+        if len(following) < _IN_ORDER or np.any(np.diff(following) < 0.0):
             continue
-        if then[-1] < begin[:rows].min():
+        if following[-1] < begin[:rows].min():
             return rows
-        if len(stamps) >= _SHORTEST and then[0] - begin[:rows].max() > years and then[-1] - then[0] < years:
+        if len(stamps) < _SHORTEST:
+            continue
+        if following[0] - begin[:rows].max() > years and following[-1] - following[0] < years:
             return rows
     return 0
 
 
-def _trailing_wild(stamps: FloatArray) -> int:
-    """How many of the last stamps lie 3 years ahead of the one before them."""
-    leaps = np.flatnonzero(np.diff(stamps) > EPOCH)
-    return len(stamps) - 1 - int(leaps[0]) if len(leaps) else 0
+def _count_trailing_strays(stamps: FloatArray) -> int:
+    """Return how many of the last time stamps are 3 years ahead of the one before them."""
+    jumps = np.flatnonzero(np.diff(stamps) > EPOCH)
+    return len(stamps) - 1 - int(jumps[0]) if len(jumps) else 0
 
 
 def _usual_step(stamps: list[float]) -> float:
-    """The shortest step ahead among the last stamps, 0 where there is none."""
+    """Return the shortest forward step among the last time stamps; 0 if there is no forward step."""
     last = stamps[-_STEPS_BEFORE - 1 :]
     return min((b - a for a, b in pairwise(last) if b > a), default=0.0)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock import GAP_PERIODS, HOLD_PERIODS
-from cdtool.clock.coarse import recent_medians
+from cdtool.clock.coarse_clock import recent_medians
 from cdtool.detectors.base import BRIDGED
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from cdtool.clock import HOLD_PERIODS, previous_value
-from cdtool.clock.coarse import recent_medians
+from cdtool.clock.coarse_clock import recent_medians
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
     drive_of,

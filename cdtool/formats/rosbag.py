@@ -19,9 +19,9 @@ from cdtool.formats.container_checks import check_size, library, one_line_errors
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source, TopicDetails
 from cdtool.messages.batch import Batch
-from cdtool.messages.gathering import Gathering
 from cdtool.messages.stream import Stream
 from cdtool.messages.topic import wanted_columns, wanted_topics
+from cdtool.messages.topic_columns import TopicColumns
 from cdtool.messages.topic_survey import TopicSurvey
 
 _BAG, _SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
@@ -101,14 +101,14 @@ class _Bag:
         columns: dict[str, Column] = {}
         findings = self._losses()
         for topic in topics.values():
-            of_topic, of_findings = topic.found()
+            of_topic, of_findings = topic.columns_and_findings()
             columns |= of_topic
             findings += of_findings
         return columns, findings
 
     def wanted(self, wanted: ChannelMap) -> tuple[dict[str, Column], list[Finding]]:
         """Return the fields of a channel map, and the findings."""
-        topics = wanted_topics(self.path, wanted, partial(Gathering, expected={}))
+        topics = wanted_topics(self.path, wanted, partial(TopicColumns, expected={}))
         for stream, batch in self._batches(topics.__contains__):
             topics[stream.topic].add(stream, batch)
         logged = [name for name, (_, count) in self.topics.items() if count]

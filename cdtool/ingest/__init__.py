@@ -1,1 +1,1 @@
-"""Columns -> channels: which format, which columns, on which clock, in which unit, and the series that they become."""
+"""Columns -> channels: select the format, map columns to channels, check clocks and units, and join parts of a log."""

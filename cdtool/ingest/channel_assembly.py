@@ -1,7 +1,7 @@
-"""A file's columns -> channels in SI: the same for every format.
+"""A file's columns -> channels in SI, the same for every format.
 
-Times are cleaned (clock.clean_time), values scaled; saturated and infinite ones and those that no sensor gives are
-masked; warnings are reported, all at once. Nothing is resampled.
+Times are cleaned (clock.clean_time) and values are scaled. Saturated, infinite and physically impossible values are
+masked. All warnings are reported together. Nothing is resampled.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series
 
 Counts = npt.NDArray[np.int64]
-# Why values are masked.
+# The kinds of masked values, in the order of convert_to_si, with their severity.
 _MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
     (InfiniteValues, "loss"),
     (SaturatedValues, "warning"),
@@ -35,22 +35,23 @@ _MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
 )
 
 
-def as_logged(source: Source, channels: ChannelMap, machine: Machine) -> Recording:
-    """The channels in SI as the machine logs them, not yet referred to the load side; the map's columns are resolved.
+def assemble_recording(source: Source, channels: ChannelMap, machine: Machine) -> Recording:
+    """Return the channels in SI as logged, not yet referred to the load side; the map's columns are resolved.
 
-    The columns are taken out of the source one after another: none is longer in memory than it is needed.
+    Each column is removed from the source after its last use, to limit the memory in use.
     """
     work = _Assembly(source, channels)
     series = {}
     for number, item in enumerate(channels.sources):
         series[item.channel] = work.series(item)
-        work.drop(item, channels.sources[number + 1 :])
+        work.drop_columns(item, channels.sources[number + 1 :])
     work.columns.clear()
     for item in channels.sources:
         if item.duty is not None:
             if "N m" not in machine.accepted_units("torque"):
                 raise ConfigurationError(
-                    f"{source.path}: torque of kind 'duty' is a motor's, the machine file says coordinates = 'load'",
+                    f"{source.path}: torque of kind 'duty' is on the motor side, but the machine file states "
+                    "coordinates = 'load'",
                     "describe the machine in motor coordinates",
                 )
             series[item.channel] = _torque_from_duty(source.path, item, series, channels.speed_low_pass)
@@ -63,21 +64,23 @@ def as_logged(source: Source, channels: ChannelMap, machine: Machine) -> Recordi
         findings=(
             *source.findings,
             *work.findings,
-            *stuck_findings({name: _constant(series[name]) for name in MEASURED if name in series}, channels.joints),
-            *apart_findings({name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}),
+            *stuck_findings({name: _is_constant(series[name]) for name in MEASURED if name in series}, channels.joints),
+            *disjoint_clock_findings(
+                {name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}
+            ),
         ),
         digest=file_digest(source.path),
     )
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file's bytes."""
+    """Return the SHA-256 of a file's bytes, as hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 class _Assembly:
-    """The series of one file, with the findings made on the way."""
+    """Assembles the series of one file, and collects the findings."""
 
     def __init__(self, source: Source, channels: ChannelMap) -> None:
         self.source = source
@@ -85,21 +88,21 @@ class _Assembly:
         self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
         self.origin = source.origin
         self.findings: list[Finding] = []
-        self.gaps: set[Fact] = set()  # what was said of the table's clock is not repeated for each channel
+        self.gaps: set[Fact] = set()  # facts about the table's clock, which are not repeated for each channel
         self.table: CleanTime | None = None
         if not channels.topics:
             self.table = self._table_clock()
             self.findings += unit_findings(source, channels)
 
-    def drop(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
-        """Forget the columns of a channel that no later one is made of."""
+    def drop_columns(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
+        """Remove the columns of a channel that no later channel needs."""
         needed = {key for other in later for key in other.keys}
         for key in item.keys:
             if key not in needed:
                 self.columns.pop(key, None)
 
     def series(self, item: ChannelSource) -> Series:
-        """One channel: its values in SI at its own times."""
+        """Return one channel: its values in SI at its own times."""
         if self.table is None:
             column = self.columns[item.keys[0]]
             stamps = column.time if column.time is not None else np.empty(0)
@@ -113,11 +116,11 @@ class _Assembly:
             raise RecordingError(
                 f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
             )
-        scaled, masked = in_si(item, self._kept(item, values, clock.keep))
+        scaled, masked = convert_to_si(item, self._select(item, values, clock.keep))
         self.findings += masked_findings(masked, item, self.channels.joints)
         series = Series(clock.time, scaled, item.unit)
-        odd = gap_findings(series, item.channel, int(masked.sum()))
-        self.findings += [found for found in odd if found.fact not in self.gaps]
+        findings = gap_findings(series, item.channel, int(masked.sum()))
+        self.findings += [finding for finding in findings if finding.fact not in self.gaps]
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
     def _table_clock(self) -> CleanTime:
@@ -134,33 +137,34 @@ class _Assembly:
         clock = self._clean((column.values - start) * time.factor, "time", counted=column.values)
         if not len(clock.time):
             raise RecordingError(
-                f"{self.source.path}: column '{column.name}' holds no time stamp", "see [channels] time"
+                f"{self.source.path}: column '{column.name}' contains no time stamp", "see [channels] time"
             )
-        told_gaps = gap_findings(Series(clock.time, np.zeros(len(clock.time)), "s"), "time")
-        self.gaps = {found.fact for found in told_gaps}
-        self.findings += told_gaps
+        gaps = gap_findings(Series(clock.time, np.zeros(len(clock.time)), "s"), "time")
+        self.gaps = {gap.fact for gap in gaps}
+        self.findings += gaps
         return clock
 
     def _clean(
         self, stamps: FloatArray, clock: str, *, counted: FloatArray | None = None, sampled: bool = True
     ) -> CleanTime:
-        """The times of a clock's stamps [s]; what is odd about them is told under its name."""
+        """Return the cleaned times of a clock's stamps [s]; its findings have `clock` as their channel."""
         first = self.source.first_row
         row_name = "line" if first else "sample"
         try:
             clean = clean_time(stamps, first, row_name, counted=counted, sampled=sampled)
         except RecordingError as fault:
             raise RecordingError(f"{self.source.path}: {clock}: {fault.message}", fault.hint) from fault
-        self.findings += [replace(found, channel=clock) for found in clean.findings]
+        self.findings += [replace(finding, channel=clock) for finding in clean.findings]
         return clean
 
-    def _kept(self, item: ChannelSource, values: FloatArray, keep: BoolArray) -> FloatArray:
+    def _select(self, item: ChannelSource, values: FloatArray, keep: BoolArray) -> FloatArray:
+        """Return the kept rows (n, J) of a channel's values; raises RecordingError if their shape does not fit."""
         table = values.reshape(len(values), -1)
         if len(table) != len(keep):
             raise RecordingError(
                 f"{self.source.path}: channel '{item.channel}' ({item.described}) has {len(table)} values, "
                 f"its clock {len(keep)}",
-                "columns of one recording are equally long",
+                "all columns of a recording have the same length",
                 channel=item.channel,
             )
         check_width(self.source.path, item, table.shape[1])
@@ -168,18 +172,18 @@ class _Assembly:
 
 
 def check_width(path: Path, item: ChannelSource, width: int) -> None:
-    """Raise RecordingError where a channel's samples have not one value a joint."""
+    """Raise RecordingError if the samples of a channel do not have one value per joint."""
     if width != len(item.factor):
         raise RecordingError(
-            f"{path}: channel '{item.channel}' ({item.described}) gives {width} values "
-            f"a sample for {len(item.factor)} joints",
-            "name one element a joint, in the order of machine.joints",
+            f"{path}: channel '{item.channel}' ({item.described}) has {width} values "
+            f"per sample for {len(item.factor)} joints",
+            "name one element per joint, in the order of machine.joints",
             channel=item.channel,
         )
 
 
 def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
-    """Return the findings about masked values (as in_si counts them), by joint."""
+    """Return the findings on masked values by joint; `masked` (3, J) are the counts of convert_to_si."""
     return [
         Finding(kind(count, joint_name(joints, j, len(counts))), item.channel, severity)
         for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
@@ -189,14 +193,14 @@ def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) 
 
 
 def joint_name(joints: Sequence[str], joint: int, count: int) -> str:
-    """Return the name of a joint where a channel has several, else nothing."""
+    """Return the name of a joint if the channel has several joints, else an empty string."""
     return joints[joint] if count > 1 else ""
 
 
-def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
-    """Return (n, J) values of a channel in its SI unit, NaN where they are masked, and how many these are.
+def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
+    """Return the values (n, J) of a channel in its SI unit, with masked ones as NaN, and the counts of masked ones.
 
-    They are (3, J): infinite, at the sensor's limit, and none that a sensor gives.
+    The counts are (3, J): infinite, saturated, and physically impossible values.
     """
     infinite = np.isinf(values)
     saturated = np.zeros_like(infinite)
@@ -205,16 +209,16 @@ def in_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, Counts]:
         saturated = ((values <= low) | (values >= high)) & ~infinite
     with np.errstate(over="ignore"):
         scaled: FloatArray = values * np.array(item.factor)
-    beyond = (values < item.least) | (values > item.most)
+    impossible = (values < item.least) | (values > item.most)
     if item.channel not in UNITLESS:
-        beyond |= np.abs(scaled) >= IMPOSSIBLE
-    beyond &= ~(infinite | saturated)
-    scaled[infinite | saturated | beyond] = np.nan
-    return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, beyond)])
+        impossible |= np.abs(scaled) >= IMPOSSIBLE
+    impossible &= ~(infinite | saturated)
+    scaled[infinite | saturated | impossible] = np.nan
+    return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, impossible)])
 
 
 def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
-    """tau = k_t (u - k_e omega) / R (thesis 6.2.2), omega being the motor's speed at or before each sample."""
+    """Return tau = k_t (u - k_e omega) / R (thesis 6.2.2); omega is the last motor speed at or before each sample."""
     duty, logged = item.duty, series[item.channel]
     assert duty is not None
     if "speed" in series and series["speed"].unit == "rad/s":
@@ -233,35 +237,39 @@ def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series]
 
 
 def stuck_findings(constant: Mapping[str, Sequence[bool]], joints: Sequence[str]) -> list[Finding]:
-    """A measured channel that never changes while its joint moves; `constant`: joint by joint, a channel does not."""
-    found = []
+    """Return a finding for each measured channel that is constant while its joint moves.
+
+    `constant` states, channel by channel and joint by joint, whether the value never changes.
+    """
+    findings = []
     for name in (item for item in MEASURED if item in constant):
         others = [constant[other] for other in ("speed", "position") if other in constant and other != name]
-        for joint, stands in enumerate(constant[name]):
-            if stands and not all(other[joint] for other in others):
-                found.append(Finding(StuckChannel(joint_name(joints, joint, len(constant[name]))), name))
-    return found
+        for joint, is_constant in enumerate(constant[name]):
+            if is_constant and not all(other[joint] for other in others):
+                findings.append(Finding(StuckChannel(joint_name(joints, joint, len(constant[name]))), name))
+    return findings
 
 
-def apart_findings(first_and_last: Mapping[str, tuple[float, float]]) -> list[Finding]:
-    """Channels on clocks of their own that have no time [s] in common: between them nothing can be compared.
+def disjoint_clock_findings(first_and_last: Mapping[str, tuple[float, float]]) -> list[Finding]:
+    """Return a finding for each channel whose times [s] do not overlap with those of the others.
 
-    What is logged at events only may lie beside the rest, by no more than the log is long.
+    Such channels cannot be compared. Channels that are logged only at events may be outside the time span of the
+    others, by at most the length of the log.
     """
     spans = sorted((first, last, name) for name, (first, last) in first_and_last.items())
     longest = max((end - start for start, end, _ in spans), default=0.0)
-    found = []
+    findings = []
     latest, before = (spans[0][1], spans[0][2]) if spans else (0.0, "")
     for start, end, name in spans[1:]:
         distance = start - latest
         if distance > (longest if {name, before} & set(UNITLESS) else 0.0):
-            found.append(Finding(ClocksApart(distance, before), name))
+            findings.append(Finding(ClocksApart(distance, before), name))
         if end > latest:
             latest, before = end, name
-    return found
+    return findings
 
 
-def _constant(series: Series) -> list[bool]:
-    """Joint by joint: does it never change?"""
+def _is_constant(series: Series) -> list[bool]:
+    """Return, joint by joint, whether the value never changes."""
     finite = (column[np.isfinite(column)] for column in series.values.T)
     return [len(known) > 1 and bool(np.all(known == known[0])) for known in finite]

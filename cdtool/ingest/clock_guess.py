@@ -1,4 +1,4 @@
-"""Which column of a table is its clock, and in which unit? A guess, for a first look without a machine file."""
+"""Guess which column of a table is its clock, and its unit, for commands without a machine file."""
 
 from __future__ import annotations
 
@@ -10,33 +10,34 @@ from typing import Literal
 import numpy as np
 
 from cdtool.clock.plausible_unit import both_readings, contradicted_by_epoch, unit_since_1970
-from cdtool.clock.stamps import EDGE_ROWS, CleanPieces, gaps_in, leading_wild
+from cdtool.clock.stamps import EDGE_ROWS, ClockCleaner, count_leading_strays, gaps_in
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.findings import Finding
 from cdtool.findings.clocks import AssumedClock, HeaderUnitImplausible
 from cdtool.formats.source import Source
-from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
+from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
-# Median step -> unit: log rates of 2 Hz to 2 MHz in each of them.
+# Upper limit of the median step -> unit: it covers sample rates of 2 Hz to 2 MHz in each unit.
 _UNITS = ((0.5, "s"), (500.0, "ms"), (5e5, "us"), (np.inf, "ns"))
-# Days since 1899-12-30, as Excel counts them, of the years 2000 to 2100; a clock in seconds would step by more.
+# The years 2000 to 2100 in Excel's days since 1899-12-30, and the longest step of such a clock [days]; a clock in
+# seconds has longer steps.
 _EXCEL_FIRST, _EXCEL_LAST, _EXCEL_STEP = 36526.0, 73051.0, 5e-5
 _DAY = 86400.0
-# A clock goes forward at this share of its steps at least, and most steps are about as long as the median.
+# A column is a clock if at least this share of its steps is forward, and at least this share is near the median.
 _FORWARD, _REGULAR = 0.95, 0.8
-# Stamps of a clock that are kept rather than read again: 32 MiB.
-_KEPT = 1 << 22
-# The pieces of a column's values, from the first again with each call.
-Reread = Callable[[str], Iterable[FloatArray]]
+# Up to this many time stamps are kept in memory (32 MiB) instead of being read again.
+_MOST_KEPT = 1 << 22
+# Yields the pieces of a column's values; each call starts again from the first piece.
+ReadColumn = Callable[[str], Iterable[FloatArray]]
 
 
 @dataclass(frozen=True)
 class GuessedClock:
-    """The column taken for the clock, its times [s], and what is odd about them."""
+    """The column used as the clock, its times [s], and the findings on them."""
 
     column: str
     time: FloatArray
@@ -45,72 +46,74 @@ class GuessedClock:
 
 @dataclass(frozen=True)
 class TableClock:
-    """The column of a table taken for its clock: how its stamps become seconds, its figures, what is odd about it."""
+    """The column of a table used as its clock: its zero and unit factor, its statistics, and the findings on it."""
 
     column: str
     origin: float
     factor: float
-    figures: ClockFigures
+    statistics: ClockStatistics
     findings: tuple[Finding, ...]
 
     def times(self, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
-        """The stamps' pieces as times [s] that strictly increase; the last rows of a piece come with the next one."""
-        return self.cleaned(CleanPieces(), stamps)
+        """Yield strictly increasing times [s] for pieces of stamps; the last rows of a piece come with the next one."""
+        return self.clean(ClockCleaner(), stamps)
 
-    def cleaned(self, clean: CleanPieces, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
-        """The same through a given cleaner, which then says what was dropped."""
+    def clean(self, cleaner: ClockCleaner, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
+        """Yield the same times as `times`, using a given cleaner, which then has the findings on dropped rows."""
         for piece in stamps:
-            yield clean.times((piece - self.origin) * self.factor, piece)
-        yield clean.times(np.empty(0), np.empty(0), final=True)
+            yield cleaner.times((piece - self.origin) * self.factor, piece)
+        yield cleaner.times(np.empty(0), np.empty(0), final=True)
 
 
 def is_clock_name(name: str) -> bool:
-    """True for a column that is called as clocks are."""
+    """Return True if a column has a typical name of a clock."""
     return _NAMES.match(name) is not None
 
 
 def guess_clock(source: Source) -> GuessedClock | None:
-    """The clock of a table that is in memory; None where no column looks like one."""
-    figures: dict[str, ColumnFigures] = {}
+    """Return the clock of a table in memory; None if no column looks like a clock."""
+    statistics: dict[str, ColumnStatistics] = {}
     for name, column in source.columns.items():
-        figures[name] = ColumnFigures()
-        figures[name].add(column.values, in_table=True)
-    found = find_clock(source, figures, lambda name: [source.columns[name].values])
-    if found is None:
+        statistics[name] = ColumnStatistics()
+        statistics[name].add(column.values, in_table=True)
+    clock = find_clock(source, statistics, lambda name: [source.columns[name].values])
+    if clock is None:
         return None
-    times = np.concatenate(list(found.times([source.columns[found.column].values])))
-    return GuessedClock(found.column, times, found.findings)
+    times = np.concatenate(list(clock.times([source.columns[clock.column].values])))
+    return GuessedClock(clock.column, times, clock.findings)
 
 
-def find_clock(source: Source, figures: Mapping[str, ColumnFigures], reread: Reread) -> TableClock | None:
-    """A table's clock by the name of a column, else by its steps; None where no column looks like one.
+def find_clock(
+    source: Source, statistics: Mapping[str, ColumnStatistics], read_column: ReadColumn
+) -> TableClock | None:
+    """Return a table's clock, found by the names of columns, then by their steps; None if no column looks like a clock.
 
-    `source` may be without its rows: `figures` are those of its columns, and `reread` gives their values.
+    `source` may be without rows: `statistics` are those of its columns, and `read_column` yields their values.
     """
     tables = [column for column in source.columns.values() if column.time is None and column.values.ndim == 1]
-    # A counter may bear such a name beside the real clock: it comes last.
-    named = sorted((c for c in tables if _NAMES.match(c.name)), key=lambda c: figures[c.name].by_one)
+    # Columns that count by one come last: a row counter may have such a name, next to the real clock.
+    named = sorted((c for c in tables if _NAMES.match(c.name)), key=lambda c: statistics[c.name].by_one)
     for column in dict.fromkeys(column.name for column in (*named, *tables)):
-        known = figures[column]
+        known = statistics[column]
         if known.steps < 3 or known.forward < _FORWARD * known.steps:
             continue
-        stamps = _stamps(column, known.present, reread)
+        stamps = _stamps(column, known.present, read_column)
         step = _usual_step(stamps())
         if step is not None:
-            return _described(source.columns[column], source.first_row, step, stamps)
+            return _describe(source.columns[column], source.first_row, step, stamps)
     return None
 
 
-def _stamps(column: str, count: int, reread: Reread) -> Callable[[], Iterable[FloatArray]]:
-    """A column's pieces: few are kept, many are read again each time."""
-    if count > _KEPT:
-        return lambda: reread(column)
-    kept = [piece.copy() for piece in reread(column)]  # a piece of many columns is not kept for the sake of one
+def _stamps(column: str, count: int, read_column: ReadColumn) -> Callable[[], Iterable[FloatArray]]:
+    """Return a function that yields a column's pieces: from memory if they are few, otherwise read again each time."""
+    if count > _MOST_KEPT:
+        return lambda: read_column(column)
+    kept = [piece.copy() for piece in read_column(column)]  # copies, as a view would keep all columns of the piece
     return lambda: kept
 
 
 def _usual_step(stamps: Iterable[FloatArray]) -> float | None:
-    """The median step between stamps, where a clock may have such steps."""
+    """Return the median step between time stamps; None if the steps are too irregular for a clock."""
     steps, last = Distribution(), np.empty(0)
     for piece in stamps:
         known = np.concatenate((last, piece[np.isfinite(piece)]))
@@ -121,7 +124,7 @@ def _usual_step(stamps: Iterable[FloatArray]) -> float | None:
     return median if regular else None
 
 
-def _described(column: Column, first_row: int, step: float, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
+def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     known = find_unit(column.unit) if column.unit else None
     evidence: Literal["header", "epoch", "excel", "steps"]
     start = _start(stamps())
@@ -141,26 +144,26 @@ def _described(column: Column, first_row: int, step: float, stamps: Callable[[],
     else:
         unit, evidence = next(name for most, name in _UNITS if step < most), "steps"
     factor = _DAY if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
-    # An epoch is taken off before scaling, so that no digit is lost.
+    # An epoch is subtracted before scaling, so that no digit is lost.
     origin = start if epoch or unit == "days" else 0.0
     assumed = Finding(AssumedClock(unit, evidence, start, step), column.name, "note")
-    clock = TableClock(column.name, origin, factor, ClockFigures(), (assumed, *wrong))
-    return _checked(clock, first_row, stamps)
+    clock = TableClock(column.name, origin, factor, ClockStatistics(), (assumed, *wrong))
+    return _with_findings(clock, first_row, stamps)
 
 
 def _start(stamps: Iterable[FloatArray]) -> float:
-    """The first stamp that is not wild; the first of an epoch where one that is of none stands before it."""
+    """Return the first time stamp that is not stray, nor outside of an epoch if a later one is within it."""
     known = next(found for piece in stamps if len(found := piece[np.isfinite(piece)]))
-    rows = leading_wild(known, np.inf)
+    rows = count_leading_strays(known, np.inf)
     if not rows and not unit_since_1970(known[0]):
         rows = next((i for i, stamp in enumerate(known[: EDGE_ROWS + 1]) if unit_since_1970(stamp)), 0)
     return float(known[rows])
 
 
-def _checked(clock: TableClock, first_row: int, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
-    """The clock with its figures and all that is odd about it."""
-    clean = CleanPieces()
-    for times in clock.cleaned(clean, stamps()):
-        clock.figures.add(times, len(times))
-    gaps = gaps_in(clock.times(stamps()), clock.figures.steps.median, clock.column)
-    return replace(clock, findings=(*clock.findings, *clean.findings(first_row), *gaps))
+def _with_findings(clock: TableClock, first_row: int, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
+    """Return the clock with its statistics and all findings."""
+    cleaner = ClockCleaner()
+    for times in clock.clean(cleaner, stamps()):
+        clock.statistics.add(times, len(times))
+    gaps = gaps_in(clock.times(stamps()), clock.statistics.steps.median, clock.column)
+    return replace(clock, findings=(*clock.findings, *cleaner.findings(first_row), *gaps))

@@ -1,4 +1,4 @@
-"""Does a log's header measure a channel in the unit that the machine file states for it?"""
+"""Check the units in a log's header against those in the machine file."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.units import RAW_UNITS, Unit, find_unit
 
-# Plain numbers, whatever they are called.
+# Units of plain numbers.
 _PLAIN = ("1", "count")
-# A scale that makes up for another unit is often rounded: 0.1047 for rpm. No two units of one kind are so close.
+# A scale that converts another unit is often rounded: 0.1047 for rpm. No two units of one kind are this close.
 _ROUNDED = 1e-3
 
 
 def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
-    """A warning for each channel whose columns' units contradict the machine file, in kind or by a factor.
+    """Return a warning for each channel whose columns have units that contradict the machine file, in kind or factor.
 
-    An explicit scale that leads from the header's unit to the channel's is no contradiction; a header without a unit,
-    with one that is not known, or with "1", says nothing. The map's columns are resolved (resolve_columns).
+    An explicit scale that converts the header's unit to the channel's is not a contradiction. A header without a unit,
+    with an unknown one, or with "1" is not checked. The map's columns are resolved (resolve_columns).
     """
     findings = []
     for item in channels.sources:
@@ -39,29 +39,29 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
 
 
 def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> list[Finding]:
-    """The warnings of one channel, one for each unit that contradicts: `columns` are those of its joints."""
+    """Return the warnings of one channel, one per contradicting unit; `columns` are those of its joints."""
     stated = find_unit(item.stated) if item.stated else None
     if stated is None:
         return []
     by_unit: dict[str, list[Column]] = {}
     for column, factor in zip(columns, item.factor, strict=False):
-        told = find_unit(column.unit) if column.unit else None
-        if told is not None and not _fits(told, stated, item.unit, abs(factor)):
+        header_unit = find_unit(column.unit) if column.unit else None
+        if header_unit is not None and not _fits(header_unit, stated, item.unit, abs(factor)):
             by_unit.setdefault(str(column.unit), []).append(column)
-    return [Finding(_contradiction(item, stated, unit, found), item.channel) for unit, found in by_unit.items()]
+    return [Finding(_contradiction(item, stated, unit, columns), item.channel) for unit, columns in by_unit.items()]
 
 
 def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
-    """The warning on a clock whose steps no log has in the unit that the machine file states.
+    """Return the warning on a clock whose steps are implausible in the unit that the machine file states.
 
-    `origin` [s in that unit] has been taken off the stamps.
-    Raises RecordingError where its stamps cannot be times in that unit, and count from 1970 in another one.
+    `origin`, in seconds according to that unit, has been subtracted from the time stamps. Raises RecordingError if the
+    time stamps cannot be times in that unit, but are times since 1970 in another one.
     """
     if time.rate is not None:
         return []
     first = _first_stamp(time, column, origin)
-    stated, told = time.unit or "s", find_unit(column.unit) if column.unit else None
-    header = _shown(column) if told == Unit("s", time.factor) else ""
+    stated, header_unit = time.unit or "s", find_unit(column.unit) if column.unit else None
+    header = _header_text(column) if header_unit == Unit("s", time.factor) else ""
     meant = contradicted_by_epoch(first, time.factor)
     if meant:
         also = f", as its header says '{header}'" if header else ""
@@ -78,61 +78,63 @@ def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float
 
 
 def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
-    """The warning on a clock whose column has another unit than the machine file states, or is no time at all.
+    """Return the warning on a clock whose column has another unit than the machine file states, or is not a time.
 
-    None where the stamps count from 1970 in the unit of the machine file: the header is wrong, and nothing is to do.
+    If the time stamps count from 1970 in the machine file's unit, the header is wrong and there is no warning.
     """
-    told = find_unit(column.unit) if column.unit else None
-    if told is not None and told.si == "s":
-        meant = contradicted_by_epoch(_first_stamp(time, column, origin), told.factor)
+    header_unit = find_unit(column.unit) if column.unit else None
+    if header_unit is not None and header_unit.si == "s":
+        meant = contradicted_by_epoch(_first_stamp(time, column, origin), header_unit.factor)
         if meant and math.isclose(SECONDS[meant], time.factor):
             return []
-    if told is None or told.si in _PLAIN or (told.si == "s" and math.isclose(told.factor, time.factor)):
+    if header_unit is None or header_unit.si in _PLAIN:
         return []
-    ratio = _ratio(told, Unit("s", time.factor))
-    fact = ClockUnitContradicted(_shown(column), str(column.unit), time.unit or "s", time.rate or 0.0, ratio)
+    if header_unit.si == "s" and math.isclose(header_unit.factor, time.factor):
+        return []
+    ratio = _ratio(header_unit, Unit("s", time.factor))
+    fact = ClockUnitContradicted(_header_text(column), str(column.unit), time.unit or "s", time.rate or 0.0, ratio)
     return [Finding(fact, "time")]
 
 
 def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:
-    """The first stamp as the file holds it, in the unit of the machine file; 0 where there is none."""
+    """Return the first time stamp as in the file, in the unit of the machine file; 0 if all are missing."""
     known = np.flatnonzero(np.isfinite(column.values))
     return float(column.values[known[0]]) + origin / time.factor if len(known) else 0.0
 
 
-def _fits(told: Unit, stated: Unit, channel_unit: str, factor: float) -> bool:
-    if told == Unit("1", 1.0) and stated.si != "1":  # what some loggers write where they know no unit
+def _fits(header_unit: Unit, stated: Unit, channel_unit: str, factor: float) -> bool:
+    if header_unit == Unit("1", 1.0) and stated.si != "1":  # some loggers write "1" if the unit is unknown
         return True
-    alike = told.si == stated.si or (told.si in _PLAIN and stated.si in _PLAIN)
-    if stated.si == "SI":  # of joints of both kinds each has its own SI unit
-        alike = told.si not in RAW_UNITS
-    if alike and math.isclose(told.factor, stated.factor):
+    same_kind = header_unit.si == stated.si or (header_unit.si in _PLAIN and stated.si in _PLAIN)
+    if stated.si == "SI":  # linear and rotary joints together: each has its own SI unit
+        same_kind = header_unit.si not in RAW_UNITS
+    if same_kind and math.isclose(header_unit.factor, stated.factor):
         return True
-    return told.si == channel_unit and math.isclose(told.factor, factor, rel_tol=_ROUNDED)
+    return header_unit.si == channel_unit and math.isclose(header_unit.factor, factor, rel_tol=_ROUNDED)
 
 
 def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> UnitContradicted:
-    told = find_unit(unit)
-    assert told is not None
+    header_unit = find_unit(unit)
+    assert header_unit is not None
     advice: Literal["unit", "unit and scale", "unit without scale", "other column"] = "unit"
-    if item.duty is None and told.si in RAW_UNITS and stated.si != told.si:
+    if item.duty is None and header_unit.si in RAW_UNITS and stated.si != header_unit.si:
         advice = "unit and scale"
-    elif told.si == item.unit and stated.si in RAW_UNITS:
+    elif header_unit.si == item.unit and stated.si in RAW_UNITS:
         advice = "unit without scale"
-    elif told.si not in (item.unit, stated.si, *RAW_UNITS):
+    elif header_unit.si not in (item.unit, stated.si, *RAW_UNITS):
         advice = "other column"
-    scale = f"{item.unit} per {told.si}" if advice == "unit and scale" else ""
-    header, ratio = _shown(columns[0]), _ratio(told, stated)
+    scale = f"{item.unit} per {header_unit.si}" if advice == "unit and scale" else ""
+    header, ratio = _header_text(columns[0]), _ratio(header_unit, stated)
     return UnitContradicted(header, unit, len(columns) - 1, str(item.stated), ratio, advice, scale)
 
 
-def _ratio(told: Unit, stated: Unit) -> float:
-    """By how much values of one kind are wrong where the header is right; 0 for units of two kinds."""
-    if told.si != stated.si:
+def _ratio(header_unit: Unit, stated: Unit) -> float:
+    """Return the factor by which values are wrong if the header is right; 0 for units of different kinds."""
+    if header_unit.si != stated.si:
         return 0.0
-    ratio = told.factor / stated.factor
+    ratio = header_unit.factor / stated.factor
     return max(ratio, 1.0 / ratio)
 
 
-def _shown(column: Column) -> str:
+def _header_text(column: Column) -> str:
     return column.name if split_unit(column.name)[1] is not None else f"{column.name} [{column.unit}]"

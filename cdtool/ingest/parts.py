@@ -1,4 +1,4 @@
-"""A log in parts, as rosbag2 splits one: its parts put together, and those that its metadata.yaml names in vain."""
+"""A log in parts, as rosbag2 splits one: joining the parts, and parts that metadata.yaml names but that are missing."""
 
 from __future__ import annotations
 
@@ -28,62 +28,63 @@ _METADATA = "metadata.yaml"
 _COMPRESSED = (".zstd", ".zst", ".lz4")
 
 
-def joined_digest(digests: Sequence[str]) -> str:
-    """SHA-256 of a log by those of its parts: of their hexadecimal digits one after the other; of one part its own."""
+def join_digests(digests: Sequence[str]) -> str:
+    """Return the SHA-256 of a log: of a single part its own, else that of the concatenated hexadecimal digests."""
     return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
-def lost_parts(folder: Path, parts: Sequence[Path]) -> list[Finding]:
-    """Files that the folder's metadata.yaml names and that are none of its `parts`; none without a metadata.yaml."""
-    read, found = {part.name for part in parts}, []
+def missing_part_findings(folder: Path, parts: Sequence[Path]) -> list[Finding]:
+    """Return findings on files that the folder's metadata.yaml names, but that are not among its `parts`."""
+    read, findings = {part.name for part in parts}, []
     for name in _named_parts(folder / _METADATA):
         plain = Path(name).stem if Path(name).suffix in _COMPRESSED else name
         if name in read or plain in read:
             continue
-        is_there = (folder / name).exists()
-        kind = PartMissing if not is_there else PartCompressed if name != plain else PartOfOtherKind
-        found.append(Finding(kind(name, _METADATA), severity="loss"))
-    return found
+        exists = (folder / name).exists()
+        kind = PartMissing if not exists else PartCompressed if name != plain else PartOfOtherKind
+        findings.append(Finding(kind(name, _METADATA), severity="loss"))
+    return findings
 
 
-def lost_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, RecordingError]) -> tuple[Finding, ...]:
-    """The losses of a folder: `parts` are its files, `unread` those of them that cannot be read, with the reason."""
-    found = lost_parts(folder, parts)
+def loss_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, RecordingError]) -> tuple[Finding, ...]:
+    """Return the losses of a folder: `parts` are its files, `unread` those that cannot be read, with the reason."""
+    findings = missing_part_findings(folder, parts)
     for part, fault in unread.items():
-        why = fault.message.removeprefix(f"{part}: ")
-        found.append(Finding(PartUnreadable(part.name, why), severity="loss"))
-    return tuple(found)
+        reason = fault.message.removeprefix(f"{part}: ")
+        findings.append(Finding(PartUnreadable(part.name, reason), severity="loss"))
+    return tuple(findings)
 
 
-def joined_sources(
+def join_sources(
     folder: Path, parts: Sequence[tuple[Source, Mapping[str, Span]]], unread: Mapping[Path, RecordingError]
 ) -> Source:
-    """Return the columns of all parts without rows, with the findings of every part, in the order of their times.
+    """Return the columns of all parts without rows, and the findings of every part, in the order of their times.
 
-    Each part comes with what its columns span [s], on one clock. A column may be absent in some of them; one whose
-    arrays differ in length is left out, and that is said, as are parts that could not be read (`unread`).
+    Each part has the time span [s] of each of its columns, on one clock. A column may be missing in some parts. A
+    column whose array length differs between parts is left out and reported, as are parts that could not be read
+    (`unread`).
     """
     sources = [source for source, _ in parts]
-    lost = lost_findings(folder, [*(source.path for source in sources), *unread], unread)
+    lost = loss_findings(folder, [*(source.path for source in sources), *unread], unread)
     if len(parts) == 1:
         return replace(sources[0], path=folder, findings=(*lost, *sources[0].findings))
-    findings = [*lost, *(found for source in sources for found in of_part(source.path, source.findings))]
+    findings = [*lost, *(found for source in sources for found in with_file_name(source.path, source.findings))]
     columns: dict[str, Column] = {}
     late: dict[Path, str] = {}
     for name in dict.fromkeys(name for source in sources for name in source.columns):
-        holding = [(source, spans.get(name)) for source, spans in parts if name in source.columns]
-        widths = sorted({source.columns[name].values.shape[1:] for source, _ in holding})
+        containing = [(source, spans.get(name)) for source, spans in parts if name in source.columns]
+        widths = sorted({source.columns[name].values.shape[1:] for source, _ in containing})
         if len(widths) > 1:
             lengths = ArrayLengthsDiffer(tuple(width[0] if width else 1 for width in widths))
             findings.append(Finding(lengths, name, "note"))
             continue
-        columns[name] = holding[0][0].columns[name]
-        for (_, before), (source, span) in pairwise(holding):
+        columns[name] = containing[0][0].columns[name]
+        for (_, before), (source, span) in pairwise(containing):
             if before and span and span[0] < before[1]:
                 late.setdefault(source.path, name)
     findings += [Finding(PartsOverlap(path.name, name)) for path, name in late.items()]
     first, names = sources[0], tuple(columns)
-    details, topics = joined_details(sources), joined_topics(sources)
+    details, topics = join_details(sources), join_topics(sources)
     return Source(folder, first.format, columns, first.origin, tuple(findings), details, names=names, topics=topics)
 
 
@@ -98,7 +99,7 @@ class ChannelSpan(NamedTuple):
 
 @dataclass(frozen=True)
 class PartSpan:
-    """What the channels of a part span, in times counted from `origin` [s]."""
+    """The time spans of the channels of a part, counted from `origin` [s]."""
 
     path: str
     origin: float
@@ -106,7 +107,7 @@ class PartSpan:
 
     @classmethod
     def of(cls, part: Recording) -> PartSpan:
-        """Return that of a part which is in memory."""
+        """Return the spans of a part that is in memory."""
         spans = {}
         for name, series in part.channels.items():
             time = series.time
@@ -116,9 +117,9 @@ class PartSpan:
 
 
 def check_parts(parts: Sequence[PartSpan]) -> None:
-    """Raise RecordingError where a part has no such channel, or begins before the one before it ends.
+    """Raise RecordingError if a part does not have a channel of another one, or begins before the previous part ends.
 
-    Ground truth may be in some of them only, such as the events of a stroke.
+    Ground truth, such as the events of a stroke, may be in some parts only.
     """
     first = parts[0]
     for name in dict.fromkeys(name for part in parts for name in part.channels):
@@ -130,23 +131,23 @@ def check_parts(parts: Sequence[PartSpan]) -> None:
             if span is None or unit not in (None, span.unit):
                 raise RecordingError(
                     f"{part.path}: channel '{name}' is not logged as in {first.path}",
-                    "parts of one log are alike",
+                    "all parts of a log have the same channels and units",
                     channel=name,
                 )
             start = span.first + (part.origin - first.origin)
             if start <= end:
                 raise RecordingError(
-                    f"{part.path}: overlaps the part before it ({name}: starts at {start:g} s, before {end:g} s)",
-                    "parts of one log share one clock and follow one another",
+                    f"{part.path}: overlaps the previous part ({name}: starts at {start:g} s, before {end:g} s)",
+                    "the parts of a log share one clock and do not overlap",
                 )
             end, unit = span.last + (part.origin - first.origin), span.unit
 
 
-def gaps_between(parts: Sequence[PartSpan]) -> Iterator[Finding]:
-    """Yield one finding for each part that begins later than its channels' steps explain; `parts` follow one another.
+def part_gap_findings(parts: Sequence[PartSpan]) -> Iterator[Finding]:
+    """Yield one finding for each of the consecutive `parts` that begins later than its channels' steps explain.
 
-    Between them nothing was logged: a recorder that was stopped, or a part that nobody names. Ground truth may be in
-    some parts only. Where not all channels pause, the finding names those that do.
+    Nothing was logged in between: the recorder was stopped, or a part is missing. Ground truth is not considered, as it
+    may be in some parts only. If only some channels pause, the finding names them.
     """
     for before, after in pairwise(parts):
         channels = [name for name in before.channels if name in after.channels and name not in GROUND_TRUTH]
@@ -160,59 +161,60 @@ def gaps_between(parts: Sequence[PartSpan]) -> Iterator[Finding]:
             yield Finding(PartGap(min(gaps.values()), paused), file=Path(after.path).name)
 
 
-def joined_recordings(parts: Sequence[Recording], name: str) -> Recording:
-    """Return parts of one log, as logged, as one recording; raises RecordingError as check_parts does."""
+def join_recordings(parts: Sequence[Recording], name: str) -> Recording:
+    """Return the parts of a log, as logged, as one recording; raises RecordingError as check_parts does."""
     parts = sorted(parts, key=lambda part: part.origin + part.start)
     spans = [PartSpan.of(part) for part in parts]
     check_parts(spans)
     first = parts[0]
     joined: dict[str, Series] = {}
     for channel in dict.fromkeys(name for part in parts for name in part.channels):
-        holding = [part for part in parts if channel in part]
-        time = np.concatenate([part[channel].time + (part.origin - first.origin) for part in holding])
-        values = np.concatenate([part[channel].values for part in holding])
-        joined[channel] = Series(time, values, holding[0][channel].unit)
-    findings = tuple(found for part in parts for found in of_part(Path(part.source), part.findings))
-    findings += tuple(gaps_between(spans))
+        containing = [part for part in parts if channel in part]
+        time = np.concatenate([part[channel].time + (part.origin - first.origin) for part in containing])
+        values = np.concatenate([part[channel].values for part in containing])
+        joined[channel] = Series(time, values, containing[0][channel].unit)
+    findings = tuple(found for part in parts for found in with_file_name(Path(part.source), part.findings))
+    findings += tuple(part_gap_findings(spans))
     source = ", ".join(part.source for part in parts)
-    digest = joined_digest([part.digest for part in parts])
+    digest = join_digests([part.digest for part in parts])
     return Recording(name, source, first.joints, joined, first.origin, findings, digest)
 
 
-def of_part(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
-    """The findings of a part, with its name."""
-    return (replace(found, file=path.name) for found in findings)
+def with_file_name(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield the findings of a part, with the name of its file."""
+    return (replace(finding, file=path.name) for finding in findings)
 
 
-def joined_details(parts: Sequence[Source]) -> dict[str, str]:
-    """Return what the parts of a log state about themselves."""
+def join_details(parts: Sequence[Source]) -> dict[str, str]:
+    """Return the details of a log from those of its parts."""
     if len(parts) == 1:
         return dict(parts[0].details)
-    said: dict[str, list[str]] = {}
+    by_key: dict[str, list[str]] = {}
     for part in parts:
         for key, text in part.details.items():
-            said.setdefault(key, []).append(text)
+            by_key.setdefault(key, []).append(text)
     joined = {"parts": f"{len(parts)}, {parts[0].path.name} to {parts[-1].path.name}"}
-    return joined | {key: " or ".join(dict.fromkeys(texts)) for key, texts in said.items()}
+    return joined | {key: " or ".join(dict.fromkeys(texts)) for key, texts in by_key.items()}
 
 
-def joined_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
-    """Return what the parts of a log state about each topic."""
-    said: dict[str, list[TopicDetails]] = {}
+def join_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
+    """Return the details of each topic from those of the parts of a log."""
+    by_name: dict[str, list[TopicDetails]] = {}
     for part in parts:
         for name, topic in part.topics.items():
-            said.setdefault(name, []).append(topic)
-    return {name: TopicDetails.of_parts(topics) for name, topics in said.items()}
+            by_name.setdefault(name, []).append(topic)
+    return {name: TopicDetails.of_parts(topics) for name, topics in by_name.items()}
 
 
 def _named_parts(metadata: Path) -> list[str]:
-    """The names below `relative_file_paths`, read line by line: rosbag2 writes plain lists of plain texts there.
+    """Return the file names listed in `relative_file_paths`; empty without a metadata.yaml.
 
-    The first versions of rosbag2 wrote the bag's folder before each name.
+    It is read line by line, as rosbag2 writes simple lists of strings. The first versions of rosbag2 wrote the bag's
+    folder before each name.
     """
     try:
         content = read_bytes(metadata, RecordingError) if metadata.is_file() else b""
-    except RecordingError:  # what it says is no more than a check
+    except RecordingError:  # the list is only used for a check
         return []
     lines = content.decode("utf-8", "replace").splitlines()
     for i, line in enumerate(lines):
@@ -224,12 +226,12 @@ def _named_parts(metadata: Path) -> list[str]:
 
 
 def _flow_list(rest: str, below: Sequence[str]) -> list[str]:
-    """`[bag_0.mcap, bag_1.mcap]`, in one line or over several."""
+    """Return the items of a list `[bag_0.mcap, bag_1.mcap]`, in one line or several."""
     return "\n".join([rest, *below]).partition("[")[2].partition("]")[0].split(",")
 
 
 def _block_list(below: Sequence[str]) -> Iterator[str]:
-    """Lines `- bag_0.mcap`, until one that is not an item."""
+    """Yield the items of lines `- bag_0.mcap`, up to the first line that is not an item."""
     for line in below:
         text = line.strip()
         if not text or text.startswith("#"):
@@ -240,7 +242,7 @@ def _block_list(below: Sequence[str]) -> Iterator[str]:
 
 
 def _plain(item: str) -> str:
-    """An item without its quotes, or without the comment behind it."""
+    """Return an item without its quotes, or without the comment after it."""
     text = item.strip()
     if text[:1] in ("'", '"'):
         return text[1:].partition(text[0])[0]

@@ -1,4 +1,4 @@
-"""Reading a log: which format, which section of the machine file, one file or parts, as a whole or piece by piece."""
+"""Read a log: select its format and the section of the machine file; read a file or parts, whole or piece by piece."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from cdtool.formats.column_names import OWN_CLOCK, resolve_columns
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source, in_words
-from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.channel_assembly import assemble_recording
 from cdtool.ingest.header_units import unit_findings
 from cdtool.ingest.parts import (
     Span,
-    joined_details,
-    joined_recordings,
-    joined_sources,
-    joined_topics,
-    lost_findings,
-    lost_parts,
+    join_details,
+    join_recordings,
+    join_sources,
+    join_topics,
+    loss_findings,
+    missing_part_findings,
 )
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Recording
 
-# Opens a file of a format, for some of its columns or all.
+# Opens a file of a format, for some or all of its columns.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
 
 _KNOWN_CONTENTS = {
@@ -48,7 +48,7 @@ _KNOWN_CONTENTS = {
     b"\x1f\x8b": "gzip-compressed",
     b"(\xb5/\xfd": "zstd-compressed",
     b"\x89HDF": "an HDF5 file",
-    b"SQLite format 3": "an SQLite database, but no ROS 2 bag",
+    b"SQLite format 3": "an SQLite database, but not a ROS 2 bag",
     b"<": "HTML or XML",
     b"{": "JSON",
     b"[": "JSON",
@@ -68,32 +68,32 @@ _WIDE = {
 
 
 def choose_format(path: Path) -> Format:
-    """The format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
-    head = _head(path)
+    """Return the format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
+    head = _read_head(path)
     suffix = path.suffix.lower()
-    for name in FORMATS.names():  # one by one: mostly the first fits, and the others need not be loaded
+    for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
         likely: Format = FORMATS.load(name)()
         if suffix in likely.suffixes and likely.sniff(path):
             return likely
     formats: list[Format] = [FORMATS.load(name)() for name in FORMATS.names(plugins=suffix not in _suffixes())]
     by_suffix = [item for item in formats if suffix in item.suffixes]
-    # Almost any text can pass for a table: one that claims to be of another format must hold numbers.
+    # Almost any text can be read as a table; a file with the suffix of another format must contain numbers.
     claimed = by_suffix and not any(_sniffs_any_text(item) for item in by_suffix)
     for item in [*by_suffix, *formats]:
         if item.sniff(path) and not (claimed and _sniffs_any_text(item) and not _is_table(item, path)):
             return item
     wide = next((encoding for mark, encoding in _WIDE.items() if head.startswith(mark)), "")
     start = (head.decode(wide, errors="replace").encode() if wide else head).removeprefix(codecs.BOM_UTF8).lstrip()
-    seen = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
-    seen = kind_of(head) or seen if seen == "JSON" else seen
-    if wide and not seen and _is_damaged_text(path, wide):
+    content = next((text for magic, text in _KNOWN_CONTENTS.items() if start.startswith(magic)), "")
+    content = kind_of(head) or content if content == "JSON" else content
+    if wide and not content and _is_damaged_text(path, wide):
         raise RecordingError(
-            f"{path}: begins as {wide.upper()} does, but does not go on as it", "copy it again from where it was made"
+            f"{path}: begins as {wide.upper()} text, but the rest is damaged", "copy the file again from its source"
         )
-    expected = f", nor a whole {by_suffix[0].name.upper()} file" if by_suffix and not seen else ""
+    expected = f", nor a complete {by_suffix[0].name.upper()} file" if by_suffix and not content else ""
     raise RecordingError(
-        f"{path}: is not a recording{f': it is {seen}' if seen else expected}",
-        _NEXT_STEPS.get(seen, f"cdtool reads {', '.join(item.name for item in formats)}"),
+        f"{path}: is not a recording{f': it is {content}' if content else expected}",
+        _NEXT_STEPS.get(content, f"cdtool reads {', '.join(item.name for item in formats)}"),
     )
 
 
@@ -103,21 +103,22 @@ def survey(path: Path) -> Source:
 
 
 def log_pieces(log: Path, keys: Collection[str] | None = None, read: ReadFile = read_pieces) -> Pieces:
-    """Yield all numeric columns of a file, or of the folder that rosbag2 made, or at least `keys`.
+    """Yield pieces of the numeric columns of a file, or of a folder written by rosbag2.
 
-    A part that cannot be read is a loss, as long as another one can. Raises RecordingError.
+    The columns are all, or at least `keys`. A part that cannot be read is a loss if another part can be read. Raises
+    RecordingError.
     """
     if not log.is_dir():
         return read(choose_format(log), log, keys)
-    return _of_parts(log, keys, read)
+    return _part_pieces(log, keys, read)
 
 
-def _of_parts(folder: Path, keys: Collection[str] | None, read: ReadFile) -> Pieces:
-    """Yield the parts one after the other, all times from the start of the first."""
-    found = FoundParts.of(folder)
+def _part_pieces(folder: Path, keys: Collection[str] | None, read: ReadFile) -> Pieces:
+    """Yield the pieces of one part after the other; all times count from the start of the first part."""
+    log = LogFolder.of(folder)
     start: float | None = None
     parts: list[tuple[Source, Mapping[str, Span]]] = []
-    for part in (*found.filled, *found.empty):
+    for part in (*log.filled, *log.empty):
         run = PieceRun(read(choose_format(part), part, keys))
         spans: dict[str, Span] = {}
         for piece in run:
@@ -130,27 +131,27 @@ def _of_parts(folder: Path, keys: Collection[str] | None, read: ReadFile) -> Pie
                 spans[name] = min(first, float(time[0])), max(last, float(time[-1]))
             yield replace(piece, time=time, origin=start)
         parts.append((run.source, spans))
-    return joined_sources(folder, parts, found.unread)
+    return join_sources(folder, parts, log.unread)
 
 
-def in_time_order(log: Path) -> bool:
-    """Return True where rows are to be in the order of their times, as messages are, and not as they stand."""
+def needs_time_order(log: Path) -> bool:
+    """Return True if rows must be sorted by their times, as messages, instead of in the order of the file."""
     return log.is_dir() or has_topics(choose_format(log))
 
 
 def element_names(path: Path, topic: str) -> tuple[str, ...]:
-    """Return how the first message of a topic names the elements of its arrays, as a JointState names its joints.
+    """Return the element names in the first message of a topic, such as the joint names of a JointState.
 
-    Empty where it does not, or the format cannot tell.
+    Empty if the message does not name its elements, or the format has no such names.
     """
-    tell = getattr(choose_format(path), "element_names", None)
-    return tuple(tell(path, topic)) if tell is not None else ()
+    read_names = getattr(choose_format(path), "element_names", None)
+    return tuple(read_names(path, topic)) if read_names is not None else ()
 
 
 def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
-    """One log as a recording on the load side; raises RecordingError or ConfigurationError.
+    """Return one log as a recording on the load side; raises RecordingError or ConfigurationError.
 
-    A folder of MCAP or .db3 files, as rosbag2 writes it, is one log in parts. Values outside of `ranges` are masked.
+    A folder of MCAP or .db3 files, as written by rosbag2, is one log in parts. Values outside of `ranges` are masked.
     """
     return read_as_logged(path, machine_file).on_load_side(machine_file.machine, ranges)
 
@@ -158,30 +159,30 @@ def read_recording(path: Path, machine_file: MachineFile, ranges: PlausibleRange
 def read_as_logged(
     path: Path, machine_file: MachineFile, unread: Literal["error", "loss"] = "error"
 ) -> LoggedRecording:
-    """Return one log, or a folder of its parts, as it is logged; raises RecordingError or ConfigurationError.
+    """Return one log, a file or a folder of parts, as logged; raises RecordingError or ConfigurationError.
 
-    `unread` says what a part is that cannot be read.
+    `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
     if not path.is_dir():
         return read_parts([path], machine_file, path.stem)
     if unread == "loss":
-        found = FoundParts.of(path)
-        parts, lost = list(found.filled), list(found.findings)
+        folder = LogFolder.of(path)
+        parts, lost = list(folder.filled), list(folder.findings)
         if not parts:
-            raise RecordingError(f"{path}: no part of the log holds a message", "was the recording stopped at once?")
+            raise RecordingError(f"{path}: no part of the log contains a message", "was the recording stopped at once?")
     else:
         parts = log_parts(path)
-        lost = lost_parts(path, parts)
+        lost = missing_part_findings(path, parts)
     logged = read_parts(parts, machine_file, path.name)
     findings = (*lost, *logged.recording.findings)
     return replace(logged, recording=replace(logged.recording, source=str(path), findings=findings))
 
 
 @dataclass(frozen=True)
-class FoundParts:
-    """The parts of a log in a folder: those that hold something in the order of their first times, and the others.
+class LogFolder:
+    """The parts of a log in a folder: `filled` ones in the order of their first times, and `empty` ones.
 
-    `unread` are those that cannot be read at all, with the reason.
+    `unread` are those that cannot be read, with the reason.
     """
 
     folder: Path
@@ -190,8 +191,8 @@ class FoundParts:
     unread: Mapping[Path, RecordingError]
 
     @classmethod
-    def of(cls, folder: Path) -> FoundParts:
-        """Look into each part; raises RecordingError where none can be read."""
+    def of(cls, folder: Path) -> LogFolder:
+        """Return the parts of a folder; raises RecordingError if no part can be read."""
         starts: dict[Path, float] = {}
         unread: dict[Path, RecordingError] = {}
         for part in log_parts(folder):
@@ -206,77 +207,78 @@ class FoundParts:
         return cls(folder, tuple(part for _, _, part in known), empty, unread)
 
     @property
-    def every(self) -> tuple[Path, ...]:
+    def files(self) -> tuple[Path, ...]:
         """All files of the log."""
         return (*self.filled, *self.empty, *self.unread)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What is lost: parts that are not there, and those that cannot be read."""
-        return lost_findings(self.folder, self.every, self.unread)
+        """The losses: missing parts, and those that cannot be read."""
+        return loss_findings(self.folder, self.files, self.unread)
 
 
 def log_parts(path: Path) -> list[Path]:
-    """The files of a log: itself, or those in the folder that rosbag2 made; raises RecordingError."""
+    """Return the files of a log: the file itself, or those in a folder written by rosbag2; raises RecordingError."""
     for pattern in ("*.mcap", "*.db3") if path.is_dir() else ():
         if parts := sorted(part for part in path.glob(pattern) if not part.name.startswith(".")):
             return parts
-    if path.is_dir() and (lost := lost_parts(path, [])):
-        raise RecordingError(f"{path}: {lost[0]}", "copy the whole folder that rosbag2 made")
-    _head(path)
+    if path.is_dir() and (lost := missing_part_findings(path, [])):
+        raise RecordingError(f"{path}: {lost[0]}", "copy the complete folder that rosbag2 wrote")
+    _read_head(path)
     return [path]
 
 
 def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, ChannelMap]:
-    """One file's columns that the machine file maps, and the map that fits them; raises RecordingError.
+    """Return the columns of one file that the machine file maps, and the map for them; raises RecordingError.
 
-    A load cell or label that is mapped and not in the file is left out of the map, with a note.
+    A mapped load cell or label that is not in the file is left out of the map, with a note.
     """
-    found = choose_format(path)
-    channels = _map(found, machine_file, path)
-    source, resolved = resolve_columns(found.columns(path, channels), channels)
+    file_format = choose_format(path)
+    channels = _map_for(file_format, machine_file, path)
+    source, resolved = resolve_columns(file_format.columns(path, channels), channels)
     return with_own_clocks(source, resolved)
 
 
-def has_topics(found: Format) -> bool:
-    """True where a format holds messages of topics, so that [channels.mcap] maps it; a plug-in need not tell."""
-    return bool(getattr(found, "topics", False))
+def has_topics(file_format: Format) -> bool:
+    """Return True if a format contains messages of topics, mapped by [channels.mcap]; optional for plug-ins."""
+    return bool(getattr(file_format, "topics", False))
 
 
 def read_parts(paths: Sequence[Path], machine_file: MachineFile, name: str) -> LoggedRecording:
-    """Return files that are parts of one log as one recording, in the order of their times; raises RecordingError."""
+    """Return the parts of a log as one recording, in the order of their times; raises RecordingError."""
     parts: list[Recording] = []
     headers: list[Source] = []
     factors: dict[str, tuple[float, ...]] = {}
     for path in paths:
         source, channels = mapped_source(path, machine_file)
         factors |= {item.channel: item.factor for item in channels.sources if item.duty is None}
-        parts.append(as_logged(source, channels, machine_file.machine))
+        parts.append(assemble_recording(source, channels, machine_file.machine))
         headers.append(replace(source, columns={}))
-    whole = parts[0] if len(parts) == 1 and parts[0].name == name else joined_recordings(parts, name)
-    details = in_words(joined_details(headers), joined_topics(headers))
+    whole = parts[0] if len(parts) == 1 and parts[0].name == name else join_recordings(parts, name)
+    details = in_words(join_details(headers), join_topics(headers))
     return LoggedRecording(whole, factors, channels.speed_low_pass, source.format, details, source.dialect)
 
 
-def _map(found: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
-    topics = has_topics(found)
+def _map_for(file_format: Format, machine_file: MachineFile, path: Path) -> ChannelMap:
+    topics = has_topics(file_format)
     channels = machine_file.topics if topics else machine_file.columns
     if not channels.sources:
         section = "[channels.mcap]" if topics else "[channels]"
         what = "topic and field" if topics else "column and unit"
         raise ConfigurationError(
-            f"{machine_file.path}: no channel in {section}, which {path} needs", f"write {section} with {what} of each"
+            f"{machine_file.path}: no channel in {section}, which {path} needs",
+            f"write {section} with the {what} of each channel",
         )
     return channels
 
 
-def _sniffs_any_text(found: Format) -> bool:
-    return bool(getattr(found, "sniffs_any_text", False))
+def _sniffs_any_text(file_format: Format) -> bool:
+    return bool(getattr(file_format, "sniffs_any_text", False))
 
 
-def _is_table(found: Format, path: Path) -> bool:
+def _is_table(file_format: Format, path: Path) -> bool:
     try:
-        return bool(found.columns(path).columns)
+        return bool(file_format.columns(path).columns)
     except RecordingError:
         return False
 
@@ -294,7 +296,7 @@ def _is_damaged_text(path: Path, encoding: str) -> bool:
 
 
 def _first_time(part: Path) -> float:
-    """When a part begins [s]; parts without any message come last."""
+    """Return the first time of a part [s]; infinite without a message, so that the part is last."""
     pieces = read_pieces(choose_format(part), part)
     try:
         piece: Piece | None = next(pieces, None)
@@ -303,7 +305,7 @@ def _first_time(part: Path) -> float:
     return np.inf if piece is None or piece.time is None or not piece.rows else piece.origin + float(piece.time[0])
 
 
-def _head(path: Path) -> bytes:
+def _read_head(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
@@ -321,12 +323,11 @@ def _head(path: Path) -> bytes:
 
 
 def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
-    """Return a source whose columns bring times, and its map, so that each channel becomes one column with a clock.
+    """Return a source whose columns have their own clocks, and its map, with one column per channel.
 
-    MDF4, TDMS and HDF5 files have such columns.
-    The map's columns are resolved (resolve_columns). A table comes back as it is. Raises RecordingError where a
-    channel's columns have different clocks or none, and ConfigurationError where the machine file gives the clock
-    another unit than s.
+    MDF4, TDMS and HDF5 files have such columns. A table is returned unchanged. The map's columns are resolved
+    (resolve_columns). Raises RecordingError if the columns of a channel have different clocks or no clock, and
+    ConfigurationError if the machine file states another unit than s for the clock.
     """
     if channels.topics or not any(column.time is not None for column in source.columns.values()):
         return source, channels
@@ -335,13 +336,13 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
         return replace(source, columns=plain), channels
     if channels.time.factor != 1.0:
         raise ConfigurationError(
-            f"{source.path}: its own clock is in s, [channels] time says another unit",
+            f"{source.path}: its own clock is in s, but [channels] time states another unit",
             'time = { column = "time", unit = "s" }',
         )
     joined = {item.channel: _joined(source, item) for item in channels.sources}
     sources = tuple(replace(item, columns=(item.channel,), keys=(item.channel,)) for item in channels.sources)
     names = tuple(joined)
-    # What each column says of its unit: the joined ones have none.
+    # The units are compared here, as joined columns have no unit.
     findings = (*source.findings, *unit_findings(source, channels))
     source = replace(source, columns=joined, names=names, findings=findings)
     return source, replace(channels, sources=sources, topics=True)
@@ -353,14 +354,14 @@ def _joined(source: Source, item: ChannelSource) -> Column:
     for part in parts:
         if part.time is None or time is None:
             raise RecordingError(
-                f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock of its own",
-                "name the column that is its clock in [channels] time",
+                f"{source.path}: column '{part.name}' (channel '{item.channel}') has no clock",
+                "name the column with its clock in [channels] time",
                 channel=item.channel,
             )
         if not np.array_equal(part.time, time):
             raise RecordingError(
                 f"{source.path}: '{parts[0].name}' and '{part.name}' of channel '{item.channel}' have different clocks",
-                "the joints of one channel are logged together",
+                "all joints of a channel must have the same clock",
                 channel=item.channel,
             )
     return Column(item.channel, np.column_stack([part.values for part in parts]), time)

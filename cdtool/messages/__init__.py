@@ -1,1 +1,1 @@
-"""Messages of topics: schemas, decoding, fields and their columns, whatever container they were logged in."""
+"""Messages of topics: schemas, decoding, fields and their columns, independent of the container format."""

@@ -1,4 +1,4 @@
-"""The decoders of a topic's channels, and what they could not decode."""
+"""The decoders of a topic's channels, and the count of messages that could not be decoded."""
 
 from __future__ import annotations
 
@@ -11,72 +11,80 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.messages import UndecodableMessages
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns import Decoder, Gathered, UndecodableError, decoder_for
-from cdtool.messages.columns.gathered import DECODED
-from cdtool.messages.fields import Field, FieldMissingError, missing
+from cdtool.messages.columns import DecodedBatch, Decoder, UndecodableError, decoder_for
+from cdtool.messages.columns.decoded_batch import DECODED
+from cdtool.messages.fast_path import RowLayout
+from cdtool.messages.fields import Field, FieldMissingError, missing_field
 from cdtool.messages.stamp_order import Stamps
 from cdtool.messages.stream import Stream
-from cdtool.messages.taken import Recipe
 
 
 class Decoders:
-    """One decoder a channel, made when its first messages come; what cannot be decoded is counted, with a reason."""
+    """One decoder per channel, created when its first messages arrive.
+
+    Messages that cannot be decoded are counted in `failed`; `reason` is that of the first one.
+    """
 
     def __init__(self) -> None:
-        self._made: dict[int, Decoder | UndecodableError] = {}
+        self._by_channel: dict[int, Decoder | UndecodableError] = {}
         self.decoded = 0
         self.failed = 0
         self.reason = ""
 
     def of(self, stream: Stream, batch: Batch) -> Decoder | None:
-        """The decoder of a channel; None, and its messages counted, where there is none."""
-        if stream.id not in self._made:
+        """Return the decoder of a channel; if the channel has no decoder, count the batch as failed and return None."""
+        if stream.id not in self._by_channel:
             try:
-                self._made[stream.id] = decoder_for(stream.encoding, *stream.definition)
+                self._by_channel[stream.id] = decoder_for(stream.encoding, *stream.definition)
             except UndecodableError as fault:
-                self._made[stream.id] = fault
-        made = self._made[stream.id]
-        if isinstance(made, UndecodableError):
-            self._fail(len(batch), str(made))
+                self._by_channel[stream.id] = fault
+        decoder = self._by_channel[stream.id]
+        if isinstance(decoder, UndecodableError):
+            self._fail(len(batch), str(decoder))
             return None
-        return made
+        return decoder
 
-    def recipe(self, channel: int, wanted: Sequence[Field], joints: Sequence[str], stamps: bool) -> Recipe | None:
-        """How more messages of a channel (by id) become these fields; None where they do not at once."""
-        made = self._made.get(channel)
-        return None if made is None or isinstance(made, UndecodableError) else made.recipe(wanted, joints, stamps)
+    def row_layout(
+        self, channel: int, wanted: Sequence[Field], joints: Sequence[str], stamps: bool
+    ) -> RowLayout | None:
+        """Return the row layout of further messages of a channel (by id); None if they must be decoded in full."""
+        decoder = self._by_channel.get(channel)
+        if decoder is None or isinstance(decoder, UndecodableError):
+            return None
+        return decoder.row_layout(wanted, joints, stamps)
 
-    def gather(
+    def decode(
         self, where: str, stream: Stream, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], clock: str
-    ) -> tuple[Decoder, Gathered, Stamps] | None:
-        """The fields of a batch and its stamps [ns] by the clock; None, and counted, where it cannot be decoded.
+    ) -> tuple[Decoder, DecodedBatch, Stamps] | None:
+        """Return the decoder, the decoded batch, and its time stamps [ns] by `clock` ("log", "publish" or "header").
 
-        Raises RecordingError, which `where` begins, where a field or the header's stamp is not there.
+        If the batch cannot be decoded, its messages are counted as failed and the result is None. Raises
+        RecordingError, with `where` as its subject, if a field or the header's time stamp is missing.
         """
         decoder = self.of(stream, batch)
         if decoder is None:
             return None
         try:
-            gathered = decoder.gather(batch, wanted, joints, stamps=clock == "header")
+            decoded = decoder.decode(batch, wanted, joints, stamps=clock == "header")
         except FieldMissingError as fault:
-            raise missing(where, _absent(decoder, batch, wanted, joints), fault) from fault
+            raise missing_field(where, _absent(decoder, batch, wanted, joints), fault) from fault
         except UndecodableError as fault:
             self.give_up(stream, batch, fault)
             return None
-        return decoder, gathered, _stamps(where, batch, gathered, clock)
+        return decoder, decoded, _stamps(where, batch, decoded, clock)
 
     def give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
-        """What only the wanted places show: a channel's messages cannot be decoded; they are counted."""
-        self._made[stream.id] = fault
+        """Mark a channel as undecodable, for a reason that only the wanted fields reveal, and count its batch."""
+        self._by_channel[stream.id] = fault
         self._fail(len(batch), str(fault))
 
-    def keep(self, gathered: Gathered) -> npt.NDArray[np.bool_]:
-        """Which messages of a batch were decoded; the others are counted."""
-        whole: npt.NDArray[np.bool_] = gathered.status == DECODED
+    def keep(self, decoded: DecodedBatch) -> npt.NDArray[np.bool_]:
+        """Return which messages of a batch are decoded (n,), and count both kinds."""
+        whole: npt.NDArray[np.bool_] = decoded.status == DECODED
         count = int(np.count_nonzero(whole))
         self.decoded += count
         if count < len(whole):
-            self._fail(len(whole) - count, gathered.reason)
+            self._fail(len(whole) - count, decoded.reason)
         return whole
 
     def _fail(self, count: int, reason: str) -> None:
@@ -84,36 +92,36 @@ class Decoders:
         self.reason = self.reason or " ".join(reason.split())[:200]
 
     def failure(self, topic: str) -> list[Finding]:
-        """The finding about messages that could not be decoded."""
+        """Return the finding on messages that could not be decoded, if there are any."""
         fact = UndecodableMessages(self.failed, self.failed + self.decoded, self.reason)
         return [Finding(fact, topic, "loss")] if self.failed else []
 
-    def told(self, path: str, topic: str) -> list[Finding]:
-        """The finding about messages that could not be decoded; raises RecordingError where none could."""
+    def checked_failure(self, path: str, topic: str) -> list[Finding]:
+        """Return the same as `failure`; raises RecordingError if no message could be decoded."""
         if not self.decoded:
             raise RecordingError(
                 f"{path}: no message of {topic} can be decoded: {self.reason}",
-                "record it as JSON, ROS 2 CDR, ROS 1 or protobuf with its message definition",
+                "record the topic as JSON, ROS 2 CDR, ROS 1 or protobuf, with its message definition",
             )
         return self.failure(topic)
 
 
-def _stamps(where: str, batch: Batch, gathered: Gathered, clock: str) -> Stamps:
+def _stamps(where: str, batch: Batch, decoded: DecodedBatch, clock: str) -> Stamps:
     if clock != "header":
         return batch.log_time if clock == "log" else batch.publish_time
-    whole = gathered.status == DECODED
-    if gathered.stamps is None or gathered.has_stamp is None or not gathered.has_stamp[whole].all():
+    whole = decoded.status == DECODED
+    if decoded.stamps is None or decoded.has_stamp is None or not decoded.has_stamp[whole].all():
         raise RecordingError(
             f"{where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
         )
-    return gathered.stamps
+    return decoded.stamps
 
 
 def _absent(decoder: Decoder, batch: Batch, wanted: Sequence[Field], joints: Sequence[str]) -> str:
-    """The field that the schema does not have."""
+    """Return the first field that the schema does not have."""
     for field in wanted:
         try:
-            decoder.gather(batch.first(1), [field], joints)
+            decoder.decode(batch.first(1), [field], joints)
         except FieldMissingError:
             return field.text
     return wanted[0].text

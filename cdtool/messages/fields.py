@@ -12,14 +12,14 @@ from typing import Any
 from cdtool.errors import RecordingError, nearest
 
 _STEP = re.compile(r"(?P<name>[^.\[\]]+)(?:\[(?P<index>[^\[\]]*)\])?")
-LONGEST_ARRAY = 16  # of a survey
-STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # of a header: ROS 2, Gazebo, ROS 1
+LONGEST_ARRAY = 16  # a survey lists only arrays up to this length
+STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"))  # members of a header stamp: ROS 2, Gazebo, ROS 1
 
 Value = float | list[float] | None
 
 
 class FieldMissingError(Exception):
-    """The message has no such field; `known` are those that it has at this place, or `advice` tells what to do."""
+    """The message has no such field; `known` are the members at this level, `advice` is the next step."""
 
     def __init__(self, problem: str, known: Sequence[str] = (), advice: str = "") -> None:
         super().__init__(problem)
@@ -30,9 +30,9 @@ class FieldMissingError(Exception):
 
 @dataclass(frozen=True)
 class Field:
-    """A parsed field; `of(message)` gives a number, a list, NaN for an empty array, None for a joint not in there.
+    """A parsed field of the field language.
 
-    A whole array (`[:]`) beside names of its elements comes in the order of `joints`, by name.
+    A whole array (`[:]`) whose elements are named is returned in the order of `joints`.
     """
 
     text: str
@@ -40,11 +40,15 @@ class Field:
 
     @property
     def whole(self) -> bool:
-        """True for a whole array."""
+        """True if the field is a whole array."""
         return any(index == ":" for _, index in self.steps)
 
     def of(self, message: Any, joints: Sequence[str] = ()) -> Value:
-        """Its value in one message; raises FieldMissingError."""
+        """Return the field's value in one message: a number, or a list for a whole array.
+
+        An element of an empty array is NaN; an element whose name the message does not list is None. Raises
+        FieldMissingError.
+        """
         value = message
         for name, index in self.steps:
             parent = value
@@ -55,27 +59,27 @@ class Field:
                 raise FieldMissingError(f"'{name}' is not an array", [name])
             if index == ":":
                 return self._in_order(value, _element_names(parent), joints)
-            place = _place_of(index, name, value, parent)
-            if place is None:
+            element = _element_number(index, name, value, parent)
+            if element is None:
                 return None
-            if place >= len(value):
+            if element >= len(value):
                 return math.nan
-            value = value[place]
+            value = value[element]
         if _is_array(value):
             raise FieldMissingError(f"'{self.text}' is an array", [f"{self.text}[0]", f"{self.text}[:]"])
         return _number(value, self.text)
 
     def _in_order(self, array: Any, names: Sequence[str], joints: Sequence[str]) -> list[float]:
-        """Return a whole array's numbers, by their names in the order of the joints."""
+        """Return a whole array's numbers, in the order of the joints if its elements are named."""
         numbers = [_number(item, self.text) for item in array]
-        order = order_of(len(numbers), names, joints)
-        return numbers if order is None else [numbers[place] for place in order]
+        order = joint_order(len(numbers), names, joints)
+        return numbers if order is None else [numbers[element] for element in order]
 
 
-def _place_of(index: str, name: str, array: Any, parent: Any) -> int | None:
-    """Return which element of an array an index takes, by number or by name; None where no element has that name.
+def _element_number(index: str, name: str, array: Any, parent: Any) -> int | None:
+    """Return the number of the element that an index selects by number or name; None if no element has the name.
 
-    Elements beyond the end of an empty array, or of one with more names than numbers, are NaN.
+    The number may lie beyond the end of an empty array, or of one with more names than numbers: its value is NaN.
     """
     if is_element_number(index):
         if 0 < len(array) <= int(index):
@@ -88,12 +92,12 @@ def _place_of(index: str, name: str, array: Any, parent: Any) -> int | None:
 
 
 def is_element_number(index: str) -> bool:
-    """An index is an element's number: any other one is a name, that of \u00b2 too."""
+    """Return True if an index is an element's number; any other index is a name, including \u00b2."""
     return index.isascii() and index.isdigit()
 
 
 def parse_field(text: str, where: str) -> Field:
-    """A field of the machine file; raises RecordingError where it cannot be understood."""
+    """Return the parsed field of a machine file; raises RecordingError if its syntax is wrong."""
     steps = []
     for part in re.split(r"\.(?![^\[]*\])", text):
         match = _STEP.fullmatch(part)
@@ -107,7 +111,7 @@ def parse_field(text: str, where: str) -> Field:
 
 
 def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[float]]:
-    """Every numeric field of a message but the header's stamp; arrays of up to 16 numbers as `name[:]`."""
+    """Return every numeric field of a message except the header stamp; arrays of up to 16 numbers as `name[:]`."""
     found: dict[str, float | list[float]] = {}
     for name in _member_names(message):
         value = _member(message, name)
@@ -125,7 +129,7 @@ def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[flo
 
 
 def header_stamp(message: Any) -> int | None:
-    """The header's time stamp [ns], None where the message has none."""
+    """Return the header's time stamp [ns]; None if the message has no header stamp."""
     try:
         stamp = _member(_member(message, "header"), "stamp")
     except FieldMissingError:
@@ -137,8 +141,8 @@ def header_stamp(message: Any) -> int | None:
     return None
 
 
-def missing(where: str, text: str, fault: FieldMissingError) -> RecordingError:
-    """The error for a field that is not there, with the nearest known ones."""
+def missing_field(where: str, text: str, fault: FieldMissingError) -> RecordingError:
+    """Return the error for a missing field, with the nearest known fields."""
     return RecordingError(f"{where}: no field '{text}': {fault.problem}", fault.advice or nearest(text, fault.known))
 
 
@@ -150,26 +154,27 @@ def _texts(names: Any) -> list[str]:
     return [str(name) for name in names] if _is_array(names) else []
 
 
-def order_of(count: int, names: Sequence[str], joints: Sequence[str]) -> list[int] | None:
-    """Which of `count` elements called `names` are those of the joints, in their order; raises FieldMissingError.
+def joint_order(count: int, names: Sequence[str], joints: Sequence[str]) -> list[int] | None:
+    """Return the element numbers of the joints, in joint order, among `count` elements with `names`.
 
-    None: as they are, since the message does not name them, or nobody said what the joints are called.
+    None means that the order stays as it is: the message does not name its elements, or there are no joint names.
+    Raises FieldMissingError.
     """
     if not joints or not count or not names:
         return None
     if len(names) != count:
         raise FieldMissingError(
-            f"its messages have {len(names)} names for {count} elements: which is whose cannot be told",
-            advice="name elements by their numbers, e.g. position[0]",
+            f"its messages have {len(names)} names for {count} elements, so the names cannot be assigned",
+            advice="select elements by number, e.g. position[0]",
         )
-    places = {name: place for place, name in reversed(list(enumerate(names)))}
-    absent = [joint for joint in joints if joint not in places]
+    numbers = {name: number for number, name in reversed(list(enumerate(names)))}  # of equal names the first
+    absent = [joint for joint in joints if joint not in numbers]
     if absent:
         raise FieldMissingError(
             f"its messages name {', '.join(names)}, not '{absent[0]}' of machine.joints",
             advice="name machine.joints as the log does (a URDF's other names go into machine.joint_map)",
         )
-    return [places[joint] for joint in joints]
+    return [numbers[joint] for joint in joints]
 
 
 def _member(value: Any, name: str) -> Any:
@@ -185,7 +190,7 @@ def _member(value: Any, name: str) -> Any:
 def _member_names(value: Any) -> Sequence[str]:
     if isinstance(value, dict):
         return [str(name) for name in value]
-    # The ROS 2 decoder makes a class for each message type, its fields being its slots.
+    # The ROS 2 decoder creates a class for each message type, with the fields as slots.
     if isinstance(value, SimpleNamespace):
         return tuple(getattr(type(value), "__slots__", ())) or tuple(vars(value))
     return ()
@@ -203,12 +208,12 @@ def _number(value: Any, text: str) -> float:
     if value is None:  # JSON's null
         return math.nan
     if not _is_number(value):
-        raise FieldMissingError(f"'{text}' holds {str(value)[:40]!r}, not a number")
+        raise FieldMissingError(f"'{text}' contains {str(value)[:40]!r}, not a number")
     return _float(value)
 
 
 def _float(value: float) -> float:
     try:
         return float(value)
-    except OverflowError:  # an int that is larger than any float64
+    except OverflowError:  # an int larger than any float64
         return math.inf if value > 0 else -math.inf

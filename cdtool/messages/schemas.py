@@ -1,4 +1,4 @@
-"""The public ROS 2 message definitions that are written, with the fields that a stream may fill."""
+"""The public ROS 2 message definitions that cdtool writes, with the fields that a stream may fill."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _vector(name: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Definition:
-    """A message type: its text, its fields of numbers, its arrays of numbers, and whether it has a header."""
+    """A message type: its definition text, its numeric fields, its numeric arrays, and whether it has a header."""
 
     text: str
     numbers: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Where a message belongs: a channel of a log, its topic and its schema, as every container describes them."""
+"""A channel of a log with its topic and schema, the same for every container format."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Stream:
-    """A channel by its number in its log; several may write to one topic.
+    """A channel, identified by its number in the log; several channels may write to one topic.
 
-    `encoding` is how its messages are written, such as `cdr`; `definition` is how they are laid out: a language such as
-    `ros2msg`, the type of the messages, such as `sensor_msgs/msg/JointState`, and the text; all empty: unknown.
+    `encoding` is the encoding of the messages, such as `cdr`. `definition` is their schema: its language, such as
+    `ros2msg`, the message type, such as `sensor_msgs/msg/JointState`, and its text; all three are empty if unknown.
     """
 
     id: int

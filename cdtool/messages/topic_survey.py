@@ -1,4 +1,4 @@
-"""Every numeric field of a topic, as `info` shows them, batch by batch."""
+"""Every numeric field of a topic, batch by batch, as `cdtool info` shows them."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from cdtool.findings.clocks import HeaderDelay, HeaderUnset
 from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.gathered import ABSENT, Gathered, Picked, UndecodableError
+from cdtool.messages.columns.decoded_batch import ABSENT, DecodedBatch, FieldValues, UndecodableError
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import Field, parse_field
 from cdtool.messages.stamp_order import StampOrders
 from cdtool.messages.stream import Stream
-from cdtool.messages.topic import in_order, tally
+from cdtool.messages.topic import count_values, sort_times
 from cdtool.recording import FloatArray
 
 _LONGEST_ARRAY = 16
-# Messages times bytes of the longest: an image, too, is an array of numbers until its length is known, and each
-# number takes 8 bytes.
+# Messages of a batch times bytes of the longest one. It bounds the memory: until its length is known, an image is an
+# array of numbers too, and each number takes 8 bytes.
 _LONGEST_BATCH = 1 << 23
 
 
 class TopicSurvey:
-    """All fields of a topic's messages by log time, and how late they were logged."""
+    """All numeric fields of a topic's messages over log time, and the delay from header stamp to log time."""
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
         self.decoders = Decoders()
         self._fields: dict[str, Field] = {}
         self._widths: dict[str, Counter[int]] = {}
-        self._shapes: dict[str, tuple[int, ...]] = {}  # of a field's row, once a message holds it
+        self._shapes: dict[str, tuple[int, ...]] = {}  # of a field's row, from its first message on
         self._late = Distribution()
         self._orders = StampOrders(topic)
         self._rounded: Counter[str] = Counter()
         self._is_late = self._stamped = False
 
     def pieces(self, stream: Stream, batch: Batch, origin: int) -> Iterator[Piece]:
-        """The messages of a batch with times after `origin` [ns], as far as they can be decoded."""
+        """Yield the decoded messages of a batch, with times after `origin` [ns]."""
         longest = int(batch.length.max()) if len(batch) else 1
         some = max(1, _LONGEST_BATCH // max(1, longest))
         for start in range(0, len(batch), some):
@@ -63,47 +63,47 @@ class TopicSurvey:
             if name not in fields and (parsed := _parsed(name)) is not None:
                 fields[name] = parsed
         try:
-            gathered = decoder.gather(batch, list(fields.values()), stamps=True)
+            decoded = decoder.decode(batch, list(fields.values()), stamps=True)
         except UndecodableError as fault:
             self.decoders.give_up(stream, batch, fault)
             return None
         self._widths |= {name: Counter() for name in fields.keys() - self._fields.keys()}
         self._fields = fields
-        whole = self.decoders.keep(gathered)
-        self._add_stamps(batch, gathered, whole)
+        whole = self.decoders.keep(decoded)
+        self._add_stamps(batch, decoded, whole)
         stamps = batch.log_time if whole.all() else batch.log_time[whole]
         self._orders.add(stream.id, stamps)
-        time, order = in_order(stamps, origin)
+        time, order = sort_times(stamps, origin)
         values: dict[str, FloatArray] = {}
-        for name, picked in zip(self._fields, gathered.picked, strict=True):
-            column = self._column(name, picked, whole)
+        for name, field_values in zip(self._fields, decoded.fields, strict=True):
+            column = self._column(name, field_values, whole)
             if column is not None:
                 values[f"{self.topic} {name}"] = column if order is None else column[order]
         return Piece(self.topic, time, values, len(time), origin / 1e9)
 
-    def _add_stamps(self, batch: Batch, gathered: Gathered, whole: npt.NDArray[np.bool_]) -> None:
-        if gathered.stamps is None or gathered.has_stamp is None:
+    def _add_stamps(self, batch: Batch, decoded: DecodedBatch, whole: npt.NDArray[np.bool_]) -> None:
+        if decoded.stamps is None or decoded.has_stamp is None:
             return
-        stamped = whole & gathered.has_stamp
-        stamps = gathered.stamps[stamped]
+        stamped = whole & decoded.has_stamp
+        stamps = decoded.stamps[stamped]
         late = (batch.log_time[stamped] - stamps.astype(np.uint64)).view(np.int64)
         self._stamped = self._stamped or bool(stamps.any())
         self._is_late = self._is_late or bool(late.any())
         self._late.add(late / 1e6)
 
-    def _column(self, name: str, picked: Picked, whole: npt.NDArray[np.bool_]) -> FloatArray | None:
-        """The field's values, NaN where a message has none; None where no message so far has any."""
-        values, count, there = picked.values, picked.count, picked.state != ABSENT
+    def _column(self, name: str, field_values: FieldValues, whole: npt.NDArray[np.bool_]) -> FloatArray | None:
+        """Return the field's values, NaN where a message does not have it; None if no message so far has it."""
+        values, count, present = field_values.values, field_values.count, field_values.state != ABSENT
         if not whole.all():
-            values, there, count = values[whole], there[whole], None if count is None else count[whole]
+            values, present, count = values[whole], present[whole], None if count is None else count[whole]
         widths = self._widths[name]
         if count is not None:
-            there &= (count >= 0) & (count <= _LONGEST_ARRAY)
-            held = tally(count[there & (count > 0)])
-            if held:
-                self._shapes.setdefault(name, (next(iter(held)),))
-            widths.update(held)
-        elif there.any():
+            present &= (count >= 0) & (count <= _LONGEST_ARRAY)
+            filled = count_values(count[present & (count > 0)])
+            if filled:
+                self._shapes.setdefault(name, (next(iter(filled)),))
+            widths.update(filled)
+        elif present.any():
             self._shapes.setdefault(name, ())
             widths[1] += 1
         if name not in self._shapes:
@@ -111,12 +111,12 @@ class TopicSurvey:
         if values.shape[1:] != self._shapes[name]:
             return np.full((len(values), *self._shapes[name]), np.nan)
         self._rounded[name] += rounded_integers(values)
-        if not there.all():
-            values = np.where(there.reshape((-1, *[1] * (values.ndim - 1))), values, np.nan)
+        if not present.all():
+            values = np.where(present.reshape((-1, *[1] * (values.ndim - 1))), values, np.nan)
         return values
 
-    def found(self) -> tuple[dict[str, Column], list[Finding]]:
-        """Return the columns without rows, and the findings: arrays whose length varies, undecodable messages."""
+    def columns_and_findings(self) -> tuple[dict[str, Column], list[Finding]]:
+        """Return the columns without rows, and the findings: varying array lengths, undecodable messages."""
         columns: dict[str, Column] = {}
         findings = self.decoders.failure(self.topic) + self._orders.findings()
         for name in self._fields:
@@ -138,7 +138,7 @@ class TopicSurvey:
 
 
 def _parsed(name: str) -> Field | None:
-    """A field by its name; None where the name itself holds what the field language is made of."""
+    """Return a field by its name; None if the name contains characters of the field language's syntax."""
     try:
         return parse_field(name, "")
     except RecordingError:

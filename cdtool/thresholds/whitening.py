@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.clock.lost import lost_samples
+from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal, Status
 from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel

@@ -12,7 +12,7 @@ from cdtool.columns import Column
 from cdtool.formats.groups import Group, Part
 from cdtool.formats.pieces import MappedLog, open_mapped_log
 from cdtool.ingest.channel_pieces import ChannelPieces
-from cdtool.ingest.reading import FoundParts, choose_format, read_as_logged
+from cdtool.ingest.reading import LogFolder, choose_format, read_as_logged
 from cdtool.machine_file import MachineFile
 from cdtool.recording import FloatArray, Series
 
@@ -56,7 +56,7 @@ def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelP
     Two cases are also read into memory: a coarse clock, which is fitted as one straight line, and the torque of a duty
     cycle, which needs the speed. Raises RecordingError or ConfigurationError.
     """
-    folder = FoundParts.of(log) if log.is_dir() else None
+    folder = LogFolder.of(log) if log.is_dir() else None
     files = (log,) if folder is None else folder.filled
     mapped = machine_file.topics.sources
     plain = bool(mapped) and not any(item.duty for item in mapped)

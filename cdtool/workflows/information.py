@@ -18,8 +18,8 @@ from cdtool.findings import Fact, Finding, worst_first
 from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
 from cdtool.findings.truth import InProgress
 from cdtool.formats.source import Source, in_words
-from cdtool.ingest.clock_guess import Reread, TableClock, is_clock_name
-from cdtool.ingest.log_figures import ClockFigures, ColumnFigures
+from cdtool.ingest.clock_guess import ReadColumn, TableClock, is_clock_name
+from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Recording, Series
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -28,7 +28,7 @@ from cdtool.workflows.log_checks.log_findings import log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 
 if TYPE_CHECKING:
-    from cdtool.ingest.log_figures import LogFigures
+    from cdtool.ingest.log_statistics import LogStatistics
 
 
 @dataclass(frozen=True)
@@ -98,25 +98,27 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
 
 def _survey(log: Path) -> Info:
     from cdtool.ingest.clock_guess import find_clock
-    from cdtool.ingest.log_figures import LogFigures
-    from cdtool.ingest.reading import in_time_order, log_pieces
+    from cdtool.ingest.log_statistics import LogStatistics
+    from cdtool.ingest.reading import log_pieces, needs_time_order
 
-    figures = LogFigures(partial(log_pieces, log), in_time_order(log))
-    source = figures.source
-    clock = find_clock(source, figures.columns, figures.values_of)
-    channels = [_described(column, figures, clock.figures if clock else None) for column in source.columns.values()]
+    statistics = LogStatistics(partial(log_pieces, log), needs_time_order(log))
+    source = statistics.source
+    clock = find_clock(source, statistics.columns, statistics.values_of)
+    channels = [
+        _described(column, statistics, clock.statistics if clock else None) for column in source.columns.values()
+    ]
     findings = [*source.findings, *(clock.findings if clock else ())]
-    findings += _clock_doubts(source, figures.columns, figures.clocks, figures.values_of, clock)
+    findings += _clock_doubts(source, statistics.columns, statistics.clocks, statistics.values_of, clock)
     for channel in channels:
         findings += missing_findings(channel.missing, channel.samples, channel.name)
     details = in_words(source.details, source.topics)
     return Info(str(log), source.format, details, tuple(channels), worst_first(findings), source.dialect)
 
 
-def _described(column: Column, figures: LogFigures, table_clock: ClockFigures | None) -> ChannelInfo:
+def _described(column: Column, statistics: LogStatistics, table_clock: ClockStatistics | None) -> ChannelInfo:
     """Return a column with its statistics; the columns of a table share the table's clock."""
-    known, samples = figures.columns[column.name], figures.rows(column.name)
-    clock = table_clock if column.time is None else figures.clocks[figures.clock_of[column.name]]
+    known, samples = statistics.columns[column.name], statistics.rows(column.name)
+    clock = table_clock if column.time is None else statistics.clocks[statistics.clock_of[column.name]]
     timed = clock is not None and clock.rows > 0
     return ChannelInfo(
         name=column.name,
@@ -173,17 +175,17 @@ def _channel(name: str, series: Series, joint: int) -> ChannelInfo:
 
 def _clock_doubts(
     source: Source,
-    figures: Mapping[str, ColumnFigures],
-    clocks: Mapping[str, ClockFigures],
-    reread: Reread,
+    statistics: Mapping[str, ColumnStatistics],
+    clocks: Mapping[str, ClockStatistics],
+    read_column: ReadColumn,
     clock: TableClock | None,
 ) -> list[Finding]:
     """Return doubts about clocks: unusable clock columns of a table, a missing clock, and coarse clocks of topics.
 
-    `figures` are those of the columns, `clocks` those of the topics' own clocks.
+    `statistics` are those of the columns, `clocks` those of the topics' own clocks.
     """
     tables = [column for column in source.columns.values() if column.time is None and column.values.ndim == 1]
-    found = list(_named_ones(tables, figures, reread, clock))
+    found = list(_named_ones(tables, statistics, read_column, clock))
     if tables and clock is None:
         found.append(Finding(NoClock()))
     for name, known in clocks.items():
@@ -194,17 +196,17 @@ def _clock_doubts(
 
 
 def _named_ones(
-    tables: list[Column], figures: Mapping[str, ColumnFigures], reread: Reread, clock: TableClock | None
+    tables: list[Column], statistics: Mapping[str, ColumnStatistics], read_column: ReadColumn, clock: TableClock | None
 ) -> Iterator[Finding]:
     for column in tables:
         if not is_clock_name(column.name) or (clock is not None and column.name == clock.column):
             continue
         steps, last = Distribution(), np.empty(0)
-        for piece in reread(column.name):
+        for piece in read_column(column.name):
             known = np.concatenate((last, piece[np.isfinite(piece)]))
             steps.add(np.diff(known))
             last = known[-1:]
-        forward = figures[column.name]
+        forward = statistics[column.name]
         if doubt := _doubt(steps, named=True):
             yield Finding(doubt, column.name)
         elif forward.present == 0:

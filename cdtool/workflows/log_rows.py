@@ -17,8 +17,8 @@ from cdtool.formats.pieces import Pieces, read_pieces
 from cdtool.formats.source import Format
 from cdtool.formats.time_order import by_time, values_of
 from cdtool.ingest.clock_guess import find_clock
-from cdtool.ingest.log_figures import ClockFigures, LogFigures
-from cdtool.ingest.reading import in_time_order, log_pieces
+from cdtool.ingest.log_statistics import ClockStatistics, LogStatistics
+from cdtool.ingest.reading import log_pieces, needs_time_order
 from cdtool.recording import FloatArray
 
 
@@ -43,12 +43,12 @@ class LogRows:
     """
 
     def __init__(self, path: Path) -> None:
-        self._figures = LogFigures(partial(log_pieces, path, read=_opened), in_time_order(path))
-        source = self._figures.source
+        self._statistics = LogStatistics(partial(log_pieces, path, read=_opened), needs_time_order(path))
+        source = self._statistics.source
         self.origin, self.findings = source.origin, source.findings
         self.groups: list[Group] = []
         self._picks: dict[str, list[_Pick]] = {}  # by group
-        self._clock = find_clock(source, self._figures.columns, self._figures.values_of)
+        self._clock = find_clock(source, self._statistics.columns, self._statistics.values_of)
         picks = [pick for column in _without_units(source.columns.values()) for pick in _split(*column)]
         self._add_groups(_each_once(picks))
 
@@ -61,9 +61,9 @@ class LogRows:
                 if group.timed:
                     columns.setdefault(clock, []).append(pick.source)
         # A guessed clock has no known position among the columns of the file.
-        late = np.inf if len(groups) > 1 and any(group.is_table for group in groups) else self._figures.late
+        late = np.inf if len(groups) > 1 and any(group.is_table for group in groups) else self._statistics.late
         if columns:
-            pieces = by_time(self._timed(columns), columns, late, self._figures.sorted)
+            pieces = by_time(self._timed(columns), columns, late, self._statistics.sorted)
             for ready in pieces:
                 yield [
                     self._part(group, [ready[clock] for clock in clocks[group.name]])
@@ -73,7 +73,7 @@ class LogRows:
                 ]
         for i, group in enumerate(groups):
             if not group.timed:
-                for piece in self._figures.pieces({pick.source.name for pick in self._picks[group.name]}):
+                for piece in self._statistics.pieces({pick.source.name for pick in self._picks[group.name]}):
                     if piece.clock == clocks[group.name][0]:
                         part = self._part(group, [piece] * len(clocks[group.name]))
                         yield [part if j == i else None for j in range(len(groups))]
@@ -86,7 +86,7 @@ class LogRows:
         """Yield the log's pieces; those of a table get the times of its clock."""
         clock = self._clock
         keys = {column.name for some in columns.values() for column in some}
-        for piece in self._figures.pieces(keys if clock is None else {*keys, clock.column}):
+        for piece in self._statistics.pieces(keys if clock is None else {*keys, clock.column}):
             if piece.time is None and clock is not None and clock.column in piece.values:
                 yield replace(piece, time=(piece.values[clock.column] - clock.origin) * clock.factor)
             else:
@@ -99,15 +99,17 @@ class LogRows:
                 clocks.setdefault(self._clock_of(pick).digest.digest(), []).append(pick)
         for members in clocks.values():
             self._add(members, self._clock_of(members[0]), is_table=False)
-        digests = self._figures.digests
+        digests = self._statistics.digests
         # A column that is the clock of others is written together with them.
         rest = [p for p in picks if p.source.time is None and digests[p.source.name].digest() not in clocks]
         for rows in dict.fromkeys(self._clock_of(pick).rows for pick in rest):
             members = [pick for pick in rest if self._clock_of(pick).rows == rows]
-            known = self._clock is not None and self._clock.figures.rows == rows
-            self._add(members, self._clock.figures if self._clock and known else ClockFigures(rows), is_table=True)
+            known = self._clock is not None and self._clock.statistics.rows == rows
+            self._add(
+                members, self._clock.statistics if self._clock and known else ClockStatistics(rows), is_table=True
+            )
 
-    def _add(self, members: list[_Pick], clock: ClockFigures, is_table: bool) -> None:
+    def _add(self, members: list[_Pick], clock: ClockStatistics, is_table: bool) -> None:
         name = f"clock_{len(self.groups) + 1}"
         timed = not np.isnan(clock.first)
         columns = tuple(pick.column for pick in members)
@@ -116,10 +118,10 @@ class LogRows:
         self._picks[name] = members
 
     def _clock_name(self, pick: _Pick) -> str:
-        return self._figures.clock_of.get(pick.source.name, "")
+        return self._statistics.clock_of.get(pick.source.name, "")
 
-    def _clock_of(self, pick: _Pick) -> ClockFigures:
-        return self._figures.clocks.get(self._clock_name(pick), ClockFigures())
+    def _clock_of(self, pick: _Pick) -> ClockStatistics:
+        return self._statistics.clocks.get(self._clock_name(pick), ClockStatistics())
 
 
 def _opened(found: Format, path: Path, keys: Collection[str] | None) -> Pieces:

@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.formats.mcap.write import Stream, write_mcap
 from tests.command import cdtool
-from tests.made_up.robots import JOINTS, six_joint_urdf
+from tests.synthetic.robots import JOINTS, six_joint_urdf
 
 pytest.importorskip("pinocchio")
 

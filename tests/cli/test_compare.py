@@ -14,8 +14,8 @@ import cdtool as api
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import to_json
 from tests.command import cdtool
-from tests.made_up.builds import BLIND, MISSED, build
 from tests.report.hostile import HOSTILE
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
 
 LATENCIES = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()
 OLD = {("momentum", "stiff"): LATENCIES, ("pure_torque", "stiff"): LATENCIES}
@@ -47,16 +47,16 @@ def written(tmp_path: Path) -> Written:
     ids=["same", "slower", "faster", "mixed"],
 )
 def test_anything_worse_exits_with_1_and_the_verdict_is_the_last_line(written, new, status, last):
-    done = cdtool("compare", written("old.json", build(OLD)), written("new.json", build(new)))
+    done = cdtool("compare", written("old.json", build_results(OLD)), written("new.json", build_results(new)))
     assert (done.status, done.err) == (status, "")
     assert "inconclusive" not in done.out
     assert done.out.splitlines()[-1] == last
 
 
 def test_the_table_precedes_the_words_and_shows_misses_with_latencies(written):
-    new = {("momentum", "stiff"): [MISSED, BLIND, *[x + 5.0 for x in LATENCIES[2:]]]}
-    old = written("old.json", build(OLD, false_alarms={("momentum", "stiff"): 3}, debounce_samples=5))
-    done = cdtool("compare", old, written("new.json", build(new)))
+    new = {("momentum", "stiff"): [MISSED, NOT_ASSESSABLE, *[x + 5.0 for x in LATENCIES[2:]]]}
+    old = written("old.json", build_results(OLD, false_alarms={("momentum", "stiff"): 3}, debounce_samples=5))
+    done = cdtool("compare", old, written("new.json", build_results(new)))
     assert done.status == 1
     assert re.search(
         r"^stiff +momentum +30 +\d\d\.\d / \d\d\.\d +0 / 1 +0 / 1 +3 / 0 +\d+ / \d+ *$", done.out, re.MULTILINE
@@ -72,15 +72,17 @@ def test_the_table_fits_100_columns_with_long_names_and_many_contacts(written):
     groups = ("inertial_momentum", "a group with a long name"), ("n" * 300, "g" * 300)
     outcomes = dict.fromkeys(groups, many)
     watched = {"window_s": {}, "holdout": ["inertial_momentum"]}
-    old = build(outcomes, false_alarms=dict.fromkeys(groups, 1100), **watched)
-    new = build({key: [MISSED] * 1000 + many[1000:] for key in groups}, gains={"n" * 300: {"g": "v" * 400}}, **watched)
+    old = build_results(outcomes, false_alarms=dict.fromkeys(groups, 1100), **watched)
+    new = build_results(
+        {key: [MISSED] * 1000 + many[1000:] for key in groups}, gains={"n" * 300: {"g": "v" * 400}}, **watched
+    )
     done = cdtool("compare", written("old.json", old), written("new.json", new))
     assert done.status == 1
     assert max(map(len, done.out.splitlines())) <= 100
 
 
 def test_json_contains_every_question_and_is_strict(written, tmp_path):
-    old, new = written("old.json", build(OLD)), written("new.json", build(SLOWER))
+    old, new = written("old.json", build_results(OLD)), written("new.json", build_results(SLOWER))
     done = cdtool("compare", old, new, "--json", "-o", tmp_path / "compare.json")
 
     def refuse(name: str) -> None:
@@ -100,7 +102,7 @@ def test_json_contains_every_question_and_is_strict(written, tmp_path):
 def test_a_change_of_few_recordings_has_no_interval_in_json_and_says_why(written):
     few = {("momentum", "stiff"): LATENCIES[:8]}
     slower = {("momentum", "stiff"): [x + 5.0 for x in LATENCIES[:8]]}
-    old, new = written("old.json", build(few)), written("new.json", build(slower))
+    old, new = written("old.json", build_results(few)), written("new.json", build_results(slower))
     done = cdtool("compare", old, new, "--json")
     (row,) = json.loads(done.out)["rows"]
     change = next(item["change"] for item in row["questions"] if item["figure"] == "latency_ms")
@@ -110,7 +112,7 @@ def test_a_change_of_few_recordings_has_no_interval_in_json_and_says_why(written
 
 
 def test_markdown_has_a_row_per_detector_and_group_with_its_words(written, tmp_path):
-    old, new = written("old.json", build(OLD)), written("new.json", build(SLOWER, debounce_samples=14))
+    old, new = written("old.json", build_results(OLD)), written("new.json", build_results(SLOWER, debounce_samples=14))
     done = cdtool("compare", old, new, "-o", tmp_path / "compare.md")
     assert done.status == 1 and f"written: {tmp_path / 'compare.md'}" in done.out
     text = (tmp_path / "compare.md").read_text(encoding="utf-8")
@@ -125,8 +127,10 @@ def test_markdown_has_a_row_per_detector_and_group_with_its_words(written, tmp_p
 @pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
 def test_names_from_files_stay_text_in_the_terminal_and_in_markdown(written, tmp_path, name):
     names = {"onset": name, "machine": name, "gains": {name: {name: name}}, "window_s": {}, "force_profiles": {}}
-    old = build({(name, name): LATENCIES}, **names)
-    new = build({(name, name): LATENCIES, (f"{name}2", f"{name}3"): LATENCIES}, **{**names, "machine": f"{name}!"})
+    old = build_results({(name, name): LATENCIES}, **names)
+    new = build_results(
+        {(name, name): LATENCIES, (f"{name}2", f"{name}3"): LATENCIES}, **{**names, "machine": f"{name}!"}
+    )
     done = cdtool("compare", written("old.json", old), written("new.json", new), "-o", tmp_path / "c.md")
     assert done.status == 0, done.err
     text = (tmp_path / "c.md").read_text(encoding="utf-8")
@@ -150,8 +154,8 @@ def test_names_from_files_stay_text_in_the_terminal_and_in_markdown(written, tmp
 )
 def test_invalid_comparisons_exit_with_2_and_one_line(written, tmp_path, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
-    written("old.json", build(OLD))
-    written("other.json", build(OLD, onset="above 30 N"))
+    written("old.json", build_results(OLD))
+    written("other.json", build_results(OLD, onset="above 30 N"))
     done = cdtool("compare", *arguments)
     assert done.status == 2 and message in done.err and done.out == ""
 
@@ -159,26 +163,26 @@ def test_invalid_comparisons_exit_with_2_and_one_line(written, tmp_path, monkeyp
 def test_a_stricter_level_is_applied(written):
     noisy = np.random.default_rng(3).normal(1.5, 3.0, 30)
     slower = {key: [a + b for a, b in zip(values, noisy, strict=True)] for key, values in OLD.items()}
-    old, new = written("old.json", build(OLD)), written("new.json", build(slower))
+    old, new = written("old.json", build_results(OLD)), written("new.json", build_results(slower))
     assert [cdtool("compare", old, new, "--level", level).status for level in (0.2, 0.0005)] == [1, 0]
 
 
 def test_python_returns_the_same_as_the_command(written):
-    old, new = written("old.json", build(OLD)), written("new.json", build(SLOWER))
+    old, new = written("old.json", build_results(OLD)), written("new.json", build_results(SLOWER))
     found = api.compare(old, new)
     assert found.words == cdtool("compare", old, new).out.splitlines()[-1]
-    assert [row.words for row in found.rows] == [row.words for row in api.compare(build(OLD), str(new)).rows]
+    assert [row.words for row in found.rows] == [row.words for row in api.compare(build_results(OLD), str(new)).rows]
 
 
 def test_the_default_debounce_is_shown_in_milliseconds(written):
-    old = written("old.json", build(OLD, debounce_samples=None))
-    done = cdtool("compare", old, written("new.json", build(OLD, debounce_samples=14)))
+    old = written("old.json", build_results(OLD, debounce_samples=None))
+    done = cdtool("compare", old, written("new.json", build_results(OLD, debounce_samples=14)))
     assert "differs: debounce_samples: default (9 ms), now 14" in done.out
 
 
 def test_every_detected_contact_now_missed_exits_with_1_and_its_probability(written):
-    old = written("old.json", build({("momentum", "stiff"): LATENCIES[:4]}))
-    done = cdtool("compare", old, written("new.json", build({("momentum", "stiff"): [MISSED] * 4})))
+    old = written("old.json", build_results({("momentum", "stiff"): LATENCIES[:4]}))
+    done = cdtool("compare", old, written("new.json", build_results({("momentum", "stiff"): [MISSED] * 4})))
     assert done.status == 1
     words = " ".join(done.out.split())
     assert "misses every contact: 4 of 4, before 0 of 4 (probability by chance 0.0625)" in words
@@ -186,8 +190,8 @@ def test_every_detected_contact_now_missed_exits_with_1_and_its_probability(writ
 
 @pytest.mark.parametrize(("option", "status"), [((), 0), (("--require-power",), 4)])
 def test_too_few_misses_are_inconclusive(written, option, status):
-    old = written("old.json", build({("momentum", "stiff"): [*LATENCIES[:5], *[MISSED] * 20]}))
-    new = written("new.json", build({("momentum", "stiff"): [*[MISSED] * 4, LATENCIES[4], *[MISSED] * 20]}))
+    old = written("old.json", build_results({("momentum", "stiff"): [*LATENCIES[:5], *[MISSED] * 20]}))
+    new = written("new.json", build_results({("momentum", "stiff"): [*[MISSED] * 4, LATENCIES[4], *[MISSED] * 20]}))
     done = cdtool("compare", old, new, *option)
     assert done.status == status
     words = " ".join(done.out.split())
@@ -195,8 +199,8 @@ def test_too_few_misses_are_inconclusive(written, option, status):
 
 
 def test_latencies_four_times_as_long_of_four_contacts_are_inconclusive(written):
-    old = written("old.json", build({("momentum", "stiff"): LATENCIES[:4]}))
-    new = written("new.json", build({("momentum", "stiff"): [4.0 * x for x in LATENCIES[:4]]}))
+    old = written("old.json", build_results({("momentum", "stiff"): LATENCIES[:4]}))
+    new = written("new.json", build_results({("momentum", "stiff"): [4.0 * x for x in LATENCIES[:4]]}))
     assert [cdtool("compare", old, new, *option).status for option in ((), ("--require-power",))] == [0, 4]
     done = cdtool("compare", old, new, "--require-power", "--json")
     assert json.loads(done.out)["verdict"] == "inconclusive" and done.status == 4
@@ -206,7 +210,7 @@ def test_latencies_four_times_as_long_of_four_contacts_are_inconclusive(written)
 def test_a_better_build_with_an_open_question_exits_with_4_if_power_is_required(written):
     values = {("momentum", "stiff"): LATENCIES, ("momentum", "soft"): LATENCIES[:3]}
     faster = {key: [x - 5.0 for x in items] for key, items in values.items()}
-    old, new = written("old.json", build(values)), written("new.json", build(faster))
+    old, new = written("old.json", build_results(values)), written("new.json", build_results(faster))
     assert [cdtool("compare", old, new, *option).status for option in ((), ("--require-power",))] == [0, 4]
     assert (
         "better: " in cdtool("compare", old, new).out
@@ -215,21 +219,21 @@ def test_a_better_build_with_an_open_question_exits_with_4_if_power_is_required(
 
 
 def test_worse_comes_before_inconclusive(written):
-    old = written("old.json", build({**OLD, ("momentum", "soft"): LATENCIES[:3]}))
-    new = written("new.json", build({**SLOWER, ("momentum", "soft"): LATENCIES[1:4]}))
+    old = written("old.json", build_results({**OLD, ("momentum", "soft"): LATENCIES[:3]}))
+    new = written("new.json", build_results({**SLOWER, ("momentum", "soft"): LATENCIES[1:4]}))
     assert cdtool("compare", old, new, "--require-power").status == 1
 
 
 @pytest.mark.parametrize(("option", "status"), [((), 0), (("--require-power",), 4)])
 def test_a_missing_detector_is_incomplete_if_power_is_required(written, option, status):
-    old = written("old.json", build(OLD))
-    new = written("new.json", build({("momentum", "stiff"): LATENCIES}))
+    old = written("old.json", build_results(OLD))
+    new = written("new.json", build_results({("momentum", "stiff"): LATENCIES}))
     assert cdtool("compare", old, new, *option).status == status
 
 
 def test_a_missing_detector_is_named_at_the_top_and_in_the_verdict(written, tmp_path):
-    old = written("old.json", build(OLD))
-    new = written("new.json", build({("momentum", "stiff"): LATENCIES}))
+    old = written("old.json", build_results(OLD))
+    new = written("new.json", build_results({("momentum", "stiff"): LATENCIES}))
     done = cdtool("compare", old, new, "-o", tmp_path / "c.md")
     assert done.status == 0 and done.out.startswith("only in old, not compared: detector pure_torque\n")
     words = "only in old: detector pure_torque"

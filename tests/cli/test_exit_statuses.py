@@ -16,7 +16,7 @@ from cdtool.exit_status import STATUSES_OF
 from tests.command import Outcome, cdtool
 from tests.evaluation.judged_results import results as judged_results
 from tests.formats.mcap.small_files import small_file
-from tests.made_up.builds import MISSED, build
+from tests.synthetic.builds import MISSED, build_results
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
@@ -91,7 +91,8 @@ def _score(files: Folder, more: str = "", rows: str = "stiff/01.csv,6.3\n", *opt
 def _compare(files: Folder, new: Sequence[float | str], *options: object, old: Sequence[float | str] = ()) -> Outcome:
     key = ("momentum", "stiff")
     paths = [
-        files.results(build({key: list(items)}), f"{name}.json") for name, items in (("old", old or new), ("new", new))
+        files.results(build_results({key: list(items)}), f"{name}.json")
+        for name, items in (("old", old or new), ("new", new))
     ]
     return cdtool("compare", *paths, *options)
 

@@ -22,8 +22,8 @@ from isal import isal_zlib
 from cdtool.errors import RecordingError
 from cdtool.evaluation.traces.file import read_traces
 from tests.command import cdtool
-from tests.made_up.robots import JOINTS, six_joint_urdf
 from tests.noted_times import note, noted
+from tests.synthetic.robots import JOINTS, six_joint_urdf
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"

@@ -14,7 +14,7 @@ from cdtool.evaluation.results_file import read_results
 from cdtool.evaluation.summary import summarise
 from tests.cli.changed_logs import SAMPLES, changed, folder_of
 from tests.command import cdtool
-from tests.made_up.builds import build
+from tests.synthetic.builds import build_results
 
 BEGUN = "a contact is in progress when it begins, until 0.599 s: its onset is not recorded, it is not scored"
 
@@ -114,8 +114,8 @@ def test_the_force_at_the_alarm_is_a_magnitude_like_the_peak(tmp_path):
 
 
 def test_benchmark_and_compare_give_the_same_force_at_the_alarm():
-    old = build({("momentum", "stiff"): [10, 11, 12, 40, 13, 14, 15, 16]})
-    new = build({("momentum", "stiff"): [20, 21, 22, 50, 23, 24, 25, 26]})
+    old = build_results({("momentum", "stiff"): [10, 11, 12, 40, 13, 14, 15, 16]})
+    new = build_results({("momentum", "stiff"): [20, 21, 22, 50, 23, 24, 25, 26]})
     (row,) = compare_builds(old, new).rows
     asked = row.question("force_at_alarm_n")
     medians = [summarise(item)[0].force_at_alarm for item in (old, new)]

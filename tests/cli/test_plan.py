@@ -20,14 +20,14 @@ from cdtool.evaluation.statistics.sample_size import (
 )
 from cdtool.workflows.planning import measured_std
 from tests.command import cdtool
-from tests.made_up.builds import BLIND, MISSED, Outcome, build
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, Outcome, build_results
 
 FIRST = np.random.default_rng(1).normal(40.0, 6.0, 30).tolist()
 SECOND = [x + y for x, y in zip(FIRST, np.random.default_rng(2).normal(20.0, 2.0, 30), strict=True)]
 
 
 def earlier(first: list[Outcome] = FIRST, second: list[Outcome] = SECOND, **options: object):
-    return build({("momentum", "stiff"): first, ("pure_torque", "stiff"): second}, **options)  # type: ignore[arg-type]
+    return build_results({("momentum", "stiff"): first, ("pure_torque", "stiff"): second}, **options)  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -129,7 +129,9 @@ def test_unpaired_the_spread_is_that_of_the_latencies(source):
 
 
 def test_contacts_that_one_missed_are_left_out_and_counted():
-    found = measured_std(earlier([MISSED, BLIND, *FIRST[2:]], [*SECOND[:2], MISSED, *SECOND[3:]]), ["gm", "pt"])
+    found = measured_std(
+        earlier([MISSED, NOT_ASSESSABLE, *FIRST[2:]], [*SECOND[:2], MISSED, *SECOND[3:]]), ["gm", "pt"]
+    )
     assert found.std == pytest.approx(np.std(np.subtract(FIRST[3:], SECOND[3:]), ddof=1))
     assert found.source.endswith("27 contacts, one per recording, 3 missed or not assessable left out")
 
@@ -192,14 +194,16 @@ def test_a_standard_deviation_requires_two_recordings():
 
 
 def test_a_group_is_required_if_there_are_several():
-    results = build({(name, group): FIRST for name in ("momentum", "pure_torque") for group in ("stiff", "soft")})
+    results = build_results(
+        {(name, group): FIRST for name in ("momentum", "pure_torque") for group in ("stiff", "soft")}
+    )
     with pytest.raises(UsageError, match=r"no group is given \(known: soft, stiff\)"):
         measured_std(results, ["gm", "pt"])
 
 
 def test_only_the_contacts_of_the_group_named_count():
     groups = {"stiff": SECOND, "soft": [3.0 * x for x in SECOND]}
-    results = build(
+    results = build_results(
         {("momentum", group): FIRST for group in groups} | {("pure_torque", g): x for g, x in groups.items()}
     )
     found = {group: measured_std(results, ["gm", "pt"], group).std for group in groups}

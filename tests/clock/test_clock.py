@@ -1,4 +1,4 @@
-"""Causal alignment, and what is told about time stamps."""
+"""Causal alignment of channels, and the findings on time stamps."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_a_value_older_than_five_of_its_periods_is_missing():
 
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.floats(0.0, 10.0), min_size=1, max_size=30, unique=True), st.floats(0.0, 10.0))
-def test_what_comes_later_never_changes_the_previous_value(stamps, now):
+def test_later_samples_never_change_the_previous_value(stamps, now):
     time = np.sort(stamps)
     values = np.arange(len(time), dtype=float)
     changed = np.where(time > now, -99.0, values)
@@ -48,7 +48,7 @@ def test_what_comes_later_never_changes_the_previous_value(stamps, now):
     np.testing.assert_array_equal(before, after)
 
 
-def test_bad_stamps_are_dropped_and_all_told_at_once_with_their_rows():
+def test_faulty_stamps_are_dropped_and_reported_together_with_their_rows():
     clean = clean_time([0.0, 1.0, 2.0, 2.0, 1.5, 3.0, np.nan, 4.0, 5.0, 6.0, 7.0, 8.0], first_row=2, row_name="line")
     np.testing.assert_array_equal(clean.time, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
     np.testing.assert_array_equal(np.flatnonzero(clean.keep), [0, 1, 2, 5, 7, 8, 9, 10, 11])
@@ -61,7 +61,7 @@ def test_bad_stamps_are_dropped_and_all_told_at_once_with_their_rows():
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(float("nan")), max_size=40))
-def test_whatever_the_stamps_the_clean_ones_strictly_increase(stamps):
+def test_cleaned_stamps_always_strictly_increase(stamps):
     try:
         clean = clean_time(stamps)
     except RecordingError as fault:
@@ -102,14 +102,14 @@ RESTART, WRAP_16, WRAP_32 = ClockRestart(), ClockRestart(wrapped_bits=16), Clock
             "loss",
         ),
     ],
-    ids=["restart", "stray", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "wild", "ahead"],
+    ids=["restart", "backward", "twice", "few", "nan", "uint16", "uint32", "int32", "no-wrap", "stray", "ahead"],
 )
-def test_dropped_stamps_are_told_with_their_share_and_are_a_loss_unless_they_are_strays(stamps, fact, severity):
+def test_dropped_stamps_are_reported_with_their_share_and_are_a_loss_unless_they_are_few(stamps, fact, severity):
     (finding,) = clean_time(np.array(stamps, dtype=float)).findings
     assert (finding.fact, finding.severity) == (fact, severity)
 
 
-def test_a_counters_wrap_shows_in_the_stamps_as_the_file_has_them():
+def test_a_counters_wrap_is_recognised_in_the_stamps_of_the_file():
     counted = np.concatenate((np.arange(65500.0, 65536.0), np.arange(20.0)))
     (finding,) = clean_time((counted - counted[0]) * 1e-6, counted=counted).findings
     assert isinstance(finding.fact, BackwardStamps) and finding.fact.restart == WRAP_16
@@ -121,14 +121,14 @@ def test_a_clock_that_stands_still_is_refused(stamps):
         clean_time(stamps)
 
 
-def test_a_single_sample_and_events_at_one_time_are_no_clock_that_stands_still():
+def test_a_single_sample_and_events_at_one_time_are_accepted():
     assert clean_time([5.0]).time.tolist() == [5.0]
     events = clean_time([1.0, 1.0, 4.0, 4.0, 9.0], sampled=False)
     assert events.time.tolist() == [1.0, 4.0, 9.0]
     assert events.findings[0].severity == "loss"
 
 
-def test_an_epochs_start_is_told_in_the_stamps_own_unit():
+def test_the_start_of_an_epoch_is_returned_in_the_unit_of_the_stamps():
     assert epoch_start(np.array([np.nan, 1.7e12, 1.7e12 + 1.0]), 1e-3) == 1.7e12
     assert epoch_start(np.array([1.7e12]), 1e-6) == 0.0
     assert epoch_start(np.array([np.nan]), 1.0) == 0.0
@@ -146,7 +146,7 @@ def test_the_derivative_of_a_ramp_is_its_slope_and_a_missing_sample_is_skipped()
     assert np.isnan(speed.values[100:110]).all()
 
 
-def test_the_derivative_lags_by_its_two_low_passes_and_looks_at_nothing_later():
+def test_the_derivative_lags_by_its_two_low_passes_and_is_causal():
     time = np.arange(2000) * 1e-3
     position = 0.5 * time**2
     speed = differentiate(series(time, position), 50.0, "m/s").values[:, 0]
@@ -156,12 +156,12 @@ def test_the_derivative_lags_by_its_two_low_passes_and_looks_at_nothing_later():
     np.testing.assert_array_equal(cut, speed[:900])
 
 
-def test_the_integral_of_a_constant_speed_is_its_way():
-    way = integrate(series([0.0, 1.0, 3.0, 4.0], [2.0, 2.0, np.nan, 2.0], "m/s"), "m")
-    np.testing.assert_allclose(way.values[:, 0], [0.0, 2.0, 6.0, 8.0])
+def test_the_integral_of_a_constant_speed_is_the_distance():
+    distance = integrate(series([0.0, 1.0, 3.0, 4.0], [2.0, 2.0, np.nan, 2.0], "m/s"), "m")
+    np.testing.assert_allclose(distance.values[:, 0], [0.0, 2.0, 6.0, 8.0])
 
 
-def test_gaps_jitter_and_missing_values_are_told():
+def test_gaps_and_missing_values_are_reported():
     time = np.concatenate((np.arange(100) * 1e-3, 0.2 + np.arange(100) * 1e-3))
     values = np.zeros(200)
     values[5] = np.nan
@@ -170,8 +170,8 @@ def test_gaps_jitter_and_missing_values_are_told():
     assert missing == Finding(MissingValues(1, 200), "speed")
 
 
-def test_how_long_a_value_is_held_depends_on_the_rate_so_far_and_not_on_a_later_one():
-    """A log that starts slowly and goes on fast: its slow samples are not stale because of what comes later."""
+def test_the_hold_time_of_a_value_depends_on_the_rate_so_far_and_not_on_a_later_rate():
+    """If the rate of a log increases, the slow samples before do not expire earlier."""
     slow, fast = np.arange(20) * 0.01, 0.2 + np.arange(2000) * 1e-3
     time = np.concatenate((slow, fast))
     values = np.arange(len(time), dtype=float)

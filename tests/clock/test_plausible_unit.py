@@ -1,4 +1,4 @@
-"""A clock whose unit its own values contradict is refused or warned of with both readings; an honest one is not."""
+"""A clock whose values contradict its unit is refused, or a warning states both readings; a valid clock is accepted."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ position = {{ column = "x", unit = "m" }}
 """
 EPOCHS = {"s": 1.6e9, "ms": 1.6e12, "us": 1.6e15}
 ONE = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-# What is said of a clock whose unit cannot be right.
+# The findings on a clock whose unit cannot be right.
 WRONG_UNIT = (ClockUnitContradicted, FileUnitImplausible, HeaderUnitImplausible, StepsImplausible)
 
 
@@ -64,13 +64,13 @@ def test_stamps_since_1970_that_cannot_be_in_the_stated_unit_are_refused_with_bo
     assert "Traceback" not in text and "\n" not in text
 
 
-def test_where_the_machine_file_has_the_unit_that_fits_the_wrong_header_is_no_warning(tmp_path):
+def test_a_wrong_header_is_not_reported_if_the_machine_file_states_the_right_unit(tmp_path):
     recording = read(tmp_path, "Time [sec]", "ms", 1.6e12 + np.arange(40.0))
     assert recording.duration == pytest.approx(0.039)
     assert not [item for item in recording.findings if isinstance(item.fact, WRONG_UNIT)]
 
 
-def test_info_without_a_machine_file_reads_it_as_it_must_be_and_warns(tmp_path):
+def test_info_without_a_machine_file_uses_the_only_possible_unit_and_warns(tmp_path):
     shown = info(log(tmp_path, "Time [sec]", 1.6e12 + np.arange(2000.0)))
     assert [channel.rate_hz for channel in shown.channels] == [pytest.approx(1000.0, rel=1e-3)] * len(shown.channels)
     (warning,) = [item for item in shown.findings if item.severity == "warning"]
@@ -78,7 +78,7 @@ def test_info_without_a_machine_file_reads_it_as_it_must_be_and_warns(tmp_path):
     assert warning.fact == HeaderUnitImplausible(readings) and warning.channel == "Time [sec]"
 
 
-def test_a_drafted_machine_file_does_not_copy_the_contradicted_unit(tmp_path):
+def test_a_drafted_machine_file_does_not_contain_the_contradicted_unit(tmp_path):
     path = log(tmp_path, "Time [sec]", 1.6e12 + np.arange(2000.0))
     done = cdtool("init", path, "-o", tmp_path / "drafted.toml")
     text = (tmp_path / "drafted.toml").read_text()
@@ -86,7 +86,7 @@ def test_a_drafted_machine_file_does_not_copy_the_contradicted_unit(tmp_path):
 
 
 @pytest.mark.parametrize(("step", "unit", "likely"), [(1e3, "s", "us"), (1e6, "s", "ns"), (1.0, "ns", "ms")])
-def test_steps_that_no_log_has_are_a_warning_with_both_readings(tmp_path, step, unit, likely):
+def test_implausible_steps_are_a_warning_with_both_readings(tmp_path, step, unit, likely):
     recording = read(tmp_path, f"t [{unit}]", unit, step * np.arange(40))
     (fact,) = [item.fact for item in recording.findings if isinstance(item.fact, StepsImplausible)]
     rate = 1.0 / (step * ONE[likely])
@@ -97,7 +97,7 @@ def test_steps_that_no_log_has_are_a_warning_with_both_readings(tmp_path, step, 
 @pytest.mark.parametrize(
     ("first", "step", "unit"),
     [
-        (0.0, 1.0, "s"),  # an honest log at 1 Hz
+        (0.0, 1.0, "s"),  # a log at 1 Hz
         (0.0, 10.0, "s"),
         (0.0, 1.0, "ms"),
         (1.6e9, 0.001, "s"),
@@ -109,13 +109,13 @@ def test_steps_that_no_log_has_are_a_warning_with_both_readings(tmp_path, step, 
         (1.6e18, 1e6, "ns"),
     ],
 )
-def test_an_honest_clock_is_neither_refused_nor_warned_of(first, step, unit):
+def test_a_valid_clock_is_accepted_without_a_warning(first, step, unit):
     stamps = first + step * np.arange(100)
     assert contradicted_by_epoch(first, ONE[unit]) == ""
     assert contradicted_by_steps(stamps, ONE[unit])[0] == ""
 
 
-def test_no_sample_log_is_warned_of():
+def test_no_sample_log_has_a_warning():
     for name in ("gate/stiff/01.csv", "arm/trial_1/free/01.csv"):
         path = next(Path("sample_logs").glob(name.replace("01.csv", "*")))
         shown = info(path)
@@ -123,13 +123,13 @@ def test_no_sample_log_is_warned_of():
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=needs_data(name)) for name in ("ur10e", "ur3e", "emps")])
-def test_no_real_recording_is_warned_of(name):
+def test_no_real_recording_has_a_warning(name):
     for path in [path for path in sorted(data(name).rglob("*")) if path.suffix in (".csv", ".mat")][:2]:
         shown = info(path)
         assert not [item for item in shown.findings if isinstance(item.fact, WRONG_UNIT)], path
 
 
-def test_a_containers_clock_that_its_attribute_contradicts_is_read_as_it_must_be_with_a_warning(tmp_path):
+def test_a_container_clock_that_contradicts_its_attribute_is_read_in_the_only_possible_unit_with_a_warning(tmp_path):
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "log.h5"
     with h5py.File(path, "w") as file:

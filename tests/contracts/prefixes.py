@@ -31,7 +31,7 @@ from cdtool.recording import Recording, Series
 from cdtool.tables import Table
 from cdtool.thresholds import THRESHOLDS
 from cdtool.workflows.signature.fitting import Fitted, fitting, for_machine
-from tests.made_up.robots import six_joint_robot
+from tests.synthetic.robots import six_joint_robot
 
 PERIOD = 2e-3
 RUNS = 10

@@ -14,9 +14,9 @@ from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import CHANNELS, GROUND_TRUTH, Recording, Series
 from cdtool.report.plots.style import look_of
-from tests.made_up.motions import moving
-from tests.made_up.robots import JOINTS as ROBOT_JOINTS
-from tests.made_up.robots import six_joint_robot
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import JOINTS as ROBOT_JOINTS
+from tests.synthetic.robots import six_joint_robot
 
 NAMES = DETECTORS.names(plugins=True)
 
@@ -46,8 +46,8 @@ def subject(request, tmp_path_factory) -> Subject:
     contact = np.linspace(5.0, 2.0, len(machine.joints))
     return Subject(
         machine,
-        lambda seed: moving(machine, seconds=7.2, seed=seed, noise=1e-3),
-        lambda seed: moving(machine, seconds=7.2, seed=seed, noise=1e-3, contact=contact, contact_at=6.0),
+        lambda seed: moving_recording(machine, seconds=7.2, seed=seed, noise=1e-3),
+        lambda seed: moving_recording(machine, seconds=7.2, seed=seed, noise=1e-3, contact=contact, contact_at=6.0),
     )
 
 
@@ -224,7 +224,7 @@ def test_wrong_gains_are_refused_by_name(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_several_joints_are_what_each_is_alone_and_their_order_does_not_matter(name, simulated):
-    from tests.made_up.machines import GATE, machine_of
+    from tests.synthetic.machines import GATE, machine_of
 
     a, b = simulated("stiff", 5), simulated("soft", 6)
     n = min(len(a["speed"]), len(b["speed"]))
@@ -252,7 +252,7 @@ def test_the_order_of_a_robots_joints_does_not_matter(name, tmp_path):
     pytest.importorskip("pinocchio")
     order = [3, 0, 5, 1, 4, 2]
     straight, mixed = six_joint_robot(tmp_path), six_joint_robot(tmp_path, [ROBOT_JOINTS[i] for i in order])
-    recording = moving(straight, seconds=3.0, noise=1e-3, contact=np.arange(1.0, 7.0), contact_at=2.0)
+    recording = moving_recording(straight, seconds=3.0, noise=1e-3, contact=np.arange(1.0, 7.0), contact_at=2.0)
     channels = {n: replace(s, values=s.values[:, order]) for n, s in recording.channels.items()}
     permuted = replace(recording, joints=mixed.joints, channels=channels)
     detector = DETECTORS.load(name)()

@@ -17,7 +17,7 @@ import pytest
 from scipy.stats import binomtest
 
 from cdtool.activation import Activation
-from cdtool.clock.lost import lost_samples
+from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.sweep import critical_factor
@@ -30,9 +30,9 @@ from cdtool.recording import Recording, Series
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.simulation.gate_recordings import as_recording
 from cdtool.thresholds import THRESHOLDS
-from tests.made_up.machines import ARM, GATE, arm_of, machine_of
-from tests.made_up.motions import moving
-from tests.made_up.robots import six_joint_robot
+from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import six_joint_robot
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from damaged_logs import KINDS, Fault, damaged, filled, random_faults
@@ -200,7 +200,7 @@ def test_lost_samples_of_coupled_joints_are_no_contact(name, threshold, kind, tm
     if kind == "robot":
         pytest.importorskip("pinocchio")
     machine = arm_of(ARM) if kind == "arm" else six_joint_robot(tmp_path)
-    base = moving(machine, seconds=3.0)
+    base = moving_recording(machine, seconds=3.0)
 
     def noisy(seed: int) -> Recording:
         rng = np.random.default_rng(seed)

@@ -18,10 +18,10 @@ from cdtool.simulation.arm_model import simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters
 from cdtool.simulation.arm_recordings import as_recording
 from cdtool.tables import Table
-from tests.made_up.machines import ARM, GATE, arm_of, machine_of
-from tests.made_up.motions import moving
-from tests.made_up.robots import six_joint_robot
 from tests.project.pages import machine_files
+from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import six_joint_robot
 
 
 @pytest.fixture(scope="module", params=MACHINES.names())
@@ -44,7 +44,7 @@ def machine(request, tmp_path_factory) -> Any:
 
 def logged(machine: Any) -> Recording:
     """A recording as the machine logs it: in motor coordinates where it has some."""
-    load = moving(machine, seconds=2.0, noise=1e-3)
+    load = moving_recording(machine, seconds=2.0, noise=1e-3)
     if machine.coordinates == "load":
         return load
     ratio = np.array(machine.transmission_ratio)
@@ -77,7 +77,7 @@ def test_it_has_everything_that_a_detector_may_ask(machine):
 
 
 def test_referring_to_the_load_side_gives_the_load_side_back(machine):
-    load, referred = moving(machine, seconds=2.0, noise=1e-3), machine.referred_to_load(logged(machine))
+    load, referred = moving_recording(machine, seconds=2.0, noise=1e-3), machine.referred_to_load(logged(machine))
     for name, series in load.channels.items():
         assert referred[name].unit == series.unit
         np.testing.assert_allclose(referred[name].values, series.values, rtol=1e-12, atol=1e-12)
@@ -106,7 +106,7 @@ def test_what_an_arms_sensors_feel_becomes_an_acceleration_causally(arm):
 
 
 def test_momentum_force_energy_and_inertia_are_of_one_machine(machine):
-    recording = moving(machine, seconds=3.0)
+    recording = moving_recording(machine, seconds=3.0)
     position, speed = recording["position"].values, recording["speed"].values
     acceleration, time = recording["acceleration"].values, recording["speed"].time
     inertia = machine.inertia_matrix(position)

@@ -13,9 +13,9 @@ from cdtool.foreign_files import refuse_other_kind
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.writers import WRITERS, known_suffixes, writer_of
 from cdtool.report.writers.base import Report, Subject
-from tests.made_up.builds import build
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
+from tests.synthetic.builds import build_results
 
 NAMES = WRITERS.names(plugins=True)
 SUFFIXES = [(name, suffix) for name in NAMES for suffix in WRITERS.load(name).suffixes]
@@ -30,7 +30,7 @@ def reports(request) -> dict[str, object]:
     provenance = {"tool": "cdtool", **evaluated.results.provenance}
     del provenance["force_profiles"]  # a figure needs profiles with names
     benchmark = Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces)
-    builds = [build({("momentum", f"stiff{added}"): [40.0 + late] * 12}, window_s={}) for late in (0.0, 5.0)]
+    builds = [build_results({("momentum", f"stiff{added}"): [40.0 + late] * 12}, window_s={}) for late in (0.0, 5.0)]
     return {"benchmark": benchmark, "comparison": compare_builds(builds[0], builds[1])}
 
 

@@ -12,7 +12,7 @@ from cdtool.detectors.base import drive_on_speed_clock, observe_momentum
 from cdtool.detectors.energy import Energy
 from cdtool.detectors.momentum import Momentum
 from cdtool.recording import FloatArray, Recording, Series
-from tests.made_up.machines import arm_of
+from tests.synthetic.machines import arm_of
 
 ARM = arm_of(
     {

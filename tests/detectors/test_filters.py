@@ -11,7 +11,7 @@ from cdtool.detectors.desired_dynamics import DesiredDynamics
 from cdtool.detectors.direct import Direct
 from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
 from cdtool.recording import FloatArray, Recording, Series
-from tests.made_up.machines import machine_of
+from tests.synthetic.machines import machine_of
 
 TIME = np.arange(4000) * 1e-3
 NONE = np.zeros((len(TIME), 1), dtype=bool)

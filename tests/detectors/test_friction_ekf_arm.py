@@ -16,8 +16,8 @@ from cdtool.dynamics import JointEquation
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import FloatArray, Recording
-from tests.made_up.motions import PERIOD, moving
-from tests.made_up.robots import six_joint_robot
+from tests.synthetic.motions import PERIOD, moving_recording
+from tests.synthetic.robots import six_joint_robot
 
 EKF = FrictionEkf(
     sigma_acceleration=0.4,
@@ -162,7 +162,7 @@ def plain_filter(motion: JointMeasurements, equation: JointEquation) -> FloatArr
 
 @pytest.mark.parametrize("joint", [0, 1])
 def test_it_equals_a_filter_of_matrices_with_a_numerical_jacobian(arm, joint):
-    log = moving(arm, seconds=3.0, seed=2, noise=5e-3, contact=[3.0, 2.0], contact_at=2.0)
+    log = moving_recording(arm, seconds=3.0, seed=2, noise=5e-3, contact=[3.0, 2.0], contact_at=2.0)
     motion, equation, _ = joint_of(arm, log, joint)
     found, _ = EKF.estimate(motion, equation)
     expected = plain_filter(motion, equation)
@@ -184,7 +184,7 @@ def fast(log: Recording) -> FloatArray:
 
 def test_it_finds_the_virtual_friction_of_both_joints_of_an_arm(arm):
     more = np.array([1.5, 0.7])
-    log = with_friction(moving(arm, seconds=6.0, seed=3), more)
+    log = with_friction(moving_recording(arm, seconds=6.0, seed=3), more)
     signal = EKF.signal(log, arm)
     judged = signal.valid & fast(log)
     own = 0.4  # what the machine file has [N m s/rad]
@@ -197,7 +197,7 @@ def test_it_finds_the_virtual_friction_of_each_joint_of_a_robot_whose_other_join
     pytest.importorskip("pinocchio")
     robot = six_joint_robot(tmp_path)
     more = np.array([6.0, 5.0, 4.0, 30.0, 2.0, 3.0])
-    log = with_friction(moving(robot, seconds=6.0, seed=3), more)
+    log = with_friction(moving_recording(robot, seconds=6.0, seed=3), more)
     signal = replace(EKF, friction_drift=50.0).signal(log, robot)
     judged = signal.valid & fast(log)
     for j in range(6):
@@ -207,7 +207,7 @@ def test_it_finds_the_virtual_friction_of_each_joint_of_a_robot_whose_other_join
 
 def test_an_angle_as_a_state_and_everything_known_as_an_input_give_the_same_friction(arm):
     """Both equations are the same one; the angle's own noise and the first-order prediction of it differ."""
-    log = with_friction(moving(arm, seconds=6.0, seed=5, noise=1e-3), np.array([1.5, 0.7]))
+    log = with_friction(moving_recording(arm, seconds=6.0, seed=5, noise=1e-3), np.array([1.5, 0.7]))
     for joint in (0, 1):
         motion, own_angle, all_known = joint_of(arm, log, joint)
         (one, status), (other, _) = EKF.estimate(motion, own_angle), EKF.estimate(motion, all_known)
@@ -217,7 +217,7 @@ def test_an_angle_as_a_state_and_everything_known_as_an_input_give_the_same_fric
 
 
 def test_at_rest_it_is_not_applicable_and_its_estimate_holds(arm):
-    log = moving(arm, seconds=4.0, seed=1, rest=2.0)
+    log = moving_recording(arm, seconds=4.0, seed=1, rest=2.0)
     signal = EKF.signal(log, arm)
     resting = signal.time < 2.0
     assert (signal.status[resting] == Status.NOT_APPLICABLE).all()
@@ -228,7 +228,7 @@ def test_however_long_the_rest_the_frictions_variance_has_not_grown(arm):
     """With a variance that had grown the estimate would move faster after a longer rest."""
     after = []
     for rest in (1.0, 41.0):
-        log = with_friction(moving(arm, seconds=rest + 1.2, rest=rest), np.array([1.5, 0.7]))
+        log = with_friction(moving_recording(arm, seconds=rest + 1.2, rest=rest), np.array([1.5, 0.7]))
         after.append(EKF.signal(log, arm).values[round(rest / PERIOD) :])
     assert np.ptp(after[0], axis=0).min() > 0.5
     np.testing.assert_allclose(after[1], after[0], atol=1e-9)

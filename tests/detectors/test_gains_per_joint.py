@@ -17,8 +17,8 @@ from cdtool.machine_file import fingerprint, read_machine_file
 from cdtool.signature_file import FactorOrigin, SignatureFile
 from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds.signature import Signature
-from tests.made_up.machines import GATE, machine_of
-from tests.made_up.motions import moving
+from tests.synthetic.machines import GATE, machine_of
+from tests.synthetic.motions import moving_recording
 
 NAMES = [name for name in DETECTORS.names() if fields(DETECTORS.load(name))]
 
@@ -30,7 +30,7 @@ def axes():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_each_joint_has_its_own_gains(name, axes):
-    recording = moving(axes, seconds=4.0, noise=1e-3, contact=[300.0, 200.0], contact_at=3.0)
+    recording = moving_recording(axes, seconds=4.0, noise=1e-3, contact=[300.0, 200.0], contact_at=3.0)
     detector = DETECTORS.load(name)
     shared = detector()
     own = {item.name: (item.default, 1.5 * item.default) for item in fields(detector)}
@@ -44,7 +44,7 @@ def test_each_joint_has_its_own_gains(name, axes):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_same_number_for_every_joint_is_that_number(name, arm):
-    recording = moving(arm, seconds=3.0, noise=1e-3, contact=[2.0, 1.0], contact_at=2.0)
+    recording = moving_recording(arm, seconds=3.0, noise=1e-3, contact=[2.0, 1.0], contact_at=2.0)
     detector = DETECTORS.load(name)
     columns = 1 if name == "energy" else 2
     equal = detector(**{item.name: (item.default,) * columns for item in fields(detector)})
@@ -53,7 +53,7 @@ def test_the_same_number_for_every_joint_is_that_number(name, arm):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_wrong_number_of_values_and_a_wrong_value_are_refused(name, arm):
-    recording = moving(arm, seconds=1.0)
+    recording = moving_recording(arm, seconds=1.0)
     detector = DETECTORS.load(name)
     first = fields(detector)[0]
     with pytest.raises(ConfigurationError, match="3 values for"):
@@ -66,7 +66,7 @@ def test_a_wrong_number_of_values_and_a_wrong_value_are_refused(name, arm):
 
 def test_a_whole_machines_energy_has_one_gain(arm):
     with pytest.raises(ConfigurationError, match="2 values for the whole machine"):
-        Energy(bandwidth=(10.0, 20.0)).signal(moving(arm, seconds=1.0), arm)
+        Energy(bandwidth=(10.0, 20.0)).signal(moving_recording(arm, seconds=1.0), arm)
 
 
 def test_one_joints_gains_are_numbers():

@@ -9,7 +9,7 @@ from scipy.linalg import solve_discrete_are
 from cdtool.detection import Status
 from cdtool.detectors.kalman_momentum import KalmanMomentum
 from cdtool.recording import FloatArray, Recording, Series
-from tests.made_up.machines import machine_of
+from tests.synthetic.machines import machine_of
 
 PERIOD, MASS = 1e-3, 12.0
 AXIS = machine_of({"coordinates": "load", "load_mass": MASS})

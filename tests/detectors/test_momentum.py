@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from cdtool.detection import Status
 from cdtool.detectors.momentum import Momentum
 from cdtool.recording import FloatArray, Recording, Series
-from tests.made_up.machines import machine_of
+from tests.synthetic.machines import machine_of
 
 # One kilogram on the load side without friction: force and momentum in plain numbers.
 UNIT_MASS = machine_of({"coordinates": "load", "load_mass": 1.0})

@@ -26,9 +26,9 @@ from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation
 from cdtool.recording import FloatArray
 from cdtool.thresholds.limit import Limit
-from tests.made_up.machines import ARM, arm_of, machine_of
-from tests.made_up.motions import PERIOD, moving, standing
-from tests.made_up.robots import six_joint_robot, urdf_robot
+from tests.synthetic.machines import ARM, arm_of, machine_of
+from tests.synthetic.motions import PERIOD, moving_recording, resting_recording
+from tests.synthetic.robots import six_joint_robot, urdf_robot
 
 BANDWIDTH = 30.0  # [rad/s], of all of them
 OBSERVERS: dict[str, Any] = {
@@ -59,13 +59,13 @@ def machines(tmp_path_factory) -> Callable[[str], Any]:
     """machines(kind), each built once; the robot needs pinocchio."""
 
     @cache
-    def build(kind: str) -> Any:
+    def build_results(kind: str) -> Any:
         if kind != "robot":
             return machine_of(AXIS) if kind == "axis" else arm_of(ARM)
         pytest.importorskip("pinocchio")
         return six_joint_robot(tmp_path_factory.mktemp("robot"))
 
-    return build
+    return build_results
 
 
 def contacts(machine: Any) -> FloatArray:
@@ -77,7 +77,7 @@ def contacts(machine: Any) -> FloatArray:
 def test_before_a_contact_it_is_zero_and_after_it_the_contact_torque(name, kind, machines):
     machine = machines(kind)
     contact = contacts(machine)
-    log = moving(machine, seconds=6.0, seed=1, contact=contact, contact_at=CONTACT_AT)
+    log = moving_recording(machine, seconds=6.0, seed=1, contact=contact, contact_at=CONTACT_AT)
     signal = OBSERVERS[name].signal(log, machine)
     before, after = (signal.time < CONTACT_AT) & signal.valid[:, 0], signal.time > CONTACT_AT + 0.5
     allowed = ALLOWED[name][MACHINES.index(kind)]
@@ -94,7 +94,7 @@ def test_the_alarm_names_the_joint_that_feels_the_contact_and_its_side(name, kin
     machine = machines(kind)
     contact = np.zeros(len(machine.joints))
     contact[joint] = 6.0 * sign
-    log = moving(machine, seconds=6.0, seed=1, contact=contact, contact_at=CONTACT_AT)
+    log = moving_recording(machine, seconds=6.0, seed=1, contact=contact, contact_at=CONTACT_AT)
     (operation,) = operations_of(log)
     detection = detect_operation(operation, machine, OBSERVERS[name], [Limit.given([3.0])], Activation())
     assert detection.verdict.outcome == "alarm"
@@ -120,7 +120,7 @@ SLIDE = """<robot name="slide"><link name="rail"/><link name="cart"><inertial><m
 def test_the_recursion_for_coupled_joints_is_the_momentum_observers_where_one_joint_has_a_constant_inertia(tmp_path):
     pytest.importorskip("pinocchio")
     slide = urdf_robot(tmp_path, SLIDE, {"joints": ["drive"], "viscous_friction": 3.0})
-    log = moving(slide, seconds=3.0, noise=0.05, contact=[4.0], contact_at=2.0)
+    log = moving_recording(slide, seconds=3.0, noise=0.05, contact=[4.0], contact_at=2.0)
     one, other = Momentum(12.0).signal(log, slide), Velocity(12.0).signal(log, slide)
     np.testing.assert_allclose(other.values, one.values, rtol=1e-12, atol=1e-12 * np.abs(one.values).max())
     settled = log["speed"].time > 1.0 / 12.0 * 3.0 + PERIOD
@@ -132,7 +132,7 @@ def test_in_a_frozen_pose_the_velocity_observer_is_the_filter_k_over_m(kind, pos
     """Step response I - exp(-K M^-1 t) of 2.15: joints leak into one another while the estimate settles."""
     machine = machines(kind)
     contact = contacts(machine)
-    log = standing(machine, pose, machine.gravity(np.array([pose]))[0] + contact, seconds=0.3)
+    log = resting_recording(machine, pose, machine.gravity(np.array([pose]))[0] + contact, seconds=0.3)
     found = Velocity(BANDWIDTH).signal(log, machine).values
     gains = np.diag(BANDWIDTH * machine.nominal_inertia)
     rate = gains @ np.linalg.inv(machine.inertia_matrix(np.array([pose]))[0])
@@ -148,7 +148,7 @@ def test_the_energy_observer_is_the_filtered_power_of_the_contact(kind, machines
     machine = machines(kind)
     contact, worst = contacts(machine), []
     for period in (1e-3, 5e-4):
-        log = moving(machine, seconds=3.0, seed=2, contact=contact, contact_at=-np.inf, period=period)
+        log = moving_recording(machine, seconds=3.0, seed=2, contact=contact, contact_at=-np.inf, period=period)
         power = np.sum(log["speed"].values * contact, axis=1)
         a = np.exp(-BANDWIDTH * period)
         expected = lfilter([1.0 - a], [1.0, -a], 0.5 * (power[1:] + power[:-1]))
@@ -164,7 +164,7 @@ def test_the_energy_observer_is_the_filtered_power_of_the_contact(kind, machines
 def test_at_rest_the_energy_observer_is_not_applicable_and_says_so(kind, machines):
     machine = machines(kind)
     pose = np.zeros(len(machine.joints))
-    log = standing(machine, pose, np.full(len(pose), 50.0))
+    log = resting_recording(machine, pose, np.full(len(pose), 50.0))
     (operation,) = operations_of(log)
     detection = detect_operation(operation, machine, Energy(), [Limit.given([1.0])], Activation())
     assert detection.verdict.outcome == "not_assessable"
@@ -179,10 +179,10 @@ def test_a_robot_that_rests_within_its_dry_friction_leaves_no_residual(name, sha
     robot = six_joint_robot(tmp_path, coulomb_friction=4.0, coulomb_slope=0.0)
     pose = np.array([0.3, -0.5, 1.2, 0.1, 0.7, -1.0])
     gravity = robot.gravity(pose[np.newaxis])[0]
-    signal = OBSERVERS[name].signal(standing(robot, pose, gravity + 4.0 * share), robot)
+    signal = OBSERVERS[name].signal(resting_recording(robot, pose, gravity + 4.0 * share), robot)
     assert (signal.status[-1] == Status.VALID).all()
     np.testing.assert_allclose(signal.values, 0.0, atol=1e-9)
-    pushed = OBSERVERS[name].signal(standing(robot, pose, gravity + 6.0), robot)
+    pushed = OBSERVERS[name].signal(resting_recording(robot, pose, gravity + 6.0), robot)
     np.testing.assert_allclose(pushed.values[-1], 2.0, rtol=1e-3)
 
 
@@ -190,7 +190,7 @@ def test_a_robot_that_rests_within_its_dry_friction_leaves_no_residual(name, sha
 def test_lost_samples_of_the_pose_move_the_signal_of_coupled_joints_no_more_than_those_of_the_speed(name):
     # Held while the speed goes on, the pose would be that of another instant: the energy would stand still, then jump.
     machine = arm_of(ARM)
-    whole = moving(machine, seconds=3.0)
+    whole = moving_recording(machine, seconds=3.0)
     expected = name().signal(whole, machine)
 
     def moved(channel: str) -> float:

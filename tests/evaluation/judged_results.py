@@ -10,7 +10,7 @@ from cdtool.evaluation.results import (
     ForceStepResult,
     Results,
 )
-from tests.made_up.builds import build
+from tests.synthetic.builds import build_results
 
 GATE = "en_12453_reducing_gap"
 PROFILE = asdict(read_force_limits()[GATE])
@@ -19,7 +19,7 @@ KEY = ("momentum", "stiff")
 
 def results(outcomes, verdicts=(), point=None, points=(), **more) -> Results:
     """Contacts of one detector, and one force verdict per contact in the given order."""
-    made = build({KEY: outcomes}, force_profiles={"stiff": PROFILE} if verdicts or points else {}, **more)
+    made = build_results({KEY: outcomes}, force_profiles={"stiff": PROFILE} if verdicts or points else {}, **more)
     return replace(
         made, forces=tuple(force(made, i, verdict, point) for i, verdict in enumerate(verdicts)), points=tuple(points)
     )

@@ -28,7 +28,7 @@ from cdtool.report.writers.base import Report
 from cdtool.report.writers.junit import to_junit
 from tests.command import cdtool
 from tests.evaluation.judged_results import GATE, results
-from tests.made_up.builds import BLIND, MISSED, build
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
 
 MET = LimitRule("*.false_alarms", "*", "*", "false_alarms", largest=0)
 
@@ -94,7 +94,7 @@ CASES = {
         2,
     ),
     "a blind detector": (
-        results([BLIND] * 3, ["pass"] * 3),
+        results([NOT_ASSESSABLE] * 3, ["pass"] * 3),
         "not_assessable",
         3,
         "nothing could be assessed",
@@ -184,7 +184,7 @@ def test_without_profile_and_limit_a_miss_is_named_without_a_violation():
 
 
 def test_a_limit_without_measurements_is_not_met():
-    made = results([BLIND] * 3)
+    made = results([NOT_ASSESSABLE] * 3)
     evaluated = evaluate(made, [LimitRule("*.p95_ms", "*", "*", "p95_ms", largest=50.0)])
     assert [item.outcome for item in evaluated.results.limits] == ["not_assessable"]
     conclusion = evaluated.results.conclusion
@@ -194,7 +194,7 @@ def test_a_limit_without_measurements_is_not_met():
 
 def test_a_detector_without_an_assessable_impact_free_operation_has_assessed_nothing():
     made = replace(
-        build({}, holdout=["momentum"]),
+        build_results({}, holdout=["momentum"]),
         exposure=(ExposureResult("holdout", "momentum", 4, 4, 0.0, 4, {"standing still": 1.0}),),
     )
     conclusion = evaluate(made).results.conclusion
@@ -203,7 +203,7 @@ def test_a_detector_without_an_assessable_impact_free_operation_has_assessed_not
 
 
 def test_reasons_for_unassessable_contacts_are_named():
-    made = results([BLIND] * 3)
+    made = results([NOT_ASSESSABLE] * 3)
     made = replace(made, contacts=tuple(replace(item, reason="the axis stands still") for item in made.contacts))
     assert evaluate(made).results.conclusion.reasons == (
         "momentum, stiff: none of 3 contacts could be assessed: the axis stands still",
@@ -246,5 +246,5 @@ def test_files_of_version_2_are_read_with_their_words_changed(tmp_path):
 
 
 def test_contacts_keep_their_spelling_in_the_data():
-    made: ContactResult = results([BLIND]).contacts[0]
+    made: ContactResult = results([NOT_ASSESSABLE]).contacts[0]
     assert made.outcome == "not_assessable"

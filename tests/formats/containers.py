@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.formats.mcap.write import Stream, write_mcap
-from cdtool.ingest.channel_assembly import as_logged
+from cdtool.ingest.channel_assembly import assemble_recording
 from cdtool.ingest.reading import mapped_source
 from cdtool.machine_file import read_machine_file
 from cdtool.recording import Recording
@@ -63,7 +63,7 @@ def two_clocks(path: Path, start_ns: int = 0) -> Path:
 def logged(path: Path | str, machine: Path | str) -> Recording:
     """Return the channels of a file as logged."""
     source, channels = mapped_source(Path(path), read_machine_file(machine))
-    return as_logged(source, channels, read_machine_file(machine).machine)
+    return assemble_recording(source, channels, read_machine_file(machine).machine)
 
 
 def assert_same(recording: Recording, other: Recording, exact_time: bool = True) -> None:

@@ -172,7 +172,7 @@ def test_messages_of_other_joints_are_left_out(by_hand):
 def test_json_null_is_nan_and_a_text_is_refused(by_hand):
     path = by_hand([(0, 0, {"x": 1, "s": "up"}), (1, 1, {"x": None, "s": "up"})])
     assert np.isnan(Mcap().columns(path, wanted(("/a", "x"))).columns["/a x"].values[1])
-    with pytest.raises(RecordingError, match="holds 'up', not a number"):
+    with pytest.raises(RecordingError, match="contains 'up', not a number"):
         Mcap().columns(path, wanted(("/a", "s")))
 
 

@@ -20,7 +20,7 @@ from cdtool.formats.csv import text
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces, split_by_clock
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
-from cdtool.ingest.log_figures import LogFigures
+from cdtool.ingest.log_statistics import LogStatistics
 from cdtool.ingest.reading import choose_format
 from cdtool.workflows.convert.converting import convert
 from tests.formats.containers import two_clocks
@@ -140,7 +140,7 @@ def test_the_memory_for_the_statistics_of_a_log_does_not_grow_with_its_length():
     peaks = {}
     for count in (20, 200):
         tracemalloc.start()
-        figures = LogFigures(lambda _, n=count: read(n), in_order=True)
+        figures = LogStatistics(lambda _, n=count: read(n), in_order=True)
         peaks[count] = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert figures.rows("/a data") == 20_000 * count

@@ -121,5 +121,5 @@ def test_an_sqlite_database_other_than_a_bag_is_refused(tmp_path):
     path = tmp_path / "other.db3"
     with sqlite3.connect(path) as base:
         base.execute("create table x (a)")
-    with pytest.raises(RecordingError, match="an SQLite database, but no ROS 2 bag"):
+    with pytest.raises(RecordingError, match="an SQLite database, but not a ROS 2 bag"):
         survey(path)

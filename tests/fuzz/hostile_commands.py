@@ -15,7 +15,7 @@ import numpy as np
 
 from tests.command import Outcome, cdtool
 from tests.fuzz.hostile_values import Mutations
-from tests.made_up.robots import JOINTS, six_joint_urdf
+from tests.synthetic.robots import JOINTS, six_joint_urdf
 
 STATUSES = (0, 1, 2, 3, 4)
 LONGEST_LINE = 300

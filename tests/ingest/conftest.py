@@ -1,4 +1,4 @@
-"""The logs and machine files of the tests of formats."""
+"""The fixtures of the format tests, for logs and machine files."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def gate_columns(n=50):
     return {"t": 10.0 * k, "i_motor": 0.1 * k, "n_motor": 1.0 + k}
 
 
-def told(recording):
+def channels_and_facts(recording):
     return [(finding.channel, finding.fact) for finding in recording.findings]
 
 
@@ -47,7 +47,7 @@ def test_columns_become_channels_in_si_on_the_load_side(log, machine):
     assert recording.digest == hashlib.sha256(path.read_bytes()).hexdigest()
     assert recording.origin == 0.0
     assert "position" in recording
-    assert ("position", IntegratedPosition()) in told(recording)
+    assert ("position", IntegratedPosition()) in channels_and_facts(recording)
 
 
 def test_topics_become_channels_with_their_own_times(tmp_path, machine):
@@ -77,7 +77,7 @@ def test_topics_become_channels_with_their_own_times(tmp_path, machine):
     assert np.allclose(recording["force"].values[:, 0], 5 * time)
 
 
-def test_an_epoch_clock_starts_at_zero_and_its_origin_is_kept(log, machine):
+def test_an_epoch_clock_starts_at_zero_and_its_origin_is_stored(log, machine):
     columns = gate_columns()
     columns["t"] = columns["t"] + 1.7e12  # ms
     recording = read_recording(log(table(columns)), machine())
@@ -85,20 +85,20 @@ def test_an_epoch_clock_starts_at_zero_and_its_origin_is_kept(log, machine):
     assert recording.origin == pytest.approx(1.7e9)
 
 
-def test_odd_stamps_are_dropped_from_every_channel_with_their_lines(log, machine):
+def test_faulty_stamps_are_dropped_from_every_channel_and_reported_with_their_lines(log, machine):
     columns = gate_columns()
     columns["t"][[10, 20]] = [50.0, np.nan]
     recording = read_recording(log(table(columns)), machine())
     assert len(recording["torque"]) == len(recording["speed"]) == 48
-    assert ("time", BackwardStamps(1, 50, (12,), "line")) in told(recording)
-    assert ("time", UnknownStamps(1, 50, (22,), "line")) in told(recording)
+    assert ("time", BackwardStamps(1, 50, (12,), "line")) in channels_and_facts(recording)
+    assert ("time", UnknownStamps(1, 50, (22,), "line")) in channels_and_facts(recording)
     assert np.isclose(recording["torque"].values[10, 0], 0.1 * 11 * 0.5 / RATIO)
 
 
-def test_a_gap_of_the_clock_is_told_once_not_for_each_channel(log, machine):
+def test_a_gap_of_the_clock_is_reported_once_and_not_for_each_channel(log, machine):
     columns = gate_columns()
     columns["t"][25:] += 500.0
-    facts = [fact for _, fact in told(read_recording(log(table(columns)), machine()))]
+    facts = [fact for _, fact in channels_and_facts(read_recording(log(table(columns)), machine()))]
     assert sum(isinstance(fact, SampleGaps) for fact in facts) == 1
 
 
@@ -119,10 +119,10 @@ def test_missing_infinite_and_saturated_values_are_masked_and_counted(log, machi
     missing = np.flatnonzero(np.isnan(recording["torque"].values[:, 0]))
     assert missing.tolist() == [3, 4, *range(40, 50)]
     for fact in (InfiniteValues(1, ""), SaturatedValues(10, ""), MissingValues(1, 50)):
-        assert ("torque", fact) in told(recording)
+        assert ("torque", fact) in channels_and_facts(recording)
 
 
-def test_a_time_offset_moves_one_channel(log, machine):
+def test_a_time_offset_shifts_only_its_channel(log, machine):
     found = machine(
         """
         [channels]
@@ -136,7 +136,7 @@ def test_a_time_offset_moves_one_channel(log, machine):
     assert np.allclose(recording["speed"].time, np.arange(50) / 100)
 
 
-def test_a_header_that_says_another_unit_is_told(log, machine):
+def test_a_header_with_another_unit_is_reported(log, machine):
     found = machine(
         """
         [channels]
@@ -148,7 +148,7 @@ def test_a_header_that_says_another_unit_is_told(log, machine):
     recording = read_recording(log("t [ms],i [A],n [mm/s]\n0,1,2\n1,2,3\n2,3,4\n"), found)
     contradicted = {
         channel: fact.header
-        for channel, fact in told(recording)
+        for channel, fact in channels_and_facts(recording)
         if isinstance(fact, ClockUnitContradicted | UnitContradicted)
     }
     assert contradicted == {"time": "t [ms]", "speed": "n [mm/s]"}
@@ -164,7 +164,7 @@ MOTOR = "back_emf_constant = 0.1, torque_constant = 0.2"
 
 
 @pytest.mark.parametrize(("unit", "volts"), [("%", 0.24), ("1", 24.0), ("V", 1.0)])
-def test_torque_comes_from_the_voltage_and_the_speed(log, machine, unit, volts):
+def test_torque_is_computed_from_voltage_and_speed(log, machine, unit, volts):
     found = machine(DUTY.format(unit=unit, motor=MOTOR, motion='speed = { column = "n", unit = "rad/s" }'))
     n = np.arange(50.0)
     recording = read_recording(log(table({"t": 10 * n, "u": 0.5 * n, "n": n})), found)
@@ -172,7 +172,7 @@ def test_torque_comes_from_the_voltage_and_the_speed(log, machine, unit, volts):
     assert np.allclose(recording["torque"].values[:, 0], expected / RATIO)
 
 
-def test_torque_from_the_voltage_takes_the_speed_from_the_position_if_need_be(log, machine):
+def test_torque_from_the_voltage_uses_the_derivative_of_the_position_without_a_speed(log, machine):
     found = machine(DUTY.format(unit="V", motor=MOTOR, motion='position = { column = "q", unit = "rad" }'))
     n = np.arange(50.0)
     recording = read_recording(log(table({"t": 10 * n, "u": 12 + 0 * n, "q": 0.3 * n})), found)
@@ -187,12 +187,12 @@ def test_torque_from_the_voltage_without_the_motors_speed_is_a_clear_error(log, 
         read_recording(log("t,u,n\n0,1,2\n1,2,3\n"), found)
 
 
-def test_a_channel_that_never_changes_while_the_machine_moves_is_told(log, machine):
+def test_a_channel_that_is_constant_while_the_machine_moves_is_reported(log, machine):
     columns = gate_columns()
     columns["i_motor"][:] = 1.5
-    assert ("torque", StuckChannel("")) in told(read_recording(log(table(columns)), machine()))
+    assert ("torque", StuckChannel("")) in channels_and_facts(read_recording(log(table(columns)), machine()))
     columns["n_motor"][:] = 0.0
-    assert ("torque", StuckChannel("")) not in told(read_recording(log(table(columns)), machine()))
+    assert ("torque", StuckChannel("")) not in channels_and_facts(read_recording(log(table(columns)), machine()))
 
 
 def test_a_field_with_more_values_than_joints_is_a_clear_error(tmp_path, machine):
@@ -200,10 +200,10 @@ def test_a_field_with_more_values_than_joints_is_a_clear_error(tmp_path, machine
     time = np.arange(5.0)
     write_mcap(path, [Stream("/drive", "std_msgs/msg/Float64MultiArray", time, {"data": np.ones((5, 2))})])
     found = machine('[channels.mcap]\ntorque = { topic = "/drive", field = "data[:]" }\n')
-    with pytest.raises(RecordingError, match=r"data\[:\]\) gives 2 values a sample for 1 joints"):
+    with pytest.raises(RecordingError, match=r"data\[:\]\) has 2 values per sample for 1 joints"):
         read_recording(path, found)
 
 
 def test_a_clock_without_a_number_is_a_clear_error(log, machine):
-    with pytest.raises(RecordingError, match="column 't' holds no time stamp"):
+    with pytest.raises(RecordingError, match="column 't' contains no time stamp"):
         read_recording(log("t,i_motor,n_motor\nnan,1,2\n,2,3\n"), machine())

@@ -1,4 +1,4 @@
-"""Mapped channels that are converted piece by piece: the rows, times and findings of those that are held in memory."""
+"""Mapped channels converted piece by piece: the same rows, times and findings as for channels in memory."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def machine(folder: Path, clock: str = "log", offset: float = 0.0) -> MachineFil
 
 
 def write(path: Path, seed: int, start: float = 0.0, rows: int = 300, cell: bool = True) -> Path:
-    """Two joints at 100 Hz with gaps, repeated stamps and odd values, a load cell at 50 Hz, two events."""
+    """Write two joints at 100 Hz with gaps, repeated stamps and faulty values, a load cell at 50 Hz, and two events."""
     random = np.random.default_rng(seed)
     time = start + np.arange(rows) / 100.0 + 0.5 * (np.arange(rows) > rows // 2)
     time[random.integers(1, rows, 5)] -= 0.01
@@ -61,8 +61,8 @@ def write(path: Path, seed: int, start: float = 0.0, rows: int = 300, cell: bool
     return path
 
 
-def late(path: Path, most: int, seed: int = 0) -> Path:
-    """A log whose messages stand up to `most` places behind their order; the header's stamps are 2 ms earlier."""
+def write_out_of_order(path: Path, most: int, seed: int = 0) -> Path:
+    """Write a log whose messages are up to `most` positions late; the header stamps are 2 ms earlier."""
     from mcap.reader import make_reader
     from mcap.writer import Writer
 
@@ -87,8 +87,8 @@ def late(path: Path, most: int, seed: int = 0) -> Path:
 
 
 def table(rows: ChannelRows | ChannelPieces) -> dict[str, bytes]:
-    """All bytes of times and values, group by group, as a writer gets them: no row is later than the next part."""
-    held: dict[str, list[list[np.ndarray]]] = {group.name: [] for group in rows.groups}
+    """Return all bytes of times and values by group, as a writer receives them: no row is later than the next part."""
+    by_group: dict[str, list[list[np.ndarray]]] = {group.name: [] for group in rows.groups}
     latest = -np.inf
     for ready in rows.parts(rows.groups):
         times = [part.time for part in ready if part is not None]
@@ -96,21 +96,21 @@ def table(rows: ChannelRows | ChannelPieces) -> dict[str, bytes]:
         latest = max(float(time[-1]) for time in times)
         for group, part in zip(rows.groups, ready, strict=True):
             if part is not None:
-                held[group.name].append([part.time, *part.flat])
+                by_group[group.name].append([part.time, *part.flat])
     for group in rows.groups:
-        assert sum(len(part[0]) for part in held[group.name]) == group.rows
+        assert sum(len(part[0]) for part in by_group[group.name]) == group.rows
     return {
         name: b"".join(np.concatenate(column).tobytes() for column in zip(*parts, strict=True))
-        for name, parts in held.items()
+        for name, parts in by_group.items()
     }
 
 
-def _shown(finding: Finding) -> tuple[str, str, str]:
+def as_shown(finding: Finding) -> tuple[str, str, str]:
     return finding.kind, finding.severity, str(finding)
 
 
-def assert_alike(log: Path, machine_file: MachineFile) -> tuple[Finding, ...]:
-    """The same groups, rows and findings as in memory; gives the findings."""
+def assert_same_as_in_memory(log: Path, machine_file: MachineFile) -> tuple[Finding, ...]:
+    """Assert the same groups, rows and findings as in memory; return the findings."""
     pieces, whole = channel_rows(log, machine_file), ChannelRows(log, machine_file)
     assert isinstance(pieces, ChannelPieces)
     assert pieces.origin == whole.origin
@@ -120,8 +120,8 @@ def assert_alike(log: Path, machine_file: MachineFile) -> tuple[Finding, ...]:
             (c.name, c.unit, c.values.shape) for c in its.columns
         ]
     assert table(pieces) == table(whole)
-    # The numbers are sums in another order: alike to the digits that are shown, not to the bit.
-    assert [*map(_shown, pieces.findings)] == [*map(_shown, whole.findings)]
+    # The numbers are summed in another order: they are equal to the digits shown, but not to the bit.
+    assert [*map(as_shown, pieces.findings)] == [*map(as_shown, whole.findings)]
     return pieces.findings
 
 
@@ -133,26 +133,26 @@ def assert_alike(log: Path, machine_file: MachineFile) -> tuple[Finding, ...]:
     waiting=st.sampled_from([16, 1 << 15]),
     seed=st.integers(0, 1000),
 )
-def test_channels_in_pieces_are_those_in_memory(tmp_path_factory, clock, offset, most, waiting, seed):
+def test_channels_in_pieces_equal_those_in_memory(tmp_path_factory, clock, offset, most, waiting, seed):
     folder = tmp_path_factory.mktemp("log")
-    log = late(folder / "log.mcap", most, seed)
+    log = write_out_of_order(folder / "log.mcap", most, seed)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(time_order.by_time, "__defaults__", (waiting,))
-        kinds = {found.kind for found in assert_alike(log, machine(folder, clock, offset))}
+        kinds = {finding.kind for finding in assert_same_as_in_memory(log, machine(folder, clock, offset))}
     assert kinds >= {"infinite_values", "saturated_values", "repeated_stamps", "sample_gaps", "missing_values"}
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_parts_in_pieces_are_those_in_memory(tmp_path, count):
+def test_parts_in_pieces_equal_those_in_memory(tmp_path, count):
     folder = tmp_path / "bag"
     folder.mkdir()
     for number in range(count):
         write(folder / f"bag_{number}.mcap", number, start=5.0 * number, cell=number != 1)
     names = "".join(f"    - bag_{number}.mcap\n" for number in range(count + 1))
     (folder / "metadata.yaml").write_text(f"bag:\n  relative_file_paths:\n{names}")
-    lost, *others = assert_alike(folder, machine(tmp_path))
+    lost, *others = assert_same_as_in_memory(folder, machine(tmp_path))
     assert lost == Finding(PartMissing(f"bag_{count}.mcap", "metadata.yaml"), severity="loss")
-    assert ("position", "bag_0.mcap") in {(found.channel, found.file) for found in others}
+    assert ("position", "bag_0.mcap") in {(finding.channel, finding.file) for finding in others}
 
 
 def test_parts_that_overlap_are_refused_as_in_memory(tmp_path):
@@ -162,28 +162,28 @@ def test_parts_that_overlap_are_refused_as_in_memory(tmp_path):
         write(folder / f"bag_{number}.mcap", number, start=1.0 * number)
     faults = []
     for read in (channel_rows, ChannelRows):
-        with pytest.raises(RecordingError, match="overlaps the part before it") as fault:
+        with pytest.raises(RecordingError, match="overlaps the previous part") as fault:
             read(folder, machine(tmp_path))
         faults.append(str(fault.value))
     assert faults[0] == faults[1]
 
 
-def test_a_load_cell_that_is_not_in_the_log_is_noted_as_in_memory(tmp_path):
-    findings = assert_alike(write(tmp_path / "log.mcap", 1, cell=False), machine(tmp_path))
-    assert [found.channel for found in findings if isinstance(found.fact, AbsentTruth)] == ["force"]
+def test_a_missing_load_cell_is_noted_as_in_memory(tmp_path):
+    findings = assert_same_as_in_memory(write(tmp_path / "log.mcap", 1, cell=False), machine(tmp_path))
+    assert [finding.channel for finding in findings if isinstance(finding.fact, AbsentTruth)] == ["force"]
 
 
-def test_a_converted_log_is_read_back_by_its_exact_times_in_pieces_too(tmp_path):
-    done = convert(write(tmp_path / "log.mcap", 2), tmp_path / "out.mcap", machine=machine(tmp_path))
-    again = read_machine_file(done.machine_files[0])
-    assert_alike(tmp_path / "out.mcap", again)
+def test_a_converted_log_has_its_exact_times_when_read_in_pieces(tmp_path):
+    converted = convert(write(tmp_path / "log.mcap", 2), tmp_path / "out.mcap", machine=machine(tmp_path))
+    again = read_machine_file(converted.machine_files[0])
+    assert_same_as_in_memory(tmp_path / "out.mcap", again)
     first, second = (channel_rows(tmp_path / name, known) for name, known in (
         ("log.mcap", machine(tmp_path)), ("out.mcap", again)
     ))  # fmt: skip
     assert table(first) == table(second) and first.origin == second.origin
 
 
-def test_a_coarse_clock_is_held_in_memory_which_its_straight_line_needs(tmp_path):
+def test_a_log_with_a_coarse_clock_is_read_into_memory(tmp_path):
     time = np.floor(np.arange(200) / 5) / 20.0
     write_mcap(
         tmp_path / "log.mcap",
@@ -193,11 +193,11 @@ def test_a_coarse_clock_is_held_in_memory_which_its_straight_line_needs(tmp_path
     text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels.mcap]\n'
     (tmp_path / "machine.toml").write_text(text + 'speed = { topic = "/speed", field = "data" }\n')
     rows = channel_rows(tmp_path / "log.mcap", read_machine_file(tmp_path / "machine.toml"))
-    assert isinstance(rows, ChannelRows) and any(isinstance(found.fact, CoarseClock) for found in rows.findings)
+    assert isinstance(rows, ChannelRows) and any(isinstance(finding.fact, CoarseClock) for finding in rows.findings)
 
 
 def number_arrays(path: Path, lengths: list[int]) -> Path:
-    """Messages with an array of so many numbers each."""
+    """Write messages with one array each, of these lengths."""
     from mcap.writer import Writer
 
     with path.open("wb") as file:
@@ -217,9 +217,9 @@ def number_arrays(path: Path, lengths: list[int]) -> Path:
 @pytest.mark.parametrize(
     "lengths",
     [[2] * 9, [0, 0, 2, 2, 0, 2, 2], [0] * 7, [2, 2, 3, 2, 2], [3] * 6],
-    ids=["alike", "some empty", "all empty", "of two lengths", "of another length than the joints"],
+    ids=["uniform", "some empty", "all empty", "of two lengths", "of another length than the joints"],
 )
-def test_whole_arrays_are_taken_or_refused_as_in_memory(tmp_path, lengths):
+def test_whole_arrays_are_accepted_or_refused_as_in_memory(tmp_path, lengths):
     log = number_arrays(tmp_path / "log.mcap", lengths)
     text = MACHINE.partition("CLOCK")[0] + 'position = { topic = "/joints", field = "position[:]", unit = "m" }\n'
     (tmp_path / "machine.toml").write_text(text)
@@ -231,4 +231,4 @@ def test_whole_arrays_are_taken_or_refused_as_in_memory(tmp_path, lengths):
             channel_rows(log, known)
         assert str(mine.value) == str(fault)
     else:
-        assert_alike(log, known)
+        assert_same_as_in_memory(log, known)

@@ -1,4 +1,4 @@
-"""`cdtool info` without a machine file: which column is the clock, and in which unit."""
+"""`cdtool info` without a machine file: the guess of the clock column and its unit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cdtool.workflows.information import info
 
 
 @pytest.mark.parametrize("rate_hz", [1.0, 10.0, 1000.0])
-def test_days_as_excel_counts_them_are_told_from_seconds_at_any_rate(tmp_path, rate_hz):
+def test_excel_days_are_distinguished_from_seconds_at_any_rate(tmp_path, rate_hz):
     days = 45231.5 + np.arange(2000) / rate_hz / DAY_S
     path = tmp_path / "log.csv"
     path.write_text("time,torque\n" + "".join(f"{day:.12f},{i % 7}\n" for i, day in enumerate(days)))

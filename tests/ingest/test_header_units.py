@@ -1,4 +1,4 @@
-"""A header's unit that contradicts the machine file, in kind or by a factor, is told; one that fits is not."""
+"""A header's unit that contradicts the machine file, in kind or by a factor, is reported; a matching one is not."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ LINEAR = LOAD.format(kind="linear_axis", inertia="load_mass = 50.0")
 ROTARY = LOAD.format(kind="rotary_axis", inertia="load_inertia = 1.0")
 
 
-def told(recording, channel):
+def unit_findings(recording, channel):
     kinds = UnitContradicted, ClockUnitContradicted
     return [item for item in recording.findings if item.channel == channel and isinstance(item.fact, kinds)]
 
 
-def found(log, machine, machine_table, channel, header, stated):
-    """The findings on a channel whose column `x` has this header, where the machine file states `stated`."""
+def findings_of_log(log, machine, machine_table, channel, header, stated):
+    """Return the findings on a channel whose column `x` has this header, if the machine file states `stated`."""
     unit = "m/s" if "linear" in machine_table else "rad/s"
     time = np.arange(30) * 0.01
     rows = "".join(f"{t:.2f};{0.1 + t:.3f};{t:.3f}\n" for t in time)
@@ -36,8 +36,8 @@ def found(log, machine, machine_table, channel, header, stated):
     text = f'[channels]\ntime = {{ column = "t", unit = "s" }}\n{speed}{channel} = {{ column = "x", {stated} }}\n'
     path = log(f"t [s];x{f' [{header}]' if header else ''};v [{unit}]\n{rows}")
     recording = read_recording(path, machine(text, machine_table))
-    assert channel == "speed" or told(recording, "speed") == []
-    return told(recording, channel)
+    assert channel == "speed" or unit_findings(recording, "speed") == []
+    return unit_findings(recording, channel)
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def found(log, machine, machine_table, channel, header, stated):
 def test_a_header_that_contradicts_the_machine_file_is_a_warning(
     log, machine, kind, channel, header, stated, ratio, advice, scale
 ):
-    (finding,) = found(log, machine, kind, channel, header, stated)
+    (finding,) = findings_of_log(log, machine, kind, channel, header, stated)
     in_file = stated.split('"')[1]
     fact = UnitContradicted(f"x [{header}]", header, 0, in_file, pytest.approx(ratio, rel=1e-3), advice, scale)
     assert finding.fact == fact and finding.severity == "warning"
@@ -94,11 +94,11 @@ def test_a_header_that_contradicts_the_machine_file_is_a_warning(
     ],
     ids=lambda value: value if isinstance(value, str) and "[machine]" not in value else "",
 )
-def test_a_header_that_fits_or_says_nothing_is_not_told(log, machine, kind, channel, header, stated):
-    assert found(log, machine, kind, channel, header, stated) == []
+def test_a_header_with_a_matching_or_unknown_unit_is_not_reported(log, machine, kind, channel, header, stated):
+    assert findings_of_log(log, machine, kind, channel, header, stated) == []
 
 
-def test_a_unit_of_1_is_none_unless_the_machine_file_takes_the_value_for_a_share():
+def test_the_unit_1_is_only_compared_if_the_machine_file_states_a_share():
     plain = Column("x", np.empty(0), unit="1")
     torque = ChannelSource("torque", ("x",), unit="N m", stated="N m")
     assert channel_unit_findings(torque, [plain]) == []
@@ -106,7 +106,7 @@ def test_a_unit_of_1_is_none_unless_the_machine_file_takes_the_value_for_a_share
     assert channel_unit_findings(duty, [plain])[0].fact.ratio == pytest.approx(100.0)
 
 
-def test_a_channel_of_joints_of_both_kinds_is_in_the_si_unit_of_each():
+def test_a_channel_of_linear_and_rotary_joints_is_in_the_si_unit_of_each():
     both = ChannelSource("position", ("a", "b"), factor=(1.0, 1.0), unit="SI", stated="SI")
     columns = [Column("a", np.empty(0), unit="rad"), Column("b", np.empty(0), unit="m")]
     assert channel_unit_findings(both, columns) == []
@@ -115,15 +115,15 @@ def test_a_channel_of_joints_of_both_kinds_is_in_the_si_unit_of_each():
     assert (fact.header, fact.stated) == ("a [deg]", "SI")
 
 
-def test_a_row_of_units_is_held_against_the_machine_file_too(log, machine):
+def test_a_row_of_units_is_compared_with_the_machine_file(log, machine):
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nposition = { column = "pos", unit = "m" }\n'
     rows = "".join(f"{0.01 * k:.2f};{k}\n" for k in range(30))
     recording = read_recording(log(f"t;pos\ns;mm\n{rows}"), machine(channels, LINEAR))
-    fact = told(recording, "position")[0].fact
+    fact = unit_findings(recording, "position")[0].fact
     assert (fact.header, fact.stated) == ("pos [mm]", "m")
 
 
-def test_joints_that_are_wrong_alike_are_one_warning_and_others_are_none(log, machine):
+def test_joints_with_the_same_wrong_unit_are_one_warning(log, machine):
     channels = """
 [channels]
 time = { column = "t", unit = "s" }
@@ -134,8 +134,8 @@ speed = { columns = ["c", "d"], unit = "rad/s" }
     recording = read_recording(
         log(f"t [s];a [deg];b [deg];c [rad/s];d [rpm]\n{rows}"), machine(channels, ROTARY + 'joints = ["a", "b"]\n')
     )
-    assert [(item.fact.header, item.fact.more) for item in told(recording, "position")] == [("a [deg]", 1)]
-    assert [(item.fact.header, item.fact.more) for item in told(recording, "speed")] == [("d [rpm]", 0)]
+    assert [(item.fact.header, item.fact.more) for item in unit_findings(recording, "position")] == [("a [deg]", 1)]
+    assert [(item.fact.header, item.fact.more) for item in unit_findings(recording, "speed")] == [("d [rpm]", 0)]
 
 
 @pytest.mark.parametrize(
@@ -149,15 +149,15 @@ speed = { columns = ["c", "d"], unit = "rad/s" }
         ("s", 'unit = "s"', 0.0, None),
     ],
 )
-def test_the_clocks_unit_is_held_against_the_machine_file(log, machine, header, time, rate, ratio):
+def test_the_unit_of_the_clock_is_compared_with_the_machine_file(log, machine, header, time, rate, ratio):
     channels = f'[channels]\ntime = {{ column = "t", {time} }}\nposition = {{ column = "x", unit = "m" }}\n'
     rows = "".join(f"{k};{k}\n" for k in range(30))
-    findings = told(read_recording(log(f"t [{header}];x [m]\n{rows}"), machine(channels, LINEAR)), "time")
+    findings = unit_findings(read_recording(log(f"t [{header}];x [m]\n{rows}"), machine(channels, LINEAR)), "time")
     fact = ClockUnitContradicted(f"t [{header}]", header, "s", rate, None if ratio is None else pytest.approx(ratio))
     assert [item.fact for item in findings] == ([] if ratio is None else [fact])
 
 
-def test_each_column_on_a_clock_of_its_own_has_its_unit_compared(tmp_path, machine):
+def test_the_unit_of_a_column_with_its_own_clock_is_compared(tmp_path, machine):
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "log.h5"
     with h5py.File(path, "w") as file:
@@ -166,5 +166,5 @@ def test_each_column_on_a_clock_of_its_own_has_its_unit_compared(tmp_path, machi
             file[f"drive/{name}"].attrs["unit"] = unit
     channels = '[channels]\ntime = { column = "time", unit = "s" }\nposition = { column = "drive/pos", unit = "m" }\n'
     recording = read_recording(path, machine(channels, LINEAR))
-    fact = told(recording, "position")[0].fact
+    fact = unit_findings(recording, "position")[0].fact
     assert (fact.header, fact.stated) == ("drive/pos [mm]", "m")

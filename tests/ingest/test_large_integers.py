@@ -1,4 +1,4 @@
-"""Numbers of more digits than float64: a clock is exact to the nanosecond, anything else is counted."""
+"""Integers with more digits than float64: clocks are exact to the nanosecond, other rounded numbers are counted."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from tests.formats.conftest import COLUMNS
 EPOCH = 1_700_000_000_123_456_789
 
 
-def rounded(source) -> list[Finding]:
+def rounding_findings(source) -> list[Finding]:
     return [finding for finding in source.findings if isinstance(finding.fact, RoundedIntegers)]
 
 
-def written(ns: int, unit: str, mark: str = ".") -> str:
-    """The stamp in that unit with all its digits."""
+def stamp_text(ns: int, unit: str, mark: str = ".") -> str:
+    """Return a time stamp in a unit, with all its digits."""
     decimals = {"s": 9, "ms": 6, "us": 3, "ns": 0}[unit]
     return str(ns) if not decimals else f"{ns // 10**decimals}{mark}{ns % 10**decimals:0{decimals}d}"
 
 
 def same(time: np.ndarray, nanoseconds) -> bool:
-    """Seconds as they are, but for the last bit of the factor that leads there."""
+    """Return True if the times equal the nanoseconds, except for the rounding of the unit factor."""
     return len(time) == len(nanoseconds) and np.allclose(time, np.array(nanoseconds) / 1e9, rtol=4e-16, atol=0.0)
 
 
@@ -46,16 +46,16 @@ def test_stamps_since_1970_keep_every_nanosecond(log, machine, unit, separator, 
     names.insert(at, "t")
     for i, stamp in enumerate(stamps.tolist()):
         row = ["1.5", f"{i}.25"]
-        row.insert(at, written(stamp, unit, "," if separator == ";" else "."))
+        row.insert(at, stamp_text(stamp, unit, "," if separator == ";" else "."))
         rows.append([cell.replace(".", ",") if separator == ";" else cell for cell in row])
     text = "\n".join(separator.join(row) for row in [names, *rows]) + "\n"
     recording = read_recording(log(text), machine(clock_in(unit)))
     assert same(recording["speed"].time, stamps - stamps[0])
     assert recording.origin == stamps[0] / 1e9
-    assert not rounded(recording)
+    assert not rounding_findings(recording)
 
 
-def test_rows_that_are_none_shift_no_stamp(log, machine, monkeypatch):
+def test_lines_that_are_not_rows_do_not_shift_the_stamps(log, machine, monkeypatch):
     monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 256)
     stamps = [EPOCH + 1_000_001 * i for i in range(200)]
     lines = [f"{stamp},1,{i}" for i, stamp in enumerate(stamps)]
@@ -65,11 +65,11 @@ def test_rows_that_are_none_shift_no_stamp(log, machine, monkeypatch):
     text = "t,i_motor,n_motor\n# units unknown\n" + "\n".join(lines) + "\n"
     time = read_recording(log(text), machine(clock_in("ns")))["speed"].time
     differences = np.array(stamps) - EPOCH
-    assert time[20] == pytest.approx(differences[20] / 1e9, abs=2e-7)  # in quotes: as float64 has it
+    assert time[20] == pytest.approx(differences[20] / 1e9, abs=2e-7)  # in quotes: read as float64
     assert same(np.delete(time, 20), np.delete(differences, 20))
 
 
-def test_a_missing_stamp_and_one_with_an_exponent_lose_nothing_of_the_others(log, machine):
+def test_a_missing_stamp_and_one_with_an_exponent_do_not_affect_the_others(log, machine):
     stamps = [str(EPOCH + 1_000_001 * i) for i in range(20)]
     stamps[4], stamps[9] = "", "1.700000000132456e18"
     text = "t,i_motor,n_motor\n" + "".join(f"{stamp},1,{i}\n" for i, stamp in enumerate(stamps))
@@ -87,7 +87,7 @@ def test_a_missing_stamp_and_one_with_an_exponent_lose_nothing_of_the_others(log
 )
 def test_any_stamps_are_exact_to_the_nanosecond(log, machine, first, steps, unit, last):
     stamps = [first + sum(steps[:i]) for i in range(len(steps) + 1)]
-    rows = "".join(f"{i}.5,{written(x, unit)},1\n" for i, x in enumerate(stamps))
+    rows = "".join(f"{i}.5,{stamp_text(x, unit)},1\n" for i, x in enumerate(stamps))
     path = log("n_motor,t,i_motor\n" + (rows if last else rows[:-1]))
     time = read_recording(path, machine(clock_in(unit)))["speed"].time
     assert same(time, [stamp - first for stamp in stamps[: len(time)]])
@@ -97,13 +97,13 @@ def test_any_stamps_are_exact_to_the_nanosecond(log, machine, first, steps, unit
 def test_without_a_machine_file_rounded_stamps_are_counted(log):
     text = "stamp,x\n" + "".join(f"{EPOCH + i},{i}\n" for i in range(30))
     for source in (Csv().columns(log(text)), join_pieces(Csv().pieces(log(text)), sort=False)):
-        assert rounded(source) == [Finding(RoundedIntegers(30), "stamp")]
+        assert rounding_findings(source) == [Finding(RoundedIntegers(30), "stamp")]
 
 
-def test_a_column_that_is_no_clock_is_counted_with_a_machine_file_too(log, machine):
+def test_rounded_numbers_of_other_columns_are_counted_with_a_machine_file(log, machine):
     rows = "".join(f"{i},1,{2**53 + 2 * i - 4}\n" for i in range(8))
     recording = read_recording(log("t,i_motor,n_motor\n" + rows), machine())
-    assert rounded(recording)[0] == Finding(RoundedIntegers(5), "n_motor")
+    assert rounding_findings(recording)[0] == Finding(RoundedIntegers(5), "n_motor")
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_column_that_is_no_clock_is_counted_with_a_machine_file_too(log, machi
         ([1e20, -1e300, np.inf, np.nan], 0),
         ([], 0),
     ],
-    ids=["exact", "rounded", "no 64 bits", "none"],
+    ids=["exact", "rounded", "no 64 bits", "empty"],
 )
-def test_what_64_bits_hold_and_float64_does_not_is_counted(values, count):
+def test_64_bit_integers_that_float64_rounds_are_counted(values, count):
     assert rounded_integers(np.array(values)) == count

@@ -1,4 +1,4 @@
-"""A log in parts, as rosbag2 splits one: surveyed as one, and what its metadata.yaml names in vain."""
+"""A log in parts, as rosbag2 splits one: surveyed as one log, with findings on missing parts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.findings.parts import PartCompressed, PartGap, PartMissing, PartOfOtherKind, PartsOverlap
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.formats.source import TopicDetails
-from cdtool.ingest.parts import lost_parts
+from cdtool.ingest.parts import missing_part_findings
 from cdtool.ingest.reading import log_parts, read_recording, survey
 from cdtool.machine_file import read_machine_file
 
@@ -37,7 +37,7 @@ def write_part(path: Path, time: np.ndarray, values: np.ndarray, topics: tuple[s
 
 
 def bag(folder: Path, count: int = 3, rows: int = 100) -> Path:
-    """`count` parts of a second each, numbered as rosbag2 does: the tenth sorts before the second."""
+    """Write `count` parts of one second each, numbered as by rosbag2: the tenth sorts before the second."""
     folder.mkdir(exist_ok=True)
     for number in range(count):
         time = number + np.arange(rows) / rows
@@ -60,7 +60,7 @@ def losses(findings) -> list[Fact]:
 
 @settings(max_examples=15, deadline=None)
 @given(cuts=st.lists(st.integers(0, 200), max_size=4), order=st.permutations(range(5)), seed=st.integers(0, 2**32 - 1))
-def test_a_log_cut_anywhere_is_surveyed_as_the_whole_one(tmp_path_factory, cuts, order, seed):
+def test_a_log_cut_anywhere_is_surveyed_as_the_whole_log(tmp_path_factory, cuts, order, seed):
     folder = tmp_path_factory.mktemp("cut")
     values = np.random.default_rng(seed).normal(size=200)
     time = np.arange(200) / 128.0
@@ -74,7 +74,7 @@ def test_a_log_cut_anywhere_is_surveyed_as_the_whole_one(tmp_path_factory, cuts,
     assert parts.origin == whole.origin == START
     column, expected = parts.columns["/speed data"], whole.columns["/speed data"]
     np.testing.assert_array_equal(column.values, expected.values)
-    # A part's origin is an epoch in float64, of which the last digit is 0.24 us.
+    # The origin of a part is an epoch in float64, with a resolution of 0.24 us.
     np.testing.assert_allclose(column.time, expected.time, rtol=0.0, atol=5e-7)
     assert parts.topics["/speed"] == whole.topics["/speed"]
     assert {item.kind for item in parts.findings} <= {"no_message"}
@@ -88,7 +88,7 @@ def test_parts_are_ordered_by_their_times_and_not_by_their_names(tmp_path):
     assert source.topics["/speed"].messages == 1100
 
 
-def test_a_topic_that_only_some_parts_hold_is_surveyed_from_these(tmp_path):
+def test_a_topic_in_only_some_parts_is_surveyed_from_these(tmp_path):
     folder = bag(tmp_path / "bag", count=2)
     time = 2.0 + np.arange(50) / 50
     write_part(folder / "bag_2.mcap", time, time, ("/speed", "/event"))
@@ -97,7 +97,7 @@ def test_a_topic_that_only_some_parts_hold_is_surveyed_from_these(tmp_path):
     np.testing.assert_allclose(source.columns["/event data"].time, time, rtol=0.0, atol=5e-7)
 
 
-def test_a_part_that_begins_before_the_last_one_ends_is_put_in_order_and_told(tmp_path):
+def test_overlapping_parts_are_sorted_and_reported(tmp_path):
     folder = tmp_path / "bag"
     folder.mkdir()
     for number in (0, 1):
@@ -110,7 +110,7 @@ def test_a_part_that_begins_before_the_last_one_ends_is_put_in_order_and_told(tm
     assert source.findings == (Finding(PartsOverlap("bag_1.mcap", "/speed data")),)
 
 
-def test_an_array_whose_length_changes_from_part_to_part_is_left_out_and_told(tmp_path):
+def test_an_array_whose_length_differs_between_parts_is_left_out_and_reported(tmp_path):
     folder = tmp_path / "bag"
     folder.mkdir()
     for number in (0, 1):
@@ -123,12 +123,12 @@ def test_an_array_whose_length_changes_from_part_to_part_is_left_out_and_told(tm
     assert Finding(ArrayLengthsDiffer((2, 3)), "/joints position[:]", "note") in source.findings
 
 
-def test_what_is_odd_about_a_part_is_told_with_its_name(tmp_path):
+def test_findings_on_a_part_have_the_name_of_its_file(tmp_path):
     folder = bag(tmp_path / "bag")
     whole = (folder / "bag_2.mcap").read_bytes()
     (folder / "bag_2.mcap").write_bytes(whole[:-40])
-    told = [item for item in survey(folder).findings if item.severity == "loss"]
-    assert told and all(item.file == "bag_2.mcap" and "bag_2.mcap: " in str(item) for item in told)
+    findings = [item for item in survey(folder).findings if item.severity == "loss"]
+    assert findings and all(item.file == "bag_2.mcap" and "bag_2.mcap: " in str(item) for item in findings)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_what_is_odd_about_a_part_is_told_with_its_name(tmp_path):
     ],
     ids=["block", "block with comments", "flow", "with the folder, as the first versions"],
 )
-def test_a_part_that_metadata_names_and_that_is_not_there_is_a_loss(tmp_path, listed):
+def test_a_missing_part_that_metadata_names_is_a_loss(tmp_path, listed):
     folder = bag(tmp_path / "bag")
     metadata(folder, listed)
     lost = [PartMissing("bag_3.mcap", "metadata.yaml")]
@@ -149,13 +149,13 @@ def test_a_part_that_metadata_names_and_that_is_not_there_is_a_loss(tmp_path, li
     assert losses(read_recording(folder, machine(tmp_path)).findings) == lost
 
 
-def test_the_last_of_two_parts_that_is_gone_is_a_loss_too(tmp_path):
+def test_the_missing_last_of_two_parts_is_a_loss(tmp_path):
     folder = bag(tmp_path / "bag", count=1)
     metadata(folder, "  relative_file_paths:\n    - bag_0.mcap\n    - bag_1.mcap\n")
     assert losses(survey(folder).findings) == [PartMissing("bag_1.mcap", "metadata.yaml")]
 
 
-def test_a_part_that_is_compressed_as_a_file_is_told_unless_it_is_there_decompressed_too(tmp_path):
+def test_a_compressed_part_is_reported_unless_it_also_exists_uncompressed(tmp_path):
     folder = bag(tmp_path / "bag")
     metadata(folder, "".join(["  relative_file_paths:\n", *(f"  - bag_{i}.mcap.zstd\n" for i in range(3))]))
     assert losses(survey(folder).findings) == []
@@ -163,14 +163,14 @@ def test_a_part_that_is_compressed_as_a_file_is_told_unless_it_is_there_decompre
     assert losses(survey(folder).findings) == [PartCompressed("bag_1.mcap.zstd", "metadata.yaml")]
 
 
-def test_a_part_of_another_kind_than_those_that_are_read_is_a_loss(tmp_path):
+def test_a_part_of_another_format_than_the_others_is_a_loss(tmp_path):
     folder = bag(tmp_path / "bag", count=1)
     (folder / "bag_1.db3").write_bytes(b"SQLite format 3\0")
     metadata(folder, "  relative_file_paths:\n  - bag_0.mcap\n  - bag_1.db3\n")
     assert losses(survey(folder).findings) == [PartOfOtherKind("bag_1.db3", "metadata.yaml")]
 
 
-def test_a_folder_none_of_whose_parts_is_there_is_refused_with_the_first_of_them(tmp_path):
+def test_a_folder_without_any_of_its_parts_is_refused_with_the_name_of_the_first(tmp_path):
     metadata(tmp_path, "  relative_file_paths:\n  - bag_0.db3\n")
     for read in (survey, log_parts):
         with pytest.raises(RecordingError, match=r"part bag_0\.db3 of metadata\.yaml is not in the folder") as fault:
@@ -183,10 +183,10 @@ def test_a_folder_none_of_whose_parts_is_there_is_refused_with_the_first_of_them
     ["", "relative_file_paths:", "relative_file_paths: [", "relative_file_paths: none", "\0\xff" * 50, "- a\n- b\n"],
     ids=["empty", "no item", "an open list", "a word", "bytes", "another list"],
 )
-def test_metadata_that_cannot_be_understood_says_nothing(tmp_path, text):
+def test_metadata_that_cannot_be_parsed_has_no_effect(tmp_path, text):
     folder = bag(tmp_path / "bag", count=1)
     (folder / "metadata.yaml").write_bytes(text.encode("latin-1"))
-    assert lost_parts(folder, log_parts(folder)) == []
+    assert missing_part_findings(folder, log_parts(folder)) == []
 
 
 def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
@@ -213,16 +213,15 @@ def test_the_parts_of_a_ros_2_bag_in_sqlite_are_surveyed_as_one(tmp_path):
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.01, 5.0])
-def test_a_pause_between_two_parts_is_told(tmp_path, pause):
+def test_a_pause_between_two_parts_is_reported(tmp_path, pause):
     folder = tmp_path / "log"
     folder.mkdir()
     for number in range(3):
         time = number + np.arange(100) / 100 + pause * (number == 2)
         write_part(folder / f"bag_{number}.mcap", time, time)
     findings = read_recording(folder, machine(tmp_path)).findings
-    told = [finding for finding in findings if isinstance(finding.fact, PartGap)]
+    gaps = [finding for finding in findings if isinstance(finding.fact, PartGap)]
     if pause < 5.0:
-        assert not told
+        assert not gaps
     else:
-        (only,) = told
-        assert only == Finding(PartGap(pytest.approx(5.01)), file="bag_2.mcap")
+        assert gaps == [Finding(PartGap(pytest.approx(5.01)), file="bag_2.mcap")]

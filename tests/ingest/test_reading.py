@@ -19,7 +19,7 @@ def rows(start, count):
     return "t,i_motor,n_motor\n" + "".join(f"{10 * i},{i},{i + 1}\n" for i in range(start, start + count))
 
 
-def test_the_first_bytes_decide_where_the_suffix_is_wrong(log, tmp_path):
+def test_the_first_bytes_determine_the_format_if_the_suffix_is_wrong(log, tmp_path):
     assert choose_format(log(ROWS, "a.mcap")).name == "csv"
     assert choose_format(log(ROWS, "a.log")).name == "csv"
     write_mcap(tmp_path / "b.csv", [Stream("/a", "std_msgs/msg/Float64", np.zeros(1), {"data": np.zeros(1)})])
@@ -34,19 +34,19 @@ def test_the_first_bytes_decide_where_the_suffix_is_wrong(log, tmp_path):
         (b"PK\x03\x04\0\0", "a.xlsx", "an Excel workbook"),
         (b"SQLite format 3\0", "a.db3", "an SQLite database"),
         (b'{"a": 1}', "a.json", "it is JSON"),
-        (b"\x89MCAP", "a.mcap", "is not a recording, nor a whole MCAP file"),
+        (b"\x89MCAP", "a.mcap", "is not a recording, nor a complete MCAP file"),
         (bytes(200), "a.dat", "is not a recording"),
         ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.csv", "contains no row of numbers"),
         ("<p>1,2</p>".encode("utf-16"), "a.csv", "is not a recording: it is HTML or XML"),
         (b"\xfe\xff" + '{"a": 1}'.encode("utf-16-be"), "a.json", "it is JSON"),
         ("<p>1,2</p>".encode("utf-32"), "a.csv", "it is HTML or XML"),
         (b"\xff\xfe" + bytes(30), "a.csv", "is not a recording"),
-        ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.mcap", "nor a whole MCAP file"),
+        ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.mcap", "nor a complete MCAP file"),
         (b"", "a.csv", "is empty"),
         (b"a sentence.\nAnd another one.\n", "a.txt", "contains no row of numbers"),
     ],
 )
-def test_what_is_no_recording_is_told_in_one_line_with_its_name(log, content, name, message):
+def test_a_file_that_is_not_a_recording_is_refused_in_one_line_with_its_name(log, content, name, message):
     path = log(content, name)
     with pytest.raises(RecordingError, match=message) as fault:
         survey(path)
@@ -55,15 +55,15 @@ def test_what_is_no_recording_is_told_in_one_line_with_its_name(log, content, na
     assert "\n" not in str(fault.value)
 
 
-def test_damaged_utf_16_is_told_as_damage_and_no_conversion_is_asked_for(log):
+def test_damaged_utf_16_is_reported_as_damage_without_advice_to_convert_it(log):
     table = ROWS.encode("utf-16")
-    path = log(table[:90] + b"\x00\xdc" + table[92:])  # the second half of a pair, without its first
-    with pytest.raises(RecordingError, match="begins as UTF-16 does, but does not go on as it") as fault:
+    path = log(table[:90] + b"\x00\xdc" + table[92:])  # the second half of a surrogate pair without the first
+    with pytest.raises(RecordingError, match="begins as UTF-16 text, but the rest is damaged") as fault:
         survey(path)
     assert "copy" in fault.value.hint and "UTF-8" not in str(fault.value)
 
 
-def test_a_folder_a_missing_file_and_a_pipe_are_told(tmp_path):
+def test_a_folder_a_missing_file_and_a_pipe_are_refused(tmp_path):
     with pytest.raises(RecordingError, match="is a folder"):
         survey(tmp_path)
     with pytest.raises(RecordingError, match="no such file"):
@@ -73,15 +73,15 @@ def test_a_folder_a_missing_file_and_a_pipe_are_told(tmp_path):
         survey(tmp_path / "pipe.csv")
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_a_file_without_permission_is_told(log):
+@pytest.mark.skipif(os.geteuid() == 0, reason="root can read every file")
+def test_a_file_without_read_permission_is_refused(log):
     path = log(ROWS)
     path.chmod(0)
     with pytest.raises(RecordingError, match="cannot be read: Permission denied"):
         survey(path)
 
 
-def test_a_machine_file_without_the_needed_section_says_which_to_write(log, tmp_path, machine):
+def test_a_machine_file_without_the_required_section_is_refused_with_its_name(log, tmp_path, machine):
     with pytest.raises(ConfigurationError, match=r"machine\.toml: no channel in \[channels\], which .*log\.csv needs"):
         read_recording(log(ROWS), machine(TOPICS))
     path = tmp_path / "a.mcap"
@@ -90,7 +90,7 @@ def test_a_machine_file_without_the_needed_section_says_which_to_write(log, tmp_
         read_recording(path, machine())
 
 
-def test_parts_are_one_recording_whatever_their_order(log, machine):
+def test_parts_are_joined_into_one_recording_in_any_order(log, machine):
     parts = [log(rows(40, 10), "3.csv"), log(rows(0, 20), "1.csv"), log(rows(20, 20), "2.csv")]
     joined = read_parts(parts, machine(), "run").on_load_side(machine().machine)
     whole = read_recording(log(rows(0, 50), "whole.csv"), machine())
@@ -101,7 +101,7 @@ def test_parts_are_one_recording_whatever_their_order(log, machine):
     assert joined.digest != whole.digest
 
 
-def test_parts_with_an_epoch_each_are_put_on_one_clock(tmp_path, machine):
+def test_parts_with_different_epochs_are_joined_on_one_clock(tmp_path, machine):
     paths = []
     for i in range(2):
         time = i * 1.0 + np.arange(100) / 100
@@ -120,11 +120,11 @@ def test_parts_with_an_epoch_each_are_put_on_one_clock(tmp_path, machine):
 
 def test_parts_that_overlap_are_refused(log, machine):
     parts = [log(rows(0, 20), "1.csv"), log(rows(19, 20), "2.csv")]
-    with pytest.raises(RecordingError, match=r"2\.csv: overlaps the part before it"):
+    with pytest.raises(RecordingError, match=r"2\.csv: overlaps the previous part"):
         read_parts(parts, machine(), "run").on_load_side(machine().machine)
 
 
-def test_parts_that_do_not_hold_the_same_columns_are_refused(log, machine):
+def test_parts_with_different_columns_are_refused(log, machine):
     parts = [log(rows(0, 20), "1.csv"), log("t,n_motor\n500,1\n", "2.csv")]
     with pytest.raises(RecordingError, match=r"2\.csv: no column 'i_motor'"):
         read_parts(parts, machine(), "run").on_load_side(machine().machine)

@@ -11,8 +11,8 @@ from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings.channels import LinkAccelerations
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import FloatArray, Recording, Series
-from tests.made_up.machines import ARM, arm_of
-from tests.made_up.motions import moving
+from tests.synthetic.machines import ARM, arm_of
+from tests.synthetic.motions import moving_recording
 
 RNG = np.random.default_rng(6)
 POSITION, SPEED, ACCELERATION = RNG.uniform(-3.0, 3.0, (3, 200, 2))
@@ -100,7 +100,7 @@ def sensed(arm: PlanarArm, elbow: bool = True) -> tuple[Recording, FloatArray]:
 
     The sensors' places are differentiated twice; without `elbow` the second one is taken as if its joint stood still.
     """
-    log = moving(arm, seconds=3.0, seed=4)
+    log = moving_recording(arm, seconds=3.0, seed=4)
     position, speed, acceleration = (log[name].values for name in ("position", "speed", "acceleration"))
 
     def place(link: int, t: float) -> FloatArray:
@@ -152,7 +152,7 @@ def test_a_log_of_motors_and_sensors_is_referred_to_the_links(arm):
 
 
 def test_accelerations_of_the_links_themselves_stay_as_they_are(arm):
-    log = moving(arm, seconds=1.0)
+    log = moving_recording(arm, seconds=1.0)
     referred = arm.referred_to_load(log)
     assert referred["acceleration"] is log["acceleration"]
     assert not referred.findings

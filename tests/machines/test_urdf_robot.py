@@ -13,8 +13,8 @@ from cdtool.detectors.momentum import Momentum
 from cdtool.errors import ConfigurationError
 from cdtool.machine_file import fingerprint, read_machine_file
 from cdtool.recording import Recording, Series
-from tests.made_up.motions import moving
-from tests.made_up.robots import JOINTS, six_joint_robot, six_joint_urdf, urdf_robot
+from tests.synthetic.motions import moving_recording
+from tests.synthetic.robots import JOINTS, six_joint_robot, six_joint_urdf, urdf_robot
 
 pytest.importorskip("pinocchio")
 
@@ -157,7 +157,7 @@ def test_a_log_of_the_motors_gives_the_residual_of_the_joints(tmp_path):
         **keys,
     )
     plain = six_joint_robot(tmp_path, **keys)
-    at_joints = moving(plain, seconds=2.0, contact=np.arange(1.0, 7.0), contact_at=1.5)
+    at_joints = moving_recording(plain, seconds=2.0, contact=np.arange(1.0, 7.0), contact_at=1.5)
     channels = {}
     for name, unit in (("torque", "N m"), ("speed", "rad/s"), ("position", "rad")):
         series = at_joints[name]
@@ -172,14 +172,14 @@ def test_a_log_of_the_motors_gives_the_residual_of_the_joints(tmp_path):
 
 def test_a_robots_pose_is_never_made_up_from_its_speed(tmp_path):
     robot = six_joint_robot(tmp_path)
-    log = moving(robot, seconds=1.0)
+    log = moving_recording(robot, seconds=1.0)
     left = {name: log[name] for name in ("torque", "speed")}
     assert "position" not in robot.referred_to_load(Recording("r", "r", JOINTS, left))
 
 
 def test_the_position_offset_turns_the_logs_zero_into_the_urdfs(tmp_path):
     robot = six_joint_robot(tmp_path, position_offset=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-    log = moving(robot, seconds=1.0)
+    log = moving_recording(robot, seconds=1.0)
     referred = robot.referred_to_load(log)
     for channel in ("position", "reference_position"):
         moved = referred[channel].values - log[channel].values

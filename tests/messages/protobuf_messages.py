@@ -1,4 +1,4 @@
-"""Protobuf files with every type of number, and random messages of them, by the protobuf package."""
+"""Protobuf files with every numeric type, and strategies for the contents of their messages."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def add(message, name, number, kind, *, repeated=False, optional=False, oneof=No
         message.oneof_decl.add(name=f"_{name}")
 
 
-def thing(syntax="proto3", packed=None):
-    """A file with every type of number, alone, optional and repeated, nested, in a oneof and in a map."""
-    file = descriptor_pb2.FileDescriptorProto(name="thing.proto", package="pkg")
+def every_type_file(syntax="proto3", packed=None):
+    """Return a file with every numeric type: singular, optional, repeated, nested, in a oneof and in a map."""
+    file = descriptor_pb2.FileDescriptorProto(name="every_type.proto", package="pkg")
     if syntax == "proto3":
         file.syntax = syntax
     mode = file.enum_type.add(name="Mode")
@@ -79,8 +79,8 @@ def thing(syntax="proto3", packed=None):
     return file
 
 
-def made(file, name="pkg.Outer"):
-    """The decoder of cdtool and the class of the package."""
+def make_decoder(file, name="pkg.Outer"):
+    """Return cdtool's decoder and the protobuf package's class of a message type."""
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
     data = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
@@ -90,10 +90,10 @@ def made(file, name="pkg.Outer"):
 
 
 CASES = {
-    "proto3": made(thing()),
-    "proto3 unpacked": made(thing(packed=False)),
-    "proto2": made(thing("proto2")),
-    "proto2 packed": made(thing("proto2", packed=True)),
+    "proto3": make_decoder(every_type_file()),
+    "proto3 unpacked": make_decoder(every_type_file(packed=False)),
+    "proto2": make_decoder(every_type_file("proto2")),
+    "proto2 packed": make_decoder(every_type_file("proto2", packed=True)),
 }
 
 

@@ -1,4 +1,4 @@
-"""Random ROS message definitions with values for them."""
+"""Strategies for ROS message definitions and values that fit them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def number(kind):
 
 @st.composite
 def definitions(draw, ros2=True):
-    """(text of the definition, strategy of its values as dicts), with up to two nested types."""
+    """Draw a definition's text and the strategy of its values as dicts, with up to two nested types."""
     nested = {}
     for title in ("Inner", "Outer")[: draw(st.integers(0, 2))]:
         nested[title] = draw(members(dict(nested), ros2))
@@ -45,6 +45,6 @@ def members(draw, nested, ros2, least=0):
 
 
 def numeric_texts(text_fields):
-    """Fields to ask for: those of a survey, with elements of their arrays, and ones that may not be there."""
+    """Return fields to decode: those of a survey, elements of their arrays, and fields that may be missing."""
     more = [name.replace("[:]", "[1]") for name in text_fields if name.endswith("[:]")]
     return [*text_fields, *more, "a", "a[0].b2", "b2.position", "position[x]", "velocity[:]", "name[0]"]

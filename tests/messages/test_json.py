@@ -10,15 +10,15 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from cdtool.messages.columns import decoder_for
-from cdtool.messages.columns.json_pattern import JsonPattern
+from cdtool.messages.columns.json_shape import JsonShape
 from cdtool.messages.fields import header_stamp, numeric_fields
-from tests.messages.batches import assert_as_the_field_language, batch_of, fields_of, same
+from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, same
 
 WANTED = ("a", "b.c", "q[:]", "q[1]", "q[x]", "b.q[:]", "l[0].c", "l[1].q[0]", "l[x].c", "name[0]", "b", "b[0]", "a.c")
 JOINTS = ("x", "y")
 
 
-def decoder():
+def new_decoder():
     return decoder_for("json", "jsonschema", "Thing", b"{}")
 
 
@@ -30,10 +30,10 @@ def loaded(payload):
     return value if isinstance(value, dict) else None
 
 
-def assert_as_python(payloads, wanted=WANTED, joints=(), found=None):
+def assert_equals_python(payloads, wanted=WANTED, joints=(), decoder=None):
     wanted = fields_of(*wanted)
-    gathered = (found or decoder()).gather(batch_of(payloads), wanted, joints)
-    assert_as_the_field_language(gathered, [loaded(payload) for payload in payloads], wanted, joints)
+    decoded = (decoder or new_decoder()).decode(batch_of(payloads), wanted, joints)
+    assert_follows_field_language(decoded, [loaded(payload) for payload in payloads], wanted, joints)
 
 
 NUMBERS = st.one_of(
@@ -61,17 +61,17 @@ LAYOUTS = st.sampled_from([{}, {"separators": (",", ":")}, {"indent": 1}, {"ensu
 @given(
     st.lists(st.tuples(OBJECTS, LAYOUTS, st.integers(1, 3)), min_size=1, max_size=6), st.randoms(use_true_random=False)
 )
-def test_random_objects_give_what_the_field_language_says_of_them(objects, order):
+def test_random_objects_decode_as_the_field_language_defines(objects, order):
     payloads = [
         json.dumps(value, **{"ensure_ascii": False, **layout}).encode("utf-8", "surrogatepass")
         for value, layout, times in objects
         for _ in range(times)
     ]
     order.shuffle(payloads)
-    found = decoder()
+    decoder = new_decoder()
     for joints in ((), JOINTS):
-        assert_as_python(payloads, joints=joints, found=found)
-    assert set(found.fields(batch_of(payloads))) == {
+        assert_equals_python(payloads, joints=joints, decoder=decoder)
+    assert set(decoder.fields(batch_of(payloads))) == {
         name for payload in payloads for name in numeric_fields(loaded(payload))
     }
 
@@ -91,10 +91,10 @@ def test_random_objects_give_what_the_field_language_says_of_them(objects, order
 @example('{"a":"\\u00zz"}')
 @example('{"\\u0061":3}')
 @example('{"a":"\x01"}')
-def test_what_python_refuses_is_refused_and_what_it_reads_is_read(text):
+def test_a_text_is_refused_exactly_if_python_refuses_it(text):
     payload = text.encode()
-    like = b'{"a":1,"b":{"c":2}}'
-    assert_as_python([like, payload, payload, like])
+    similar = b'{"a":1,"b":{"c":2}}'
+    assert_equals_python([similar, payload, payload, similar])
 
 
 @settings(max_examples=200, deadline=None)
@@ -102,14 +102,14 @@ def test_what_python_refuses_is_refused_and_what_it_reads_is_read(text):
     st.sampled_from([b'{"a": 1.5, "b": {"c": -2e-3, "s": "up"}, "q": [1, 2.25]}', b'{"a":true,"q":[null,3]}']),
     st.data(),
 )
-def test_a_byte_that_differs_from_the_shape_is_never_overlooked(payload, data):
+def test_every_byte_that_differs_from_the_shape_is_noticed(payload, data):
     at = data.draw(st.integers(0, len(payload) - 1))
     changed = bytearray(payload)
     changed[at] = data.draw(st.integers(0, 255))
-    assert_as_python([payload, bytes(changed), payload[:at], payload + bytes(changed[at : at + 1])])
+    assert_equals_python([payload, bytes(changed), payload[:at], payload + bytes(changed[at : at + 1])])
 
 
-def test_numbers_are_the_floats_of_python_to_the_bit():
+def test_numbers_equal_pythons_floats_to_the_bit():
     random.seed(7)
     texts = ["0", "-0", "-0.0", "0e9", "1e400", "-1e400", "4.9e-324", "2.2250738585072011e-308", "9007199254740993"]
     texts += ["1.7976931348623157e308", "0.000012345678901234567", "123456789012345678901234567890", "1E5", "1e-07"]
@@ -119,7 +119,7 @@ def test_numbers_are_the_floats_of_python_to_the_bit():
         value = struct.unpack("<d", struct.pack("<Q", random.getrandbits(64)))[0]
         texts += [repr(value)] if np.isfinite(value) else []
     payloads = [b'{"a":%s}' % text.encode() for text in texts]
-    values = decoder().gather(batch_of(payloads), fields_of("a")).picked[0].values
+    values = new_decoder().decode(batch_of(payloads), fields_of("a")).fields[0].values
     expected = []
     for payload in payloads:
         value = json.loads(payload)["a"]
@@ -127,51 +127,51 @@ def test_numbers_are_the_floats_of_python_to_the_bit():
     assert same(values, expected)
 
 
-def test_messages_of_one_shape_are_not_read_by_python(monkeypatch):
+def test_messages_of_one_shape_are_not_decoded_by_python(monkeypatch):
     payloads = [
         b'{"t": "%d", "q": [%d, -1.5e%d], "on": %s}' % (i, i, i, b"true" if i % 2 else b"false") for i in range(50)
     ]
-    batch, found, wanted = batch_of(payloads), decoder(), fields_of("q[:]", "on")
-    found.gather(batch, wanted)
-    monkeypatch.setattr(json, "loads", lambda *_: pytest.fail("Python was asked"))
-    table, on = (picked.values for picked in found.gather(batch, wanted).picked)
+    batch, decoder, wanted = batch_of(payloads), new_decoder(), fields_of("q[:]", "on")
+    decoder.decode(batch, wanted)
+    monkeypatch.setattr(json, "loads", lambda *_: pytest.fail("a message was decoded by Python"))
+    table, on = (field_values.values for field_values in decoder.decode(batch, wanted).fields)
     assert table.tolist() == [[i, float(f"-1.5e{i}")] for i in range(50)]
     assert on.tolist() == [i % 2 for i in range(50)]
 
 
-def test_more_shapes_than_are_kept_give_the_same():
+def test_more_shapes_than_are_stored_decode_to_the_same_values():
     payloads = [json.dumps({"q": list(range(i % 90)), f"k{i % 7}": {"c": i}, "a": i}).encode() for i in range(300)]
-    found = decoder()
+    decoder = new_decoder()
     for _ in range(2):
-        assert_as_python(payloads, ("a", "q[:]", "k3.c", "q[5]"), found=found)
+        assert_equals_python(payloads, ("a", "q[:]", "k3.c", "q[5]"), decoder=decoder)
 
 
 @pytest.mark.parametrize("depth", [60, 900, 100_000])
 def test_deep_nesting_neither_crashes_nor_hangs(depth):
     payload = b'{"a":1,"x":' + b"[" * depth + b"]" * depth + b"}"
-    gathered = decoder().gather(batch_of([payload, b'{"a":2}']), fields_of("a"))
-    assert gathered.status.tolist() in ([0, 0], [1, 0])
-    assert gathered.picked[0].values[1] == 2
+    decoded = new_decoder().decode(batch_of([payload, b'{"a":2}']), fields_of("a"))
+    assert decoded.status.tolist() in ([0, 0], [1, 0])
+    assert decoded.fields[0].values[1] == 2
 
 
-def test_header_stamps_are_read_in_all_their_spellings():
+def test_header_stamps_are_read_in_all_spellings():
     spellings = [("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("seconds", "nanos")]
     objects = [{"header": {"stamp": {s: 1_700_000_000 + i, n: 999_999_999}}} for s, n in spellings for i in range(2)]
     objects += [{"header": {"stamp": {"sec": "12", "nanosec": 5}}}, {"header": {"stamp": {"sec": 2.75, "nanosec": 5}}}]
     objects += [{"header": {"stamp": None}}, {"header": 3}, {}, {"header": {"stamp": {"sec": None, "nanosec": 1}}}]
-    gathered = decoder().gather(batch_of([json.dumps(each).encode() for each in objects]), [], stamps=True)
+    decoded = new_decoder().decode(batch_of([json.dumps(each).encode() for each in objects]), [], stamps=True)
     expected = [header_stamp(each) for each in objects[:-1]] + [None]
-    assert [s if t else None for s, t in zip(gathered.stamps.tolist(), gathered.has_stamp, strict=True)] == expected
+    assert [s if t else None for s, t in zip(decoded.stamps.tolist(), decoded.has_stamp, strict=True)] == expected
 
 
-def test_a_message_that_is_damaged_says_why():
-    gathered = decoder().gather(batch_of([b'{"a":1}', b'{"a":', b"[1]"]), fields_of("a"))
-    assert gathered.status.tolist() == [0, 1, 1]
-    assert gathered.reason.startswith("JSONDecodeError: Expecting value")
-    assert decoder().gather(batch_of([b"[1]"]), []).reason == "ValueError: the JSON is not an object"
+def test_a_damaged_message_has_a_reason():
+    decoded = new_decoder().decode(batch_of([b'{"a":1}', b'{"a":', b"[1]"]), fields_of("a"))
+    assert decoded.status.tolist() == [0, 1, 1]
+    assert decoded.reason.startswith("JSONDecodeError: Expecting value")
+    assert new_decoder().decode(batch_of([b"[1]"]), []).reason == "ValueError: the JSON is not an object"
 
 
-def test_shapes_belong_to_one_decoder():
-    first, second = decoder(), decoder()
-    first.gather(batch_of([b'{"a":1}']), fields_of("a"))
-    assert first._patterns and isinstance(first._patterns[0], JsonPattern) and not second._patterns
+def test_decoders_do_not_share_shapes():
+    first, second = new_decoder(), new_decoder()
+    first.decode(batch_of([b'{"a":1}']), fields_of("a"))
+    assert first._shapes and isinstance(first._shapes[0], JsonShape) and not second._shapes

@@ -15,12 +15,12 @@ def members(text):
     return parse_ros2msg("test_msgs/msg/Thing", text.encode()).root.members
 
 
-def test_types_arrays_defaults_constants_and_comments_are_told_apart():
-    found = members(
+def test_types_arrays_defaults_constants_and_comments_are_distinguished():
+    parsed = members(
         "# Thing\nint32 FIVE=5\nstring TEXT='a # b'\nfloat64 a 1.5\nstring<=10 b \"x = y\"\nint8[3] c [1, 2, 3]\n"
         "float32[<=4] d\nstring<=3[<=2] e\nbyte f  # comment\nchar g\nwstring h\n\tbool[] i"
     )
-    assert [(member.name, member.kind, member.array) for member in found] == [
+    assert [(member.name, member.kind, member.array) for member in parsed] == [
         ("a", Number("float64"), None),
         ("b", Text(), None),
         ("c", Number("int8"), Array(3)),
@@ -33,7 +33,7 @@ def test_types_arrays_defaults_constants_and_comments_are_told_apart():
     ]
 
 
-def test_nested_types_are_found_by_their_full_and_their_short_name():
+def test_nested_types_are_found_by_their_full_and_short_names():
     text = f"Inner a\ntest_msgs/Inner b\ntest_msgs/msg/Inner[] c\n{RULE}\nMSG: test_msgs/msg/Inner\nint8 x"
     assert [member.kind for member in members(text)] == [Message("test_msgs/Inner")] * 3
     assert members("builtin_interfaces/Time stamp")[0].kind == Message("builtin_interfaces/Time")
@@ -46,19 +46,19 @@ def test_nested_types_are_found_by_their_full_and_their_short_name():
         ("float64", "is not a field"),
         ("float64 a,b", "is not a field"),
         ("float65 a", "type 'float65' of test_msgs/Thing.a is not defined"),
-        ("float64[0] a", "is not understood"),
-        ("float64[<=] a", "is not understood"),
-        ("float64<=3 a", "only strings have a bound"),
+        ("float64[0] a", "cannot be parsed"),
+        ("float64[<=] a", "cannot be parsed"),
+        ("float64<=3 a", "only strings can have a length limit"),
         ("int8 a\nint8 a", "two fields 'a'"),
-        ("Thing a", "holds itself"),
-        (f"A a\n{RULE}\nMSG: test_msgs/A\nB b\n{RULE}\nMSG: test_msgs/B\nA a", "holds itself"),
+        ("Thing a", "contains itself"),
+        (f"A a\n{RULE}\nMSG: test_msgs/A\nB b\n{RULE}\nMSG: test_msgs/B\nA a", "contains itself"),
         (f"A a\n{RULE}\nint8 x", "instead of MSG:"),
-        (f"A a\n{RULE}\nMSG: test_msgs/A\nint8 x\n{RULE}\nMSG: test_msgs/A\nint16 x", "defined twice, differently"),
+        (f"A a\n{RULE}\nMSG: test_msgs/A\nint8 x\n{RULE}\nMSG: test_msgs/A\nint16 x", "has two different definitions"),
         ("int64 a\n---\nint64 sum", "of a service or action"),
         ("\udcff", "not UTF-8"),
     ],
 )
-def test_a_text_that_is_no_message_definition_is_refused_with_what_is_wrong_in_it(text, problem):
+def test_a_text_that_is_not_a_message_definition_is_refused_with_the_reason(text, problem):
     with pytest.raises(SchemaError, match=problem.replace("?", r"\?")):
         parse_ros2msg("test_msgs/msg/Thing", text.encode(errors="surrogateescape"))
 
@@ -66,8 +66,8 @@ def test_a_text_that_is_no_message_definition_is_refused_with_what_is_wrong_in_i
 @pytest.mark.parametrize(
     ("message", "schema", "text"),
     [
-        ("cdr", "ros2idl", "schema encoding 'ros2idl' is not read"),
-        ("protobuf", "", "no schema is not read"),
+        ("cdr", "ros2idl", "schema encoding 'ros2idl' is not supported"),
+        ("protobuf", "", "no schema is not supported"),
         ("flatbuffer", "flatbuffer", "message encoding 'flatbuffer'"),
         ("cdr", "ros1msg", "message encoding 'cdr' with schema encoding 'ros1msg'"),
     ],
@@ -77,7 +77,7 @@ def test_other_encodings_are_refused_by_name(message, schema, text):
         decoder_for(message, schema, "a/b", b"")
 
 
-def test_a_survey_names_every_number_but_the_headers_stamp():
+def test_a_survey_lists_every_number_except_the_header_stamp():
     def fields(name):
         return decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].text.encode()).fields(batch_of([]))
 
@@ -92,15 +92,15 @@ def test_a_survey_names_every_number_but_the_headers_stamp():
     ("field", "problem", "known"),
     [
         ("wrench.forces.z", "there is no 'forces'", ("force", "torque")),
-        ("wrench.force", "'wrench.force' holds a geometry_msgs/Vector3, not a number", ()),
-        ("header.frame_id", "'header.frame_id' holds a text, not a number", ()),
+        ("wrench.force", "'wrench.force' is a geometry_msgs/Vector3, not a number", ()),
+        ("header.frame_id", "'header.frame_id' is a string, not a number", ()),
         ("wrench.force.z[0]", "'z' is not an array", ("z",)),
         ("wrench.force.z.x", "there is no 'x'", ()),
     ],
 )
-def test_a_field_that_the_schema_does_not_have_is_told_with_those_that_it_has(field, problem, known):
+def test_a_missing_field_is_reported_with_the_fields_that_exist(field, problem, known):
     name = "geometry_msgs/msg/WrenchStamped"
-    found = decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].text.encode())
-    (picked,) = found.gather(batch_of([b"\0\1\0\0" + bytes(64)]), fields_of(field)).picked
-    assert (picked.fault.problem, picked.fault.known) == (problem, known)
-    assert picked.state.tolist() == [2]
+    decoder = decoder_for("cdr", "ros2msg", name, DEFINITIONS[name].text.encode())
+    (field_values,) = decoder.decode(batch_of([b"\0\1\0\0" + bytes(64)]), fields_of(field)).fields
+    assert (field_values.fault.problem, field_values.fault.known) == (problem, known)
+    assert field_values.state.tolist() == [2]

@@ -1,4 +1,4 @@
-"""Maps of protobuf: repeated messages on the wire, but without an order that means anything."""
+"""Maps of protobuf: repeated messages on the wire, whose order has no meaning."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.messages.batches import batch_of
 pytest.importorskip("google.protobuf")
 
 
-def test_an_entry_of_a_map_cannot_be_had_by_its_number():
+def test_an_entry_of_a_map_cannot_be_selected_by_number():
     from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
     kinds = descriptor_pb2.FieldDescriptorProto
@@ -27,14 +27,14 @@ def test_an_entry_of_a_map_cannot_be_had_by_its_number():
     log.field.add(name="data", number=2, type=kinds.TYPE_DOUBLE, label=kinds.LABEL_OPTIONAL)
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
-    made = message_factory.GetMessageClass(pool.FindMessageTypeByName("a.Log"))
-    message = made(data=3.0)
+    message_class = message_factory.GetMessageClass(pool.FindMessageTypeByName("a.Log"))
+    message = message_class(data=3.0)
     message.vals["f"] = 20.0
     message.vals["g"] = 1001.0
     described = descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
     decoder = decoder_for("protobuf", "protobuf", "a.Log", described)
     wanted = [parse_field("vals[0].value", ""), parse_field("data", "")]
-    refused, data = decoder.gather(batch_of([message.SerializeToString()]), wanted).picked
+    refused, data = decoder.decode(batch_of([message.SerializeToString()]), wanted).fields
     assert isinstance(refused.fault, FieldMissingError)
     assert "'vals' is a map, whose entries have no order" in refused.fault.problem
     assert data.values.tolist() == [3.0]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cdtool.messages.columns import decoder_for
 from cdtool.messages.layouts.ros1msg import parse_ros1msg
-from tests.messages.batches import assert_as_the_field_language, batch_of, fields_of
+from tests.messages.batches import assert_follows_field_language, batch_of, fields_of
 from tests.messages.ros_messages import definitions
 
 typesys = pytest.importorskip("rosbags.typesys")
@@ -25,22 +25,22 @@ time stamp
 string frame_id"""
 
 
-def decoder(text, name=NAME):
+def decoder_of(text, name=NAME):
     return decoder_for("ros1", "ros1msg", name, text.encode())
 
 
 def encode(text, value):
-    """rosbags' bytes of a dict."""
+    """Return a dict encoded by rosbags."""
     store = typesys.get_typestore(typesys.Stores.EMPTY)
-    found = typesys.get_types_from_msg(text, "test_msgs/msg/Thing")
-    store.register({name: parts for name, parts in found.items() if name not in store.fielddefs})
+    types = typesys.get_types_from_msg(text, "test_msgs/msg/Thing")
+    store.register({name: parts for name, parts in types.items() if name not in store.fielddefs})
     return bytes(store.serialize_ros1(_message(store, "test_msgs/msg/Thing", value), "test_msgs/msg/Thing"))
 
 
 def _message(store, name, value):
     filled = {}
     for field, (kind, detail) in store.fielddefs[name][1]:
-        # What rosbags gives a message without members is not written in ROS 1.
+        # rosbags adds a member to a message without members; ROS 1 does not write it.
         filled[field] = _value(store, kind, detail, value.get(field, 0))
     return store.types[name](**filled)
 
@@ -58,16 +58,16 @@ def _value(store, kind, detail, value):
 
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
-def test_random_messages_read_back_to_the_bit(data):
+def test_random_messages_decode_to_the_same_bits(data):
     text, values = data.draw(definitions(ros2=False))
     messages = data.draw(st.lists(values, min_size=1, max_size=4))
     payloads = [encode(text, message) for message in messages]
-    for checked in (False, True):
-        found = decoder(text)
-        if checked:
-            found.finder.find = found.finder.checked
-        wanted = fields_of(*found.fields(None))
-        assert_as_the_field_language(found.gather(batch_of(payloads), wanted), messages, wanted)
+    for singly in (False, True):
+        decoder = decoder_of(text)
+        if singly:
+            decoder.locator.locate = decoder.locator.locate_singly
+        wanted = fields_of(*decoder.fields(None))
+        assert_follows_field_language(decoder.decode(batch_of(payloads), wanted), messages, wanted)
 
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -75,23 +75,23 @@ def test_random_messages_read_back_to_the_bit(data):
 def test_a_message_cut_at_any_byte_is_damaged_and_never_a_value(data):
     text, values = data.draw(definitions(ros2=False))
     payload = encode(text, data.draw(values))
-    found = decoder(text)
+    decoder = decoder_of(text)
     pieces = [payload[:cut] for cut in range(len(payload))]
-    gathered = found.gather(batch_of([payload, *pieces]), fields_of(*found.fields(None)))
-    assert gathered.status.tolist() == [0, *[1] * len(pieces)]
+    decoded = decoder.decode(batch_of([payload, *pieces]), fields_of(*decoder.fields(None)))
+    assert decoded.status.tolist() == [0, *[1] * len(pieces)]
 
 
 def test_time_and_duration_are_two_numbers_and_the_header_has_a_stamp():
     payloads = [
         struct.pack("<IIII", 3, 1_700_000_000 + i, 999_999_999, 4) + b"base" + struct.pack("<f", i) for i in range(3)
     ]
-    found = decoder(EMPTY_HEADER)
-    gathered = found.gather(batch_of(payloads), fields_of("header.stamp.nsecs", "x"), stamps=True)
-    assert gathered.stamps.tolist() == [(1_700_000_000 + i) * 10**9 + 999_999_999 for i in range(3)]
-    assert gathered.picked[0].values.tolist() == [999_999_999] * 3
-    assert found.fields(None) == ["header.seq", "x"]
-    moved = decoder("duration d").gather(batch_of([struct.pack("<ii", -1, -5)]), fields_of("d.secs", "d.nsecs"))
-    assert [picked.values.tolist() for picked in moved.picked] == [[-1], [-5]]
+    decoder = decoder_of(EMPTY_HEADER)
+    decoded = decoder.decode(batch_of(payloads), fields_of("header.stamp.nsecs", "x"), stamps=True)
+    assert decoded.stamps.tolist() == [(1_700_000_000 + i) * 10**9 + 999_999_999 for i in range(3)]
+    assert decoded.fields[0].values.tolist() == [999_999_999] * 3
+    assert decoder.fields(None) == ["header.seq", "x"]
+    moved = decoder_of("duration d").decode(batch_of([struct.pack("<ii", -1, -5)]), fields_of("d.secs", "d.nsecs"))
+    assert [field_values.values.tolist() for field_values in moved.fields] == [[-1], [-5]]
 
 
 def test_byte_is_signed_and_char_is_not():
@@ -99,9 +99,9 @@ def test_byte_is_signed_and_char_is_not():
     assert [member.kind.name for member in members] == ["int8", "uint8", "std_msgs/Header"]
 
 
-def test_messages_without_members_take_no_bytes_however_many_there_are():
+def test_messages_without_members_take_no_bytes_in_any_number():
     text = f"Nothing[] a\nfloat64 b\n{'=' * 80}\nMSG: test_msgs/Nothing\n"
     payload = struct.pack("<Id", 2**32 - 1, 2.5)
-    assert decoder(text).gather(batch_of([payload]), fields_of("b")).picked[0].values.tolist() == [2.5]
+    assert decoder_of(text).decode(batch_of([payload]), fields_of("b")).fields[0].values.tolist() == [2.5]
     with BytesIO(payload) as file:
-        assert decoder(text).gather(batch_of([file.read(11)]), fields_of("b")).status.tolist() == [1]
+        assert decoder_of(text).decode(batch_of([file.read(11)]), fields_of("b")).status.tolist() == [1]

@@ -17,7 +17,7 @@ from cdtool.signature_store import write_signature
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.detection_options import DetectionOptions
 from tests.command import cdtool as run
-from tests.made_up.door import MACHINE, write_log
+from tests.synthetic.door import MACHINE, write_log
 
 
 @pytest.fixture(scope="module")

@@ -138,6 +138,13 @@ def test_all_detectors_include_those_of_plugins(command, tmp_path):
     assert only.returncode == 0 and "1 of 1 limits are set for detectors that were not run" in only.stderr
 
 
+def test_the_examples_in_its_docstrings_run(site):
+    modules = [site / "cdtool_plugin_example" / f"{name}.py" for name in ("torque_rate", "robust_limit")]
+    done = python("-m", "doctest", "-v", *modules, site=site)
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert done.stdout.count("Test passed.") == 2
+
+
 def test_the_contract_tests_run_over_the_plugins(site):
     chosen = ("-q", "-p", "no:cacheprovider", "-k", CONTRACTS, "tests/contracts")
     done = python("-m", "pytest", *chosen, site=site)

@@ -16,7 +16,7 @@ from cdtool import benchmark, compare, simulate_gate
 from cdtool.activation import Activation
 from cdtool.evaluation.results import Results
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
-from tests.made_up.builds import MISSED, Outcome, build
+from tests.synthetic.builds import MISSED, Outcome, build_results
 
 KEYS = [(name, group) for name in ("momentum", "pure_torque") for group in ("stiff", "soft")]
 
@@ -61,8 +61,8 @@ def test_equal_builds_are_called_neither_worse_nor_better_in_at_least_nine_of_te
     quiet, tried = Counter[str](), 30
     for _ in range(tried):
         false_alarms = [{key: int(rng.poisson(3.0)) for key in KEYS} for _ in range(2)]
-        old = build({key: drawn() for key in KEYS}, false_alarms=false_alarms[0], force=None)
-        new = build({key: drawn() for key in KEYS}, false_alarms=false_alarms[1], force=None, **other)
+        old = build_results({key: drawn() for key in KEYS}, false_alarms=false_alarms[0], force=None)
+        new = build_results({key: drawn() for key in KEYS}, false_alarms=false_alarms[1], force=None, **other)
         found = compare(old, new, relevant_change=0.5)
         assert {row.paired for row in found.rows} == {paired}
         quiet[found.verdict] += 1

@@ -19,14 +19,16 @@ from cdtool.simulation.arm_recordings import write_arm_recordings
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.contact_force import ContactPoint, contact_force, summarise_force
 from tests.command import cdtool
-from tests.made_up.motions import moving
+from tests.synthetic.motions import moving_recording
 
 POINT = ContactPoint("forearm", (0.2, 0.0, 0.0))
 
 
 def hit(machine, force, at=2.0):
     """A recording in which a force, constant in the base's axes, acts at the point from `at` s."""
-    free = moving(machine, seconds=5.0, amplitude=0.15, seed=4)  # the elbow stays bent: both directions are observable
+    free = moving_recording(
+        machine, seconds=5.0, amplitude=0.15, seed=4
+    )  # the elbow stays bent: both directions are observable
     torque, position = free["torque"], free["position"].values
     pushed = np.zeros((len(position), 6))
     pushed[torque.time >= at, :3] = force

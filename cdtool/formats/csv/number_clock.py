@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdtool.clock.stamps import EPOCH, leading_wild
+from cdtool.clock.stamps import EPOCH, count_leading_strays
 from cdtool.formats.csv.blank_lines import fill_blank_lines
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_arrays import Rows
@@ -75,7 +75,7 @@ def exact_differences(
     decimals = _DECIMALS.get(factor)
     if decimals is None or not known.any():
         return None
-    first_row = leading_wild(stamps[known], EPOCH / factor)
+    first_row = count_leading_strays(stamps[known], EPOCH / factor)
     if not _is_large(stamps[known] * factor, first_row):
         return None
     scale = 10**decimals

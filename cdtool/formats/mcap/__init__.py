@@ -26,9 +26,9 @@ from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.gathering import Gathering
-from cdtool.messages.taken import Bound
-from cdtool.messages.topic import Taken, Topic, in_order, wanted_columns, wanted_topics
+from cdtool.messages.fast_path import Binding
+from cdtool.messages.topic import BatchValues, Topic, sort_times, wanted_columns, wanted_topics
+from cdtool.messages.topic_columns import TopicColumns
 from cdtool.messages.topic_survey import TopicSurvey
 
 __all__ = ["Mcap"]
@@ -69,7 +69,7 @@ class Mcap:
         findings = log.findings()
         columns: dict[str, Column] = {}
         for name in (name for name in log.topics if name in topics):
-            of_topic, of_findings = topics[name].found()
+            of_topic, of_findings = topics[name].columns_and_findings()
             columns |= of_topic
             findings += of_findings
         return source_of(log, columns, findings + jumps.findings(), log.origin)
@@ -100,7 +100,9 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
     names = {source.topic for source in wanted.sources}
     taker = UniformChunkReader(publish=wanted.time.clock == "publish")
     log = Log(path, names.__contains__, taker=taker)
-    topics = wanted_topics(path, wanted, partial(Gathering, expected={topic: log.expected(topic) for topic in names}))
+    topics = wanted_topics(
+        path, wanted, partial(TopicColumns, expected={topic: log.expected(topic) for topic in names})
+    )
     pieces = log.pieces()
     # The chunk reader must learn from the first piece before the second one is read.
     for piece in chain(islice(pieces, 1), read_ahead(pieces)):
@@ -115,15 +117,15 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
     return mapped_source_of(log, wanted, topics)[0]
 
 
-def _bound(log: Log, topics: Mapping[str, Gathering]) -> dict[int, Bound]:
-    """Return, by id, the channels that uniform chunks may contain: wanted ones with a recipe, and unwanted ones."""
+def _bound(log: Log, topics: Mapping[str, TopicColumns]) -> dict[int, Binding]:
+    """Return, by id, the channels that uniform chunks may contain: wanted ones with a layout, and unwanted ones."""
     channels = log.summary.channels.values()
     channels_per_topic = Counter(channel.topic for channel in channels)
-    bound: dict[int, Bound] = {}
+    bound: dict[int, Binding] = {}
     for channel in channels:
         if channel.topic not in topics:
             bound[channel.id] = None
-        elif channels_per_topic[channel.topic] == 1 and (of_channel := topics[channel.topic].bound(channel.id)):
+        elif channels_per_topic[channel.topic] == 1 and (of_channel := topics[channel.topic].binding(channel.id)):
             bound[channel.id] = of_channel
     return bound
 
@@ -167,7 +169,7 @@ class MappedFields:
                 start = first
             for messages in piece:
                 topic = topics[messages.stream.topic]
-                taken = topic.take(messages.stream, messages.batch)
+                taken = topic.decode(messages.stream, messages.batch)
                 if taken is None or not len(taken[0]):
                     continue
                 start = int(taken[0][0]) if start is None else start
@@ -182,14 +184,14 @@ class MappedFields:
             return source
         return replace(source, origin=float(self._converted.get("cdtool.origin_s", "0")))
 
-    def _piece(self, name: str, text: str, taken: Taken, origin: int) -> Piece:
+    def _piece(self, name: str, text: str, taken: BatchValues, origin: int) -> Piece:
         """Return one field of a batch's messages, without the messages that do not name its joints."""
         stamps, (values, other) = taken[0], taken[1][text]
         exact = None if self._converted is None else taken[1][EXACT_TIME][0]
         if other is not None:
             stamps = stamps[~other]
             values, exact = (None if each is None else each[~other] for each in (values, exact))
-        time, order = in_order(stamps, origin)
+        time, order = sort_times(stamps, origin)
         time = time if exact is None else exact if order is None else exact[order]
         rows = {} if values is None else {name: values if order is None else values[order]}
         return Piece(name, time, rows, len(time))

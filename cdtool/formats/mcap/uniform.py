@@ -13,9 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.formats.mcap import uniform_kernel as kernel
-from cdtool.messages.columns.alike_kernel import WORD, words_of
-from cdtool.messages.columns.gathered import ByteArray, IntArray
-from cdtool.messages.taken import Alike, Bound, Destination, Knows, Part, Recipe, Taken, Words
+from cdtool.messages.columns.copy_kernel import WORD, words_of
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
+from cdtool.messages.fast_path import (
+    Binding,
+    ChunkRows,
+    Destination,
+    IsKnownDefinition,
+    MessageTemplate,
+    RowLayout,
+    Words,
+    WrittenRows,
+)
 
 # The fast path is given up when the chunks that did not match outnumber those that did by this number.
 _MOST_MISMATCHES = 16
@@ -26,7 +35,7 @@ _KINDS = {"f": kernel.SINGLE, "i": kernel.SIGNED_INTEGER, "u": kernel.UNSIGNED_I
 class _Tables:
     """The recipes as arrays for the kernel; `bound` keeps references to the columns whose addresses they contain."""
 
-    bound: Mapping[int, Bound]
+    bound: Mapping[int, Binding]
     slots: IntArray
     bounds: IntArray
     compared: Words
@@ -37,15 +46,15 @@ class _Tables:
 
 
 class UniformChunkReader:
-    """A Taker (taken.py) of uniform chunks; `publish`: its times are publish times of the records, not log times."""
+    """A ChunkReader (fast_path.py) of uniform chunks; `publish`: its times are publish times, not log times."""
 
     def __init__(self, publish: bool = False) -> None:
         self._time = kernel.PUBLISH_TIME if publish else kernel.LOG_TIME
         self._tables: _Tables | None = None
         self._mismatches = 0
 
-    def learn(self, bound: Mapping[int, Bound]) -> None:
-        """Set the recipes of channels, by id; chunks with any other channel are not taken."""
+    def learn(self, bound: Mapping[int, Binding]) -> None:
+        """Set the layouts of channels, by id; chunks with any other channel are not taken."""
         given_up = self._mismatches >= _MOST_MISMATCHES or not any(bound.values())
         self._tables = None if given_up else _tables(bound)
 
@@ -54,7 +63,7 @@ class UniformChunkReader:
         """Return whether there are recipes."""
         return self._tables is not None
 
-    def take(self, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:
+    def take(self, content: ByteArray, rows: Mapping[int, range], knows: IsKnownDefinition) -> ChunkRows | None:
         """Return all messages of a chunk; None if a message does not match, or if a definition is not known."""
         tables = self._tables
         if tables is None:
@@ -63,7 +72,9 @@ class UniformChunkReader:
         self._mismatches = max(0, self._mismatches + (1 if taken is None else -1))
         return taken
 
-    def _take(self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: Knows) -> Taken | None:
+    def _take(
+        self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: IsKnownDefinition
+    ) -> ChunkRows | None:
         claimed = _claimed_rows(tables.bound, rows)
         if claimed is None:
             return None
@@ -108,11 +119,11 @@ class UniformChunkReader:
             if end > begin:
                 counts[channel] = end - begin
                 if bound is not None:
-                    parts[channel] = Part(bound[1], slice(begin, end), stamp < kernel.NO_DATE)
-        return Taken(counts, parts, (earliest, latest), first_time)
+                    parts[channel] = WrittenRows(bound[1], slice(begin, end), stamp < kernel.NO_DATE)
+        return ChunkRows(counts, parts, (earliest, latest), first_time)
 
 
-def _claimed_rows(bound: Mapping[int, Bound], rows: Mapping[int, range]) -> tuple[Words, Words] | None:
+def _claimed_rows(bound: Mapping[int, Binding], rows: Mapping[int, range]) -> tuple[Words, Words] | None:
     """Return first row and end of each channel's messages; None if its columns do not have as many free rows."""
     first, limits = np.zeros(len(bound), np.uint64), np.zeros(len(bound), np.uint64)
     for slot, (channel, each) in enumerate(bound.items()):
@@ -124,47 +135,47 @@ def _claimed_rows(bound: Mapping[int, Bound], rows: Mapping[int, range]) -> tupl
     return first, limits
 
 
-def _tables(bound: Mapping[int, Bound]) -> _Tables:
+def _tables(bound: Mapping[int, Binding]) -> _Tables:
     slots = np.full(max(bound, default=-1) + 1, -1, np.int64)
     bounds = np.zeros((len(bound), kernel.BOUNDS), np.int64)
     stamps = np.zeros(len(bound), np.uint64)
-    alike: list[Alike] = []
+    template: list[MessageTemplate] = []
     numbers: list[Words] = []
     compared = end = 0
     for slot, (channel, each) in enumerate(bound.items()):
         slots[channel] = slot
         if each is None:
             continue
-        recipe, destination = each
+        layout, destination = each
         stamps[slot] = destination.stamps.ctypes.data
-        stamp = (-1, 0) if recipe.stamp is None else (recipe.stamp.at, recipe.stamp.signed)
-        numbers.append(_numbers(recipe, destination))
+        stamp = (-1, 0) if layout.stamp is None else (layout.stamp.at, layout.stamp.signed)
+        numbers.append(_numbers(layout, destination))
         begin, others = end, end + int(np.count_nonzero(numbers[-1][:, kernel.KIND] == kernel.DOUBLE))
         end += len(numbers[-1])
-        places = compared, compared + len(recipe.alike.compared), begin, others, end
-        bounds[slot] = recipe.alike.shortest, recipe.alike.longest, *places, *stamp
-        alike.append(recipe.alike)
+        places = compared, compared + len(layout.template.compared), begin, others, end
+        bounds[slot] = layout.template.shortest, layout.template.longest, *places, *stamp
+        template.append(layout.template)
         compared = places[1]
     return _Tables(
         dict(bound),
         slots,
         bounds,
-        np.concatenate([each.compared for each in alike]),
-        np.concatenate([each.mask for each in alike]),
-        np.concatenate([each.pattern for each in alike]),
+        np.concatenate([each.compared for each in template]),
+        np.concatenate([each.mask for each in template]),
+        np.concatenate([each.pattern for each in template]),
         np.concatenate(numbers),
         stamps,
     )
 
 
-def _numbers(recipe: Recipe, destination: Destination) -> Words:
+def _numbers(layout: RowLayout, destination: Destination) -> Words:
     """Return the table of numbers (k, kernel.NUMBER), with float64 values first."""
     rows = []
-    for numbers, table in zip(recipe.fields, destination.tables, strict=True):
+    for numbers, table in zip(layout.fields, destination.tables, strict=True):
         size = np.dtype(numbers.dtype).itemsize
         kind = kernel.DOUBLE if numbers.dtype == "f8" else _KINDS[numbers.dtype[0]]
         for element, at in enumerate(numbers.at):
-            word = min(at, recipe.alike.shortest - WORD)  # the last word must also be within the message
+            word = min(at, layout.template.shortest - WORD)  # the last word must also be within the message
             bits = 8 * (WORD - size)
             address = table.ctypes.data + element * WORD
             rows.append((address, table.strides[0], at, kind, word, bits - 8 * (at - word), bits))

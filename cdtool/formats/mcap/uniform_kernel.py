@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from cdtool.instructions import store
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import IntArray
+from cdtool.messages.columns.decoded_batch import IntArray
 
 # Reason of the end: the chunk's end, a definition, or any other record that does not match.
 DONE, DEFINITION, OTHER = range(3)

@@ -1,19 +1,19 @@
-"""Messages -> columns: every wanted field of all messages at once, one file an encoding."""
+"""Messages -> columns: every wanted field of a whole batch at once; one module per message encoding."""
 
 from __future__ import annotations
 
-from cdtool.messages.columns.gathered import Decoder, Gathered, Picked, UndecodableError
+from cdtool.messages.columns.decoded_batch import DecodedBatch, Decoder, FieldValues, UndecodableError
 from cdtool.messages.layouts.layout import SchemaError
 
-__all__ = ["Decoder", "Gathered", "Picked", "UndecodableError", "decoder_for"]
+__all__ = ["DecodedBatch", "Decoder", "FieldValues", "UndecodableError", "decoder_for"]
 
 
 def decoder_for(message_encoding: str, schema_encoding: str, schema_name: str, schema_data: bytes) -> Decoder:
-    """The decoder of a channel; raises UndecodableError."""
+    """Return the decoder for a channel's message and schema encoding; raises UndecodableError."""
     try:
         return _decoder(message_encoding, schema_encoding, schema_name, schema_data)
     except SchemaError as fault:
-        raise UndecodableError(f"schema '{schema_name}' is not understood: {fault}") from fault
+        raise UndecodableError(f"schema '{schema_name}' cannot be parsed: {fault}") from fault
 
 
 def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, schema_data: bytes) -> Decoder:
@@ -39,6 +39,6 @@ def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, sche
             return protobuf_decoder(parse_protobuf(schema_name, schema_data))
     described = f"schema encoding '{schema_encoding}'" if schema_encoding else "no schema"
     raise UndecodableError(
-        f"message encoding '{message_encoding}' with {described} is not read (json, ROS 1, ROS 2 cdr with ros2msg and "
-        "protobuf are)"
+        f"message encoding '{message_encoding}' with {described} is not supported (supported: json, ROS 1, ROS 2 cdr "
+        "with ros2msg, protobuf)"
     )

@@ -1,8 +1,8 @@
-"""Reading JSON messages of a known shape: the text between the values is the same in all, the values are decoded.
+"""Decode JSON messages of a known shape: the text between the values is the same in all of them.
 
-The shape is a row of tokens, each a text that must stand there and what follows it: a number (or true, false, null), a
-text without escapes, or the end. What fits is JSON with the same members (RFC 8259); what does not fit is left to
-others.
+A shape is a sequence of tokens, each a literal text and what follows it: a number (or true, false, null), a string
+without escapes, or the end. A message that matches is JSON with the same members (RFC 8259); any other message is
+decoded elsewhere.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ import numpy.typing as npt
 
 from cdtool.decimal_kernel import UNDECIDED, float_bits
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 
 VALUE, TEXT, END = 0, 1, 2
-OTHER, FITS, UNCLEAR = 0, 1, 2  # what becomes of a message; UNCLEAR: it fits, but Python must convert a number
+# The result for a message: it does not match, it matches, or it matches but Python must convert a number.
+OTHER, MATCHES, UNCLEAR = 0, 1, 2
 
-# Unsigned constants: a signed one beside an unsigned number would make a float of both.
+# Unsigned constants: a signed and an unsigned operand would both be converted to float.
 _0, _1, _4, _5, _7, _8, _9, _10, _16, _32, _48, _56, _63, _64 = map(
     np.uint64, (0, 1, 4, 5, 7, 8, 9, 10, 16, 32, 48, 56, 63, 64)
 )
@@ -28,13 +29,13 @@ _PAIRS, _UPPER, _LOWER = np.uint64(0x000000FF000000FF), np.uint64(0x000F42400000
 _NULL, _TRUE, _FALSE = (np.uint64(int.from_bytes(word)) for word in (b"null", b"true", b"false"))
 _NAN, _ONE = np.uint64(0x7FF8000000000000), np.uint64(0x3FF0000000000000)  # as float64
 _TENS = np.array([10**n for n in range(9)], dtype=np.uint64)
-_LARGEST = np.array([(2**64 - 10**n) // 10**n for n in range(9)], dtype=np.uint64)  # n digits more fit 64 bits
-_MOST_DIGITS = np.uint64(4000)  # Python bounds those of an int
+_LARGEST = np.array([(2**64 - 10**n) // 10**n for n in range(9)], dtype=np.uint64)  # to which n digits can be appended
+_MOST_DIGITS = np.uint64(4000)  # Python limits the digits of an int
 
 
 @kernel("uint64(uint64)")
 def _first(found: np.uint64) -> np.uint64:
-    """Which byte of a word is the first whose highest bit is set, the others being 0; 8 where none is."""
+    """Return the first byte of a word whose highest bit is set; 8 if no byte has it set. All other bits must be 0."""
     first: np.uint64 = ((((found & (~found + _1)) >> _7) - _1) & _ONES) * _ONES >> _56
     return first
 
@@ -44,7 +45,7 @@ def _first(found: np.uint64) -> np.uint64:
     "Array(int64, 1, 'A', readonly=True), Array(int64, 1, 'A', readonly=True), uint8[::1], int64[:,::1], "
     "Array(uint64, 2, 'C', readonly=True), uint64[:,::1], uint8[::1])"
 )
-def read_alike(
+def read_matching(
     data: ByteArray,
     words: npt.NDArray[np.uint64],
     start: IntArray,
@@ -53,17 +54,18 @@ def read_alike(
     tokens: IntArray,
     powers: npt.NDArray[np.uint64],
     bits: npt.NDArray[np.uint64],
-    fits: ByteArray,
+    matches: ByteArray,
 ) -> None:
-    """Fill `fits` (n,) and, where a message does, `bits` (n, columns) with the float64 of its wanted values.
+    """Fill `matches` (n,) and, for messages that match, `bits` (n, columns) with the wanted values as float64.
 
-    `tokens` (m, 4): first byte and size of the literal before it, kind, column of a wanted value (-1: not wanted).
-    `words[p]` are the 8 bytes of `data` from p on. Eight digits at a time: Lemire 2021 (decimal_kernel.py).
+    `tokens` (m, 4): first byte and size of the preceding literal, kind, column of a wanted value (-1: not wanted).
+    `words[p]` are the 8 bytes of `data` from p on. Digits are converted eight at a time: Lemire 2021
+    (decimal_kernel.py).
     """
     for i in range(start.size):
         p = np.uint64(start[i])
         end = p + np.uint64(length[i])
-        fits[i] = OTHER
+        matches[i] = OTHER
         unclear = False
         for t in range(tokens.shape[0]):
             literal, size, kind, column = np.uint64(tokens[t, 0]), np.uint64(tokens[t, 1]), tokens[t, 2], tokens[t, 3]
@@ -77,7 +79,7 @@ def read_alike(
             p += size
             if kind == END:
                 if p == end:
-                    fits[i] = UNCLEAR if unclear else FITS
+                    matches[i] = UNCLEAR if unclear else MATCHES
                 break
             if p >= end:
                 break
@@ -118,9 +120,9 @@ def read_alike(
             begin = p
             whole = True
             sound = False
-            after = p  # the point
+            after = p  # the first byte after the decimal point
             while True:
-                # Of a fraction 8 digits at a time, and those that are left at once.
+                # The digits of a fraction: 8 at a time, the last ones together.
                 while not whole and p + _8 <= end:
                     word = words[p]
                     low = word - _ZEROS
@@ -174,5 +176,5 @@ def read_alike(
             if column >= 0:
                 value = UNDECIDED if overflow else float_bits(w, q, powers)
                 unclear = unclear or value == UNDECIDED
-                # An int has no negative zero.
+                # An integer has no negative zero.
                 bits[i, column] = value if whole and w == _0 else value | negative << _63

@@ -1,8 +1,8 @@
-"""Walking messages that have no tags: where each wanted member lies, found by a small program.
+"""Walk messages that have no tags: a small program locates each wanted member.
 
-Plain CDR (OMG DDS-XTypes 1.3, 7.4.1, encoding version 1) and ROS 1's serialisation are numbers one after another in the
-order of the schema, strings and sequences with their length before them. CDR aligns each number to its size, counted
-from the first byte after the encapsulation header; ROS 1 does not align.
+Plain CDR (OMG DDS-XTypes 1.3, 7.4.1, encoding version 1) and ROS 1's serialisation write numbers in the order of the
+schema, and strings and sequences after their length. CDR aligns each number to its size, counted from the first byte
+after the encapsulation header; ROS 1 does not align.
 """
 
 from __future__ import annotations
@@ -11,32 +11,32 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.kernels import kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 
-# A program has a row for each step: what to do, slot (-1: the selected one), elements (-1: in the message), a, b.
+# A program has one row per step: operation, slot (-1: the selected one), elements (-1: given in the message), a, b.
 ADVANCE = 0  # by a bytes
 ALIGN = 1  # to a multiple of a
-GUARD = 2  # the next SELECT holds only in element b of loop a
-SELECT = 3  # slot for the next step that takes one
-TAKE = 4  # elements that begin a bytes from here
+GUARD = 2  # the next SELECT applies only in element b of loop a
+SELECT = 3  # slot for the next step that uses one
+TAKE = 4  # elements that begin a bytes ahead
 TEXT = 5
 SEQUENCE = 6  # of elements of a bytes, aligned to b
 LOOP = 7  # a: the step after its end
 END = 8  # a: the loop's first step
-STOP = 9  # at the slot's end
+STOP = 9  # end of the slot
 
 COLUMNS = 5
-DEEPEST = 8  # loops within loops
-WHOLE, CUT, OTHER_KIND, LONG = 0, 1, 2, 3  # what becomes of a message
+DEEPEST = 8  # nested loops
+WHOLE, CUT, OTHER_KIND, LONG = 0, 1, 2, 3  # status of a message
 PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a multiple of 4
 
 BYTES = "Array(uint8, 1, 'C', readonly=True)"
 QUADS = "Array(uint32, 1, 'A', readonly=True, aligned=False)"
-PLACES = "Array(int64, 1, 'A', readonly=True)"
+POSITIONS = "Array(int64, 1, 'A', readonly=True)"
 
 
 @kernel(
-    f"void({BYTES}, {QUADS}, {PLACES}, {PLACES}, int64[:,::1], int64, int64[:,::1], int64[:,::1], "
+    f"void({BYTES}, {QUADS}, {POSITIONS}, {POSITIONS}, int64[:,::1], int64, int64[:,::1], int64[:,::1], "
     "int64[::1], uint8[::1], uint8[::1], int64[:,::1])"
 )
 def walk(
@@ -53,13 +53,13 @@ def walk(
     swapped: ByteArray,
     loops: IntArray,
 ) -> None:
-    """Fill `at` and `count` (n, slots): first byte and number of elements of every slot, count -1: not there.
+    """Fill `at` and `count` (n, slots): first byte and number of elements of every slot; count -1: absent.
 
-    `header` is 4 with CDR's encapsulation and alignment, 0 without; `swapped`: big-endian. Nothing is valid of a
-    message whose status is not 0. `quads[p]` are the 4 bytes of `data` from p on. `lengths` takes the places of the
-    last message's lengths, its first element their number and the second one its end; it may be of size 2 only. `loops`
-    (2, DEEPEST) is overwritten. Nothing outside of a message is read, and no loop runs longer than the message has
-    bytes.
+    `header` is 4 with CDR's encapsulation and alignment, 0 without; `swapped` marks big-endian messages. Results of a
+    message are valid only if its status is 0. `quads[p]` are the 4 bytes of `data` from p on. `lengths` receives, for
+    the last message, the number of its lengths, its end, and the byte positions of as many lengths as fit; its size may
+    be 2. `loops` (2, DEEPEST) is scratch memory. No byte outside of a message is read, and no loop has more iterations
+    than the message has bytes.
     """
     for i in range(start.size):
         p = start[i]
@@ -78,7 +78,7 @@ def walk(
         body = p
         level = -1
         selected = -1
-        holds = True
+        applies = True
         step = 0
         while step < program.shape[0]:
             what, slot, number, a, b = (
@@ -96,12 +96,12 @@ def walk(
                 p += (body - p) & (a - 1)
                 continue
             if what == GUARD:
-                holds = holds and loops[0, a] == b
+                applies = applies and loops[0, a] == b
                 continue
             if what == SELECT:
-                if holds:
+                if applies:
                     selected = slot
-                holds = True
+                applies = True
                 continue
             if what == END:
                 if p > end:
@@ -112,7 +112,7 @@ def walk(
                 else:
                     level -= 1
                 continue
-            if number < 0:  # the length stands in the message
+            if number < 0:  # the length is given in the message
                 if header > 0:
                     p += (body - p) & 3
                 if p + 4 > end:
@@ -151,7 +151,7 @@ def walk(
                 if slot >= 0:
                     at[i, slot] = p + a
                 continue
-            if number > end - p:  # every element of a loop takes a byte at least
+            if number > end - p:  # every element of a loop has at least one byte
                 status[i] = CUT
                 break
             if number == 0:
@@ -166,16 +166,18 @@ def walk(
             status[i] = LONG
 
 
-@kernel(f"b1({BYTES}, {PLACES}, {PLACES}, int64, uint8[::1], uint8[::1])")
-def all_fit(
+@kernel(f"b1({BYTES}, {POSITIONS}, {POSITIONS}, int64, uint8[::1], uint8[::1])")
+def all_match(
     data: ByteArray, start: IntArray, length: IntArray, shortest: int, mask: ByteArray, pattern: ByteArray
 ) -> bool:
-    """True if every message has `shortest` bytes (at least those of `pattern`), and in `mask` those of `pattern`."""
+    """Return True if every message has `shortest` or more bytes, and the bits of `pattern` where `mask` is set.
+
+    `pattern` has at most `shortest` bytes.
+    """
     for i in range(start.size):
         if length[i] < shortest:
             return False
-        # An unsigned index is not looked at for counting from the end, and bytes that stay bytes are compared many at
-        # once.
+        # Unsigned indices avoid the check for negative ones, and byte arithmetic lets the compiler vectorise the loop.
         begin = np.uint64(start[i])
         differing = np.uint8(0)
         for k in range(np.uint64(pattern.size)):
@@ -185,10 +187,10 @@ def all_fit(
     return True
 
 
-@kernel(f"void({BYTES}, {PLACES}, int64, uint8[:,::1])")
-def fetch(data: ByteArray, at: IntArray, offset: int, found: ByteArray) -> None:
-    """Fill `found` (n, k) with the k bytes of `data` from `at[i] + offset` on, all of which must be there."""
+@kernel(f"void({BYTES}, {POSITIONS}, int64, uint8[:,::1])")
+def fetch(data: ByteArray, at: IntArray, offset: int, out: ByteArray) -> None:
+    """Fill `out` (n, k) with the k bytes of `data` from `at[i] + offset` on, all of which must exist."""
     for i in range(at.size):
         begin = np.uint64(at[i] + offset)
-        for k in range(np.uint64(found.shape[1])):
-            found[i, k] = data[begin + k]
+        for k in range(np.uint64(out.shape[1])):
+            out[i, k] = data[begin + k]

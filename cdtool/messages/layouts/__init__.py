@@ -1,1 +1,1 @@
-"""Schemas: the text or descriptor that a file carries -> which fields a message has, one file a schema encoding."""
+"""Schemas in a file, as text or descriptor -> the fields of a message; one module per schema encoding."""

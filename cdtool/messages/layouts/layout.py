@@ -1,4 +1,4 @@
-"""What a schema says about a message: its members in order, their types, and whether they are arrays."""
+"""The parsed schema of a message: its members in order, their types, and whether they are arrays."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _NUMBERS = {
 
 
 class SchemaError(Exception):
-    """A schema cannot be understood; says why."""
+    """A schema cannot be parsed; the message is the reason."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number of a fixed width: `name` as in ROS 2 (float64, uint8, bool, ...)."""
+    """A fixed-width number; `name` is that of ROS 2 (float64, uint8, bool, ...)."""
 
     name: str
 
@@ -38,36 +38,37 @@ class Number:
 
     @property
     def size(self) -> int:
-        """Bytes, which is its alignment too."""
+        """Size in bytes, which is also the alignment."""
         return int(self.dtype[1])
 
 
 @dataclass(frozen=True)
 class Text:
-    """A string; `wide`: of wide characters, whose width depends on who wrote it."""
+    """A string; `wide`: of wide characters, whose width depends on the writer."""
 
     wide: bool = False
 
 
 @dataclass(frozen=True)
 class Message:
-    """A nested message, by the name of its layout."""
+    """A nested message; `name` is that of its layout."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class Array:
-    """An array of `length` elements, or where that is None a sequence with its length in the message."""
+    """An array of `length` elements; None: a sequence whose length is given in the message."""
 
     length: int | None = None
 
 
 @dataclass(frozen=True)
 class Tag:
-    """What protobuf says of a member: its number, how it is written, whether its absence can be told from zero.
+    """The protobuf tag of a member: its field number, its type, and whether its presence is tracked.
 
-    `wire` is the type's name in the descriptor (double, sint32, message, group, ...); `oneof` < 0: of none.
+    `wire` is the name of the type in the descriptor (double, sint32, message, group, ...). `presence`: an absent member
+    differs from a zero. `oneof` is the index of its oneof, negative if it is in none.
     """
 
     number: int
@@ -88,7 +89,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Layout:
-    """A message type: its members in the order of the schema; `entry`: that of a map."""
+    """A message type: its members in schema order; `entry`: it is the entry of a map."""
 
     name: str
     members: tuple[Member, ...]
@@ -96,27 +97,27 @@ class Layout:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The members' names."""
+        """The names of the members."""
         return tuple(member.name for member in self.members)
 
     def member(self, name: str) -> Member | None:
-        """The member of that name."""
+        """Return the member of this name, if it exists."""
         return next((member for member in self.members if member.name == name), None)
 
 
 @dataclass(frozen=True)
 class Schema:
-    """All layouts of a schema by name, and which is the message's own."""
+    """All layouts of a schema by name, and the layout of the message itself."""
 
     root: Layout
     layouts: Mapping[str, Layout]
 
     def nested(self, kind: Message) -> Layout:
-        """The layout of a nested message."""
+        """Return the layout of a nested message."""
         return self.layouts[kind.name]
 
     def walk(self) -> Iterator[Member]:
-        """Every member of the message and of all that it nests, each layout once."""
+        """Yield every member of the message and of its nested messages, each layout once."""
         seen, waiting = {self.root.name}, [self.root]
         while waiting:
             for member in waiting.pop().members:

@@ -1,7 +1,7 @@
-"""The text of ROS message definitions: what ros1msg and ros2msg share.
+"""The text format of ROS message definitions that ros1msg and ros2msg share.
 
-The message's own definition comes first; after a line of `=` and `MSG: package/Type` come those that it nests. A line
-is `type name`, `type name default` or `type NAME=constant`; `#` begins a comment.
+The definition of the message itself comes first. The definitions of nested messages follow, each after a line of `=`
+and `MSG: package/Type`. A line is `type name`, `type name default` or `type NAME=constant`; `#` begins a comment.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ Kind = Number | Text | Message
 
 @dataclass(frozen=True)
 class Dialect:
-    """What differs between ROS 1 and ROS 2: the primitive types and the layouts that need no definition."""
+    """The differences between ROS 1 and ROS 2: the primitive types and the layouts that need no definition."""
 
     primitives: dict[str, Kind]
     known: tuple[Layout, ...]
 
 
 def parse_definitions(name: str, data: bytes, dialect: Dialect) -> Schema:
-    """The layouts of a definition text; raises SchemaError."""
+    """Return the layouts of a definition text; raises SchemaError."""
     try:
         text = data.decode()
     except UnicodeDecodeError as fault:
@@ -44,7 +44,7 @@ def parse_definitions(name: str, data: bytes, dialect: Dialect) -> Schema:
 
 
 def short_name(name: str) -> str:
-    """`package/msg/Type` -> `package/Type`."""
+    """Return a type's name without its middle part: `package/msg/Type` becomes `package/Type`."""
     parts = name.split("/")
     return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
 
@@ -58,7 +58,7 @@ def _sections(text: str) -> list[str]:
             continue
         title, body = _section(part, "")
         if bodies.setdefault(title, body) != body:
-            raise SchemaError(f"'{title}' is defined twice, differently")
+            raise SchemaError(f"'{title}' has two different definitions")
         kept.append(part)
     return kept
 
@@ -97,17 +97,17 @@ def _layout(title: str, body: str, names: set[str], dialect: Dialect) -> Layout:
 def _member(text: str, name: str, title: str, names: set[str], dialect: Dialect) -> Member:
     match = _TYPE.fullmatch(text)
     if match is None:
-        raise SchemaError(f"type '{text[:60]}' of {title}.{name} is not understood")
+        raise SchemaError(f"type '{text[:60]}' of {title}.{name} cannot be parsed")
     kind = dialect.primitives.get(match["base"]) or _message(match["base"], title, names)
     if kind is None:
         raise SchemaError(f"type '{match['base']}' of {title}.{name} is not defined")
     if match["text_bound"] and not isinstance(kind, Text):
-        raise SchemaError(f"type '{text[:60]}' of {title}.{name}: only strings have a bound")
+        raise SchemaError(f"type '{text[:60]}' of {title}.{name}: only strings can have a length limit")
     if not match["array"]:
         return Member(name, kind)
     bounded = "<=" in match["array"]
     if bounded and not match["length"]:
-        raise SchemaError(f"type '{text[:60]}' of {title}.{name} is not understood")
+        raise SchemaError(f"type '{text[:60]}' of {title}.{name} cannot be parsed")
     return Member(name, kind, Array(int(match["length"]) if match["length"] and not bounded else None))
 
 
@@ -118,16 +118,16 @@ def _message(base: str, title: str, names: set[str]) -> Message | None:
 
 
 def _check_nesting(root: str, layouts: dict[str, Layout]) -> None:
-    """A message cannot hold itself: raises SchemaError where one does."""
+    """Raise SchemaError if a message contains itself."""
     done: set[str] = set()
 
     def visit(name: str, above: tuple[str, ...]) -> None:
         if name in above:
-            raise SchemaError(f"'{name}' holds itself")
+            raise SchemaError(f"'{name}' contains itself")
         if name in done:
             return
         if len(above) > 100:
-            raise SchemaError("more than 100 levels of messages")
+            raise SchemaError("more than 100 levels of nested messages")
         for member in layouts[name].members:
             if isinstance(member.kind, Message):
                 visit(member.kind.name, (*above, name))

@@ -1,7 +1,7 @@
 """protobuf: a FileDescriptorSet (MCAP, appendix "Well-known schema encodings"; google/protobuf/descriptor.proto).
 
-A descriptor is itself a protobuf message, so a small reader of the wire format (protobuf.dev, "Encoding") is all it
-takes: the package would read no more of it, and takes longer to load than a short log to analyse.
+A descriptor is itself a protobuf message, so a small reader of the wire format (protobuf.dev, "Encoding") suffices: the
+protobuf package would not read more, and importing it takes longer than analysing a short log.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from cdtool.messages.layouts.layout import Array, Layout, Member, Message, Number, Schema, SchemaError, Tag, Text
 
-# FieldDescriptorProto.Type: the name of the type, and of the number that it holds.
+# FieldDescriptorProto.Type: the name of the type, and of the number that it represents.
 _TYPES = {
     1: ("double", "float64"),
     2: ("float", "float32"),
@@ -41,13 +41,13 @@ _Fields = dict[int, list[int | bytes]]
 
 @dataclass(frozen=True)
 class _Features:
-    """What holds unless a message or field says otherwise: proto2, proto3 and editions differ in it."""
+    """Defaults that a message or field may override: proto2, proto3 and editions differ in them."""
 
     implicit: bool
     delimited: bool = False
 
     def with_options(self, options: list[int | bytes], number: int) -> _Features:
-        """The features of options (their field `number` is a FeatureSet), else these."""
+        """Return these features, overridden by those of options (whose field `number` is a FeatureSet)."""
         features = self
         for option in options:
             for value in _fields(option).get(number, []):
@@ -61,7 +61,7 @@ class _Features:
 
 
 def parse_protobuf(name: str, data: bytes) -> Schema:
-    """The layouts of the message `name` and of all that it nests; raises SchemaError."""
+    """Return the layouts of the message `name` and of its nested messages; raises SchemaError."""
     layouts: dict[str, Layout] = {}
     for file in _fields(data).get(1, []):
         found = _fields(file)
@@ -73,11 +73,11 @@ def parse_protobuf(name: str, data: bytes) -> Schema:
             layouts.update(_layouts(message, f"{package}." if package else "", features))
     root = layouts.get(name.lstrip("."))
     if root is None:
-        raise SchemaError(f"its descriptors do not have '{name}'")
+        raise SchemaError(f"its descriptors do not define '{name}'")
     schema = Schema(root, layouts)
     for member in schema.walk():
         if isinstance(member.kind, Message) and member.kind.name not in layouts:
-            raise SchemaError(f"its descriptors do not have '{member.kind.name}' of field '{member.name}'")
+            raise SchemaError(f"its descriptors do not define '{member.kind.name}' of field '{member.name}'")
     return schema
 
 
@@ -102,7 +102,7 @@ def _member(field: int | bytes, features: _Features) -> Member:
     if not isinstance(number, int) or not 0 < number < 2**29 or kind not in _TYPES or not isinstance(kind, int):
         raise SchemaError(f"field '{name}' has the number {number!r} and the type {kind!r}")
     features = features.with_options(found.get(8, []), 21)
-    wire, held = _TYPES[kind]
+    wire, number_name = _TYPES[kind]
     if wire == "message" and features.delimited:
         wire = "group"
     repeated = found.get(4, [1])[-1] == _REPEATED
@@ -114,8 +114,8 @@ def _member(field: int | bytes, features: _Features) -> Member:
         oneof=oneof if isinstance(oneof, int) and 17 not in found else -1,
     )
     array = Array() if repeated else None
-    if held:
-        return Member(name, Number(held), array, tag)
+    if number_name:
+        return Member(name, Number(number_name), array, tag)
     if wire in ("string", "bytes"):
         return Member(name, Text(), array, tag)
     return Member(name, Message(_text(found.get(6, [b""])[-1]).lstrip(".")), array, tag)
@@ -126,7 +126,7 @@ def _text(value: int | bytes) -> str:
 
 
 def _fields(message: int | bytes) -> _Fields:
-    """The fields of a message by number, each with its values in order; raises SchemaError."""
+    """Return the fields of a message by number, each with its values in order; raises SchemaError."""
     if not isinstance(message, bytes):
         raise SchemaError("its descriptors are damaged")
     found: _Fields = {}

@@ -1,6 +1,6 @@
 """ros1msg: the concatenated .msg text of ROS 1 (MCAP, appendix "Well-known schema encodings").
 
-http://wiki.ros.org/msg: `char` is an uint8, `byte` an int8; `time` and `duration` are two numbers, `secs` and `nsecs`.
+http://wiki.ros.org/msg: `char` is a uint8, `byte` an int8; `time` and `duration` are two numbers, `secs` and `nsecs`.
 """
 
 from __future__ import annotations
@@ -27,5 +27,5 @@ _ROS1 = Dialect(
 
 
 def parse_ros1msg(name: str, data: bytes) -> Schema:
-    """The layouts of the message `name` and of all that it nests; raises SchemaError."""
+    """Return the layouts of the message `name` and of its nested messages; raises SchemaError."""
     return parse_definitions(name, data, _ROS1)

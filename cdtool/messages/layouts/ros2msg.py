@@ -1,7 +1,7 @@
 """ros2msg: the concatenated .msg text of ROS 2 (MCAP, appendix "Well-known schema encodings").
 
-https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html: `char` is an uint8, `byte` an octet; a string or
-sequence may be bounded (`string<=5`, `float64[<=3]`), which does not change how it is written.
+https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html: `char` is a uint8, `byte` an octet. A string or
+sequence may have a length limit (`string<=5`, `float64[<=3]`), which does not change its encoding.
 """
 
 from __future__ import annotations
@@ -27,5 +27,5 @@ _ROS2 = Dialect(
 
 
 def parse_ros2msg(name: str, data: bytes) -> Schema:
-    """The layouts of the message `name` and of all that it nests; raises SchemaError."""
+    """Return the layouts of the message `name` and of its nested messages; raises SchemaError."""
     return parse_definitions(name, data, _ROS2)

@@ -14,8 +14,8 @@ from cdtool.findings import Finding
 from cdtool.findings.containers import Unverified
 from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer
 from cdtool.ingest.channel_assembly import file_digest
-from cdtool.ingest.parts import joined_digest
-from cdtool.ingest.reading import FoundParts, log_parts
+from cdtool.ingest.parts import join_digests
+from cdtool.ingest.reading import LogFolder, log_parts
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
@@ -181,11 +181,11 @@ def _provenance(
 ) -> Mapping[str, str]:
     """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
     if log.is_dir():
-        parts = FoundParts.of(log).every  # in order of time
+        parts = LogFolder.of(log).files  # in order of time
     digests = {part.name: file_digest(part) for part in parts}
     told = {
         "source": log.name or log.resolve().name,
-        "sha256": joined_digest(list(digests.values())),
+        "sha256": join_digests(list(digests.values())),
         "version": __version__,
         "origin_s": repr(origin),
     }

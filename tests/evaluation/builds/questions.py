@@ -7,7 +7,7 @@ import numpy as np
 from cdtool.evaluation.builds.comparison import BuildComparison
 from cdtool.evaluation.builds.rows import BuildRow, Question
 from cdtool.evaluation.results import Results
-from tests.made_up.builds import build
+from tests.synthetic.builds import build_results
 
 KEY = ("momentum", "stiff")
 
@@ -17,7 +17,7 @@ def latencies(n: int = 30, mean: float = 40.0, std: float = 6.0, seed: int = 1) 
 
 
 def single(outcomes, **options) -> Results:
-    return build({KEY: outcomes}, **options)
+    return build_results({KEY: outcomes}, **options)
 
 
 def row_of(comparison: BuildComparison) -> BuildRow:

@@ -17,8 +17,8 @@ from cdtool.evaluation.statistics.rates import poisson_difference_p
 from cdtool.evaluation.statistics.sample_size import detectable_difference, impacts_for_unpaired
 from cdtool.report.writers.comparison_json import to_json
 from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
-from tests.made_up.builds import BLIND, MISSED, ONSET, RULES, UNCERTAINTY, build
 from tests.report.hostile import HOSTILE
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, ONSET, RULES, UNCERTAINTY, build_results
 
 
 def test_a_shift_of_every_latency_is_shown_with_its_size_in_both_directions():
@@ -110,8 +110,8 @@ def test_misses_that_only_one_build_has_do_not_touch_the_latency_of_the_others()
 
 
 def test_a_pair_not_assessable_in_one_build_is_counted_separately():
-    old = [*latencies(30), BLIND, MISSED]
-    new = [BLIND, *latencies(30)[1:], BLIND, MISSED]
+    old = [*latencies(30), NOT_ASSESSABLE, MISSED]
+    new = [NOT_ASSESSABLE, *latencies(30)[1:], NOT_ASSESSABLE, MISSED]
     found = compare_builds(single(old), single(new))
     row = row_of(found)
     assert row.one_not_assessable == 1 and row.pairs == 32
@@ -121,7 +121,7 @@ def test_a_pair_not_assessable_in_one_build_is_counted_separately():
 
 
 def test_a_build_that_can_no_longer_assess_is_worse():
-    found = compare_builds(single(latencies()), single([BLIND] * 30))
+    found = compare_builds(single(latencies()), single([NOT_ASSESSABLE] * 30))
     assert found.verdict == "worse"
     assert "nothing is assessable: not assessable 30 of 30, before 0 of 30" in row_of(found).words
     assert asked(found, "latency_ms").outcome == "not_asked"
@@ -139,13 +139,13 @@ def test_false_alarms_are_compared_by_hours():
 
 
 def test_an_impact_free_group_says_how_many_false_alarms_would_have_been_shown():
-    old = build({}, holdout=["momentum"])
-    found = compare_builds(old, build({}, holdout=["momentum"], benchmark_sha256="another"))
+    old = build_results({}, holdout=["momentum"])
+    found = compare_builds(old, build_results({}, holdout=["momentum"], benchmark_sha256="another"))
     least = int(asked(found, "false_alarms").detectable)
     assert row_of(found).words == f"no change shown ({least} false alarms instead of 0 would have been shown)"
     shown = {
         count: compare_builds(
-            old, build({}, holdout=["momentum"], false_alarms={("momentum", "holdout"): count})
+            old, build_results({}, holdout=["momentum"], false_alarms={("momentum", "holdout"): count})
         ).verdict
         for count in (least - 1, least)
     }
@@ -183,7 +183,7 @@ def test_a_detector_without_monitored_time_has_no_false_alarms_to_compare():
 
 
 def test_operations_not_assessable_in_one_build_count_without_contacts():
-    old = build({}, holdout=["momentum"])
+    old = build_results({}, holdout=["momentum"])
     new = replace(old, exposure=tuple(replace(item, not_assessable=40) for item in old.exposure))
     found = compare_builds(old, new)
     assert found.verdict == "worse"
@@ -204,7 +204,9 @@ def test_all_questions_are_corrected_together():
         key: [x + y for x, y in zip(v, latencies(12, 0.0, 3.0, 40 + i), strict=True)]
         for i, (key, v) in enumerate(noise.items())
     }
-    together = compare_builds(build({KEY: old, **noise}, force=None), build({KEY: new, **moved}, force=None))
+    together = compare_builds(
+        build_results({KEY: old, **noise}, force=None), build_results({KEY: new, **moved}, force=None)
+    )
     assert together.asked == 7
     (row,) = [row for row in together.rows if row.detector == "momentum" and row.group == "stiff"]
     question = row.question("latency_ms")
@@ -216,7 +218,7 @@ def test_all_questions_are_corrected_together():
 def test_one_better_and_one_worse_is_mixed():
     old = {("momentum", "stiff"): latencies(), ("momentum", "soft"): latencies(seed=2)}
     new = {key: [x + (5.0 if key[1] == "soft" else -5.0) for x in values] for key, values in old.items()}
-    assert compare_builds(build(old), build(new)).verdict == "mixed"
+    assert compare_builds(build_results(old), build_results(new)).verdict == "mixed"
 
 
 def test_a_stricter_level_shows_less():
@@ -379,8 +381,8 @@ def test_results_from_a_file_are_compared_with_results_in_memory(tmp_path):
 
 
 def test_content_of_only_one_file_is_named_and_not_compared():
-    old = build({KEY: latencies(), ("pure_torque", "stiff"): latencies(), ("momentum", "soft"): latencies()})
-    new = build({KEY: latencies(), ("energy", "stiff"): latencies(), ("momentum", "wet"): latencies()})
+    old = build_results({KEY: latencies(), ("pure_torque", "stiff"): latencies(), ("momentum", "soft"): latencies()})
+    new = build_results({KEY: latencies(), ("energy", "stiff"): latencies(), ("momentum", "wet"): latencies()})
     found = compare_builds(old, new)
     assert [(row.detector, row.group) for row in found.rows] == [KEY]
     assert found.only_old == ("detector pure_torque", "group soft")
@@ -388,7 +390,7 @@ def test_content_of_only_one_file_is_named_and_not_compared():
 
 
 def test_a_detector_without_results_in_a_group_of_one_build_is_named():
-    old = build({KEY: latencies(), ("pure_torque", "stiff"): latencies()})
+    old = build_results({KEY: latencies(), ("pure_torque", "stiff"): latencies()})
     lost = replace(
         old,
         contacts=tuple(item for item in old.contacts if item.detector == "momentum"),
@@ -400,7 +402,7 @@ def test_a_detector_without_results_in_a_group_of_one_build_is_named():
 
 def test_nothing_in_common_is_an_error():
     with pytest.raises(UsageError, match="no detector and group in common"):
-        compare_builds(single(latencies()), build({("energy", "stiff"): latencies()}))
+        compare_builds(single(latencies()), build_results({("energy", "stiff"): latencies()}))
 
 
 def test_nothing_depends_on_the_order_of_the_recordings():
@@ -413,5 +415,5 @@ def test_nothing_depends_on_the_order_of_the_recordings():
 @pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
 def test_hostile_names_are_compared_like_any_other(name):
     outcomes = {("momentum", name): latencies()}
-    found = compare_builds(build(outcomes, window_s={}), build(outcomes, window_s={}))
+    found = compare_builds(build_results(outcomes, window_s={}), build_results(outcomes, window_s={}))
     assert row_of(found).group == name and found.verdict == "no change shown"

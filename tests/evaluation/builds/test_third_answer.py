@@ -17,15 +17,15 @@ from cdtool.evaluation.statistics.rates import (
 )
 from cdtool.exit_status import Fact, status_of
 from tests.evaluation.builds.questions import KEY, asked, latencies, row_of, single
-from tests.made_up.builds import BLIND, MISSED, build
+from tests.synthetic.builds import MISSED, NOT_ASSESSABLE, build_results
 
 OTHERS = {"bytes_of": "other", "names": "x"}
 
 
 def test_the_example_of_a_debounce_of_200_is_worse_and_inconclusive_never_no_change():
     stiff, soft = ("friction_ekf", "stiff"), ("friction_ekf", "soft")
-    old = build({stiff: [33.0, 31.0, 35.0, 34.0], soft: [82.0, 79.0, 88.0, 81.0]}, hours=0.01)
-    new = build({stiff: [MISSED] * 4, soft: [330.0, 310.0, 350.0, 320.0]}, hours=0.01)
+    old = build_results({stiff: [33.0, 31.0, 35.0, 34.0], soft: [82.0, 79.0, 88.0, 81.0]}, hours=0.01)
+    new = build_results({stiff: [MISSED] * 4, soft: [330.0, 310.0, 350.0, 320.0]}, hours=0.01)
     found = compare_builds(old, new)
     assert found.verdict == "worse" and "no change" not in found.words
     by_group = {row.group: row for row in found.rows}
@@ -66,7 +66,7 @@ def test_one_contact_that_is_still_detected_is_no_complete_change():
 
 
 def test_a_build_that_can_no_longer_assess_anything_is_worse_for_any_number_of_contacts():
-    found = compare_builds(single(latencies(3)), single([BLIND] * 3))
+    found = compare_builds(single(latencies(3)), single([NOT_ASSESSABLE] * 3))
     assert found.verdict == "worse" and asked(found, "not_assessable").complete_change_p == 0.125
     assert "nothing is assessable: not assessable 3 of 3, before 0 of 3" in row_of(found).words
 
@@ -95,19 +95,19 @@ def test_a_spread_too_large_for_a_relevant_change_is_inconclusive_with_the_detec
 
 
 def test_identical_files_of_any_size_show_no_change():
-    old = build({KEY: latencies(2), ("pure_torque", "soft"): [MISSED, 40.0]})
+    old = build_results({KEY: latencies(2), ("pure_torque", "soft"): [MISSED, 40.0]})
     found = compare_builds(old, old)
     assert found.verdict == "no change shown" and not found.inconclusive and found.facts == ()
 
 
 def test_two_files_that_could_both_assess_nothing_show_nothing():
-    results = single([BLIND] * 30)
+    results = single([NOT_ASSESSABLE] * 30)
     assert compare_builds(results, results).verdict == "inconclusive"
 
 
 def test_a_missing_detector_makes_the_comparison_incomplete():
-    old = build({KEY: latencies(), ("pure_torque", "stiff"): latencies()})
-    found = compare_builds(old, build({KEY: latencies()}))
+    old = build_results({KEY: latencies(), ("pure_torque", "stiff"): latencies()})
+    found = compare_builds(old, build_results({KEY: latencies()}))
     assert found.facts == (Fact.INCOMPLETE,) and status_of(found.facts) == 4
 
 

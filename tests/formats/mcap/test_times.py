@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.formats.mcap import Mcap
-from cdtool.messages.topic import in_order
+from cdtool.messages.topic import sort_times
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 
 _LATEST = 2**64 - 1
@@ -16,13 +16,13 @@ _LATEST = 2**64 - 1
 
 @given(st.lists(st.integers(0, _LATEST), max_size=6), st.integers(0, _LATEST))
 def test_times_are_differences_of_any_integers(stamps, origin):
-    time, _ = in_order(np.array(stamps, dtype=np.uint64), origin)
+    time, _ = sort_times(np.array(stamps, dtype=np.uint64), origin)
     assert time.tolist() == sorted((stamp - origin) / 1e9 for stamp in stamps)
 
 
 @given(st.lists(st.integers(-(2**63) + 1, 2**63 - 1), min_size=1, max_size=6))
 def test_times_of_headers_may_be_before_1970(stamps):
-    time, _ = in_order(np.array(stamps, dtype=np.int64), stamps[0])
+    time, _ = sort_times(np.array(stamps, dtype=np.int64), stamps[0])
     assert time.tolist() == sorted((stamp - stamps[0]) / 1e9 for stamp in stamps)
 
 

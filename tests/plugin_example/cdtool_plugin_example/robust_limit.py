@@ -1,4 +1,4 @@
-"""Robust limits: constant, and not moved by one odd run among those learned from."""
+"""Robust limits: constant limits that a single unusual run does not change much."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,15 +11,37 @@ from cdtool.errors import SignatureError
 from cdtool.recording import Recording
 from cdtool.thresholds.limit import FittedLimit
 
-# Median absolute deviation -> standard deviation, for normally distributed values.
+# Ratio of the standard deviation to the median absolute deviation of normally distributed values.
 _AS_DEVIATION = 1.4826
 
 
 @dataclass(frozen=True)
 class RobustLimit:
-    """Constant limits: the median of the runs' extremes, `safety_factor` robust deviations further out.
+    """Constant limits: the medians of the runs' extremes, extended by `safety_factor` robust standard deviations.
 
-    Fails where friction or gravity vary along the path, and with few runs: half of them give the spread.
+    Parameters
+    ----------
+    safety_factor : float
+        Number of robust standard deviations from the median extremes to the limits.
+
+    Notes
+    -----
+    upper = median(max i) + safety_factor s, and likewise lower, for each joint; s = 1.4826 times the median absolute
+    deviation of the extremes, over runs. Fails if friction or gravity vary along the travel, and with few runs, as half
+    of them determine s.
+
+    Examples
+    --------
+    One of four runs with an unusual peak does not move the limit far.
+
+    >>> from cdtool.recording import Recording
+    >>> def pair(peak):
+    ...     values = np.array([[-1.0], [peak]])
+    ...     signal = Signal(np.array([0.0, 0.1]), values, np.zeros((2, 1), np.uint8), "N", signed=True)
+    ...     return Recording("run", "", ("axis",), {}), signal
+    >>> fitted = RobustLimit(safety_factor=5.0).fit([pair(9.0), pair(10.0), pair(11.0), pair(90.0)])
+    >>> np.round(fitted.upper, 1).tolist()
+    [17.9]
     """
 
     safety_factor: float = 5.5
@@ -29,7 +51,10 @@ class RobustLimit:
     fitted: ClassVar[tuple[type, ...]] = (FittedLimit,)
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedLimit:
-        """Limits from impact-free runs; raises SignatureError with fewer than three or without valid samples."""
+        """Return limits from impact-free runs.
+
+        Raises SignatureError with fewer than three runs, or if a joint has no valid sample.
+        """
         if len(pairs) < 3:
             raise SignatureError(f"a robust limit needs at least 3 impact-free runs, {len(pairs)} given", "add runs")
         for recording, signal in pairs:

@@ -1,4 +1,4 @@
-"""Torque rate: how quickly the drive's effort changes."""
+"""Torque rate (TR): the rate of change of the drive force."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,10 +14,40 @@ from cdtool.recording import Recording
 
 @dataclass(frozen=True)
 class TorqueRate:
-    """i = s LP{tau}: the rate of change of the low-passed drive force on the load side, on the torque's own clock.
+    """i = s LP{tau}: the rate of change of the low-passed drive force on the load side.
 
-    Needs: torque. Unit: N/s or N m/s. Start-up: until the low-pass has settled. Fails: it answers to every start, stop
-    and change of load, and a slow controller shows a contact late.
+    Parameters
+    ----------
+    cutoff : float or tuple of float
+        Cut-off frequency of the low-pass [Hz], one number or one per joint.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain is not a finite number above 0.
+
+    Notes
+    -----
+    LP is a second-order Butterworth low-pass, on the torque's own clock.
+
+    * Needs: torque.
+    * Unit: N/s (linear axis) or N m/s (rotary axis), positive in positive travel.
+    * Status: start-up until the low-pass has settled; missing samples.
+    * Fails: it responds to every start, stop and change of load; with a slow controller it detects a contact late.
+
+    Examples
+    --------
+    A drive force that rises by 1 N per millisecond has a rate of 1000 N/s.
+
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Recording, Series
+    >>> from cdtool.tables import Table
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
+    >>> time = np.arange(2000) * 1e-3
+    >>> run = Recording("run", "", ("axis",), {"torque": Series(time, 1000.0 * time, "N")})
+    >>> signal = TorqueRate().signal(run, axis)
+    >>> signal.values[-1, 0].round(3).item(), signal.unit
+    (1000.0, 'N/s')
     """
 
     cutoff: Gain = gain(2.0, "Hz", "cut-off frequency of the low-pass")
@@ -32,11 +62,11 @@ class TorqueRate:
         require_positive(self, "cutoff")
 
     def unit(self, machine: Machine) -> str:
-        """N/s or N m/s."""
+        """Return "N/s" or "N m/s"."""
         return f"{machine.force_unit}/s"
 
     def signal(self, recording: Recording, machine: Machine) -> Signal:
-        """Rate of the drive force (n, J); raises RecordingError without a torque."""
+        """Return the rate of the drive force (n, J); raises RecordingError if the torque is missing."""
         require_channels(self, recording)
         torque = recording["torque"]
         missing = ~np.isfinite(torque.values)

@@ -16,7 +16,7 @@ from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
-from tests.made_up.door import MACHINE, write_log
+from tests.synthetic.door import MACHINE, write_log
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["gm"]\noperations = "motion"\n'
 LOGS = '[learn]\nlogs = ["free.csv"]\n[impacts.push]\nlogs = ["hits.csv"]\n[holdout]\nlogs = ["quiet.csv"]\n'

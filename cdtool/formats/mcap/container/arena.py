@@ -13,7 +13,7 @@ from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.batch import Batch
-from cdtool.messages.taken import Taken
+from cdtool.messages.fast_path import ChunkRows
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class MessageBlock:
     batches: tuple[tuple[int, Batch], ...]
     covered: bool
     cuts: Mapping[int, int]
-    taken: tuple[Taken, ...] = ()
+    taken: tuple[ChunkRows, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Arena:
         self._used = 0
         self._covered = False
         self._cuts: dict[int, int] = {}
-        self._taken: list[Taken] = []
+        self._taken: list[ChunkRows] = []
 
     def fits(self, size: int, covered: bool) -> bool:
         """Return whether `size` more bytes have space, and a CRC covers both these and earlier bytes, or neither."""
@@ -66,7 +66,7 @@ class Arena:
         """Start again with `memory`, after `flush`."""
         self._data, self._covered = memory, covered
 
-    def add_decoded(self, size: int, taken: Taken) -> Iterator[MessageBlock]:
+    def add_decoded(self, size: int, taken: ChunkRows) -> Iterator[MessageBlock]:
         """Add the next `size` bytes as a chunk whose messages the fast path has read."""
         if self._table.count:
             yield from self._blocks()

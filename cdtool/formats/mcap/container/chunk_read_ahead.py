@@ -29,7 +29,7 @@ from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.messages.taken import Taken, Taker
+from cdtool.messages.fast_path import ChunkReader, ChunkRows
 
 _LARGE_PAGE = 2 << 20
 _MOST_FREE = 3
@@ -89,7 +89,7 @@ class _CheckedChunk:
 
     header: ChunkHeader
     address: int = 0
-    taken: Taken | None = None
+    taken: ChunkRows | None = None
 
 
 class _Reader:
@@ -122,7 +122,7 @@ class ChunkReadAhead:
     """
 
     def __init__(
-        self, path: Path, summary: Summary, skip: Container[int], definitions: Definitions, taker: Taker | None
+        self, path: Path, summary: Summary, skip: Container[int], definitions: Definitions, taker: ChunkReader | None
     ) -> None:
         self._path, self._definitions, self._taker = path, definitions, taker
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
@@ -176,7 +176,7 @@ class ChunkReadAhead:
         chunk = self._checked.get(header)
         return chunk is not None and chunk.address == content.ctypes.data
 
-    def taken(self, header: ChunkHeader) -> Taken | None:
+    def taken(self, header: ChunkHeader) -> ChunkRows | None:
         """Return the messages of the chunk with this header; None if the fast path has not read them."""
         chunk = self._checked.get(header)
         return None if chunk is None or self._definitions.ambiguous else chunk.taken

@@ -45,7 +45,7 @@ from cdtool.formats.mcap.container.records import (
 from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.messages.taken import Taker
+from cdtool.messages.fast_path import ChunkReader
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
@@ -71,7 +71,7 @@ class DataSection:
         summary: Summary,
         definitions: Definitions,
         skip: Mapping[int, object],
-        taker: Taker | None,
+        taker: ChunkReader | None,
     ) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}

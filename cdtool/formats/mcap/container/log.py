@@ -33,7 +33,7 @@ from cdtool.formats.mcap.container.skippable_chunks import skippable_chunks
 from cdtool.formats.mcap.container.summary import matches_header, read_summary
 from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import NO_BATCH, Batch
-from cdtool.messages.taken import Part, Taker
+from cdtool.messages.fast_path import ChunkReader, WrittenRows
 
 _LONGEST_HEADER = 1 << 12
 
@@ -48,7 +48,7 @@ class Messages:
     stream: DefinedStream
     batch: Batch
     covered: bool
-    parts: tuple[Part, ...] = ()
+    parts: tuple[WrittenRows, ...] = ()
 
 
 @dataclass
@@ -77,7 +77,7 @@ class Log:
         wanted: Callable[[str], bool] | None = None,
         use_index: bool = True,
         strict: bool = True,
-        taker: Taker | None = None,
+        taker: ChunkReader | None = None,
     ) -> None:
         self.path = path
         self._strict = strict
@@ -140,7 +140,7 @@ class Log:
                 yield from self._counted(channel, len(batch), piece.covered, batch)
 
     def _counted(
-        self, channel: int, count: int, covered: bool, batch: Batch, parts: tuple[Part, ...] = ()
+        self, channel: int, count: int, covered: bool, batch: Batch, parts: tuple[WrittenRows, ...] = ()
     ) -> Iterator[Messages]:
         try:
             stream = self._definitions.stream(channel)

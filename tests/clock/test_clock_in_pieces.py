@@ -1,4 +1,4 @@
-"""A clock that comes piece by piece: what cdtool.clock says of it as a whole."""
+"""A clock cleaned piece by piece: the same times and findings as for the whole clock."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.clock import clean_time, gap_findings
-from cdtool.clock.stamps import CleanPieces, gaps_in
+from cdtool.clock.stamps import ClockCleaner, gaps_in
 from cdtool.findings import Finding
 from cdtool.recording import Series
 
 
-def _shown(findings: Iterable[Finding]) -> list[tuple[str, str, str]]:
-    """Kind, severity and sentence: a number that is a sum in another order is alike to the digits that are shown."""
+def as_shown(findings: Iterable[Finding]) -> list[tuple[str, str, str]]:
+    """Return kind, severity and sentence: a number summed in another order is equal only to the digits shown."""
     return [(finding.kind, finding.severity, str(finding)) for finding in findings]
 
 
 @st.composite
 def clocks(draw: st.DrawFn) -> np.ndarray:
-    """Stamps of a clock with gaps, a few of them missing, repeated or running backward: less than a fifth.
+    """Draw time stamps with gaps, less than a fifth of which are missing, repeated or run backward.
 
-    Some are counters that wrap, some start again.
+    Some clocks are counters that wrap, some restart.
     """
     count = draw(st.integers(20, 120))
     time = np.cumsum(draw(st.lists(st.sampled_from([0.01, 0.01, 0.012, 0.5]), min_size=count, max_size=count)))
@@ -37,13 +37,13 @@ def clocks(draw: st.DrawFn) -> np.ndarray:
 
 
 @given(clocks(), st.integers(1, 9), st.sampled_from([0, 2]))
-def test_a_clock_in_pieces_is_cleaned_as_the_whole_one_is(stamps, parts, first_row):
+def test_a_clock_in_pieces_is_cleaned_as_a_whole_clock(stamps, parts, first_row):
     pieces = np.array_split(stamps, parts)
-    clean = CleanPieces()
-    times = [clean.times(piece, piece) for piece in pieces]
-    times.append(clean.times(np.empty(0), np.empty(0), final=True))
+    cleaner = ClockCleaner()
+    times = [cleaner.times(piece, piece) for piece in pieces]
+    times.append(cleaner.times(np.empty(0), np.empty(0), final=True))
     whole = clean_time(stamps, first_row, "line" if first_row else "sample")
     assert np.array_equal(np.concatenate(times), whole.time)
-    assert _shown(clean.findings(first_row)) == _shown(whole.findings)
+    assert as_shown(cleaner.findings(first_row)) == as_shown(whole.findings)
     series = Series(whole.time, np.zeros(len(whole.time)), "s")
-    assert _shown(gaps_in(times, series.period, "time")) == _shown(gap_findings(series, "time"))
+    assert as_shown(gaps_in(times, series.period, "time")) == as_shown(gap_findings(series, "time"))

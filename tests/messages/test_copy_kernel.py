@@ -1,4 +1,4 @@
-"""take_alike against the same in plain Python: random words, masks and messages."""
+"""The copy kernel compared with plain Python on random words, masks and messages."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.messages.columns.alike_kernel import WORD, compared_words, take_alike, words_of
+from cdtool.messages.columns.copy_kernel import WORD, compared_words, copy_uniform, words_of
 
 
 @st.composite
@@ -18,7 +18,7 @@ def messages(draw):
     rest = []
     for _ in range(count - 1):
         other = bytearray(draw(st.binary(min_size=size, max_size=size + 5)))
-        if draw(st.integers(0, 4)):  # nearly always alike
+        if draw(st.integers(0, 4)):  # most messages match
             other[:size] = bytes(a if hidden else b for a, hidden, b in zip(first, mask, other, strict=False))
         rest.append(bytes(other[: draw(st.integers(size - 1, len(other)))] if not draw(st.integers(0, 9)) else other))
     copied = draw(st.lists(st.integers(0, size - WORD), max_size=5))
@@ -27,7 +27,7 @@ def messages(draw):
 
 @settings(deadline=None)  # the first example compiles
 @given(messages())
-def test_words_are_copied_where_every_message_is_alike(given_messages):
+def test_words_are_copied_if_every_message_matches_the_template(given_messages):
     first, mask, rest, copied, shift = given_messages
     every = [first, *rest]
     data = np.frombuffer(b"".join(every), np.uint8)
@@ -35,8 +35,8 @@ def test_words_are_copied_where_every_message_is_alike(given_messages):
     start = np.cumsum(length) - length
     compared = compared_words(np.frombuffer(mask, np.uint8), np.frombuffer(first, np.uint8))
     n, k = len(every), len(copied)
-    taken = np.zeros(n * k, np.uint64)
-    alike = take_alike(
+    out = np.zeros(n * k, np.uint64)
+    all_match = copy_uniform(
         words_of(data),
         start,
         length,
@@ -47,31 +47,31 @@ def test_words_are_copied_where_every_message_is_alike(given_messages):
         8 * np.array(shift, np.uint64),
         np.arange(k) * n,
         np.ones(k, np.int64),
-        taken,
+        out,
     )
     expected = all(
         0 <= len(each) - len(first) <= 2 and all(a == b for a, b, bits in zip(each, first, mask, strict=False) if bits)
         for each in every
     )
-    assert alike == expected
-    if alike:
+    assert all_match == expected
+    if all_match:
         words = [
             int.from_bytes(each[at + up : at + WORD], "little")
             for at, up in zip(copied, shift, strict=True)
             for each in every
         ]
-        assert taken.tolist() == words
+        assert out.tolist() == words
 
 
-def test_every_byte_of_a_mask_is_compared_and_no_other():
+def test_exactly_the_bytes_of_the_mask_are_compared():
     rng = np.random.default_rng(4)
     for size in range(WORD, 40):
         mask = np.where(rng.random(size) < 0.2, 255, 0).astype(np.uint8)
         content = rng.integers(0, 256, size, dtype=np.uint8)
-        places, bits, pattern = compared_words(mask, content)
-        seen = np.zeros(size, np.uint8)
-        for at, each, wanted in zip(places.astype(int), bits, pattern, strict=True):
+        offsets, bits, pattern = compared_words(mask, content)
+        covered = np.zeros(size, np.uint8)
+        for at, each, wanted in zip(offsets.astype(int), bits, pattern, strict=True):
             assert at + WORD <= size
-            seen[at : at + WORD] |= np.frombuffer(each.tobytes(), np.uint8)
+            covered[at : at + WORD] |= np.frombuffer(each.tobytes(), np.uint8)
             assert wanted.tobytes() == content[at : at + WORD].tobytes()
-        assert np.array_equal(seen, mask)
+        assert np.array_equal(covered, mask)

@@ -1,4 +1,4 @@
-"""Where channels have lost samples: missing values, and samples that have not come when they were due."""
+"""Lost samples of channels: missing values, and samples that did not arrive when due."""
 
 from __future__ import annotations
 
@@ -6,34 +6,34 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cdtool.clock.coarse import RECENT_STEPS, recent_medians
+from cdtool.clock.coarse_clock import RECENT_STEPS, recent_medians
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
-# A channel is late where its newest sample is older than this many of its longest usual steps.
+# A channel is late if its newest sample is older than this many times its longest usual step.
 _LATE = 1.5
-# A step longer than this many medians is no usual one: it holds lost samples itself.
+# A step longer than this many times the median is not a usual one: samples are missing within it.
 _USUAL = 2.0
-# A channel shares its clock where so many of the clock's last samples were its own, too.
+# A channel shares a clock if it has samples at this share of the clock's last 20 samples.
 _SHARED_WINDOW, _SHARED_SHARE = 20, 0.75
 
 
 def lost_samples(recording: Recording, channels: Iterable[str], clock: FloatArray) -> BoolArray | None:
-    """Return where on `clock` (n,) [s] a sample of one of `channels` was lost: (n, J), or None where none was.
+    """Return at which times of `clock` (n,) [s] a sample of one of `channels` is lost (n, J); None if no sample is.
 
-    A sample is lost where the channel's newest value is NaN, where a channel that shares the clock has no sample of
-    its own, and where a channel with a clock of its own is late: its newest sample is older than 1.5 of the longest of
-    its last 9 steps. Before its first sample a channel has lost nothing. Causal: a later sample changes nothing.
+    A sample is lost if the channel's newest value is NaN, if a channel that shares the clock has no sample at that
+    time, or if a channel with its own clock is late: its newest sample is older than 1.5 times the longest of its last
+    9 steps. Before the first sample of a channel, none is lost. The result is causal.
     """
     lost: BoolArray | None = None
     for name in channels:
         if name in recording and len(recording[name]):
-            of_channel = _lost(recording[name], clock)
+            of_channel = _lost_in_channel(recording[name], clock)
             if of_channel.any():
                 lost = of_channel if lost is None else lost | of_channel
     return lost
 
 
-def _lost(series: Series, clock: FloatArray) -> BoolArray:
+def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray:
     missing: BoolArray = ~np.isfinite(series.values)
     if len(series.time) == len(clock) and np.array_equal(series.time, clock):
         return missing
@@ -46,7 +46,7 @@ def _lost(series: Series, clock: FloatArray) -> BoolArray:
 
 
 def _longest_usual_step(time: FloatArray) -> FloatArray:
-    """At each sample (n,) the longest of its last 9 steps [s] that hold no lost sample; infinite at the first."""
+    """Return, at each sample, the longest usual step [s] of the last 9; infinite at the first sample."""
     longest = np.full(len(time), np.inf)
     if len(time) > 1:
         steps = np.diff(time)
@@ -57,7 +57,7 @@ def _longest_usual_step(time: FloatArray) -> FloatArray:
 
 
 def _shares_clock(age: FloatArray) -> BoolArray:
-    """Whether most of the samples of the clock before each one (n,) were the channel's own."""
+    """Return where most of the preceding times of the clock were samples of the channel (n,)."""
     own = np.concatenate(([0.0], np.cumsum(age == 0.0)))
     index = np.arange(len(age))
     before = own[index] - own[np.maximum(index - _SHARED_WINDOW, 0)]

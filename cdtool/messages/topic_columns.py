@@ -1,6 +1,6 @@
-"""The wanted fields of a topic, gathered batch by batch into columns.
+"""The wanted fields of a topic, collected batch by batch into columns in memory.
 
-Arrays grow by batches, without a copy where their length was expected; others may write rows of their own into them.
+Arrays grow by batches, without a copy as long as the expected length suffices. The fast path writes rows into them.
 """
 
 from __future__ import annotations
@@ -18,23 +18,22 @@ from cdtool.columns import Column
 from cdtool.findings import Finding
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
+from cdtool.messages.fast_path import Binding, Destination, WrittenRows
 from cdtool.messages.stream import Stream
-from cdtool.messages.taken import Bound, Destination, Part
-from cdtool.messages.topic import Topic, Values, in_order
+from cdtool.messages.topic import Topic, Values, sort_times
 from cdtool.recording import FloatArray
 
-# An expected length is no more than a hint: this much is reserved at most [bytes].
+# An expected length is only a hint, as the file may be damaged: at most this much is reserved [bytes].
 _MOST_RESERVED = 1 << 28
-# How often an array that others write into is replaced: each time it is copied.
+# A shared array is replaced at most this often, as each time it is copied.
 _MOST_REPLACED = 16
 
 
 class Rows:
-    """(n,) or (n, k) values; what does not fit the first batch's k is NaN.
+    """Values (n,) or (n, k), appended batch by batch; rows whose width differs from the first batch's k are NaN.
 
-    Others may write into rows behind the last one, each into rows of their own: `share` gives them the array,
-    `confirm` tells that some are there. As nobody knows who is still writing, what is appended otherwise goes into a
-    copy of it from then on.
+    Other threads may write into rows after the last one, each into rows of its own: `share` returns the array for them,
+    and `confirm` adds the rows written. As a thread may still be writing, the array is copied before the next `append`.
     """
 
     def __init__(self, expected: int, dtype: npt.DTypeLike = np.float64) -> None:
@@ -46,7 +45,7 @@ class Rows:
         self.count = 0
 
     def append(self, values: npt.NDArray[Any]) -> None:
-        """Add a batch's rows."""
+        """Append the rows of a batch."""
         if self._table is None:
             width = int(np.prod(values.shape[1:])) * values.itemsize  # bytes of a row
             rows = min(self._expected, _MOST_RESERVED // max(1, width))
@@ -63,24 +62,24 @@ class Rows:
         self.count = end
 
     def share(self, shape: tuple[int, ...]) -> npt.NDArray[Any] | None:
-        """The array, so that others write rows of this shape into it; None where it has none of them."""
+        """Return the array for other threads to write rows of `shape` into; None if its rows have another shape."""
         if self._table is None or self._table.shape[1:] != shape or self._replaced > _MOST_REPLACED:
             return None
         self._shared = True
         return self._table
 
     def confirm(self, table: npt.NDArray[Any], rows: slice) -> None:
-        """Add these rows of an array that was shared, at some time."""
+        """Add rows of a shared array, which may have been replaced since."""
         present = self._table
         if present is None or rows.start != self.count or rows.stop > len(present):
             self.append(table[rows])
             return
-        if table is not present:  # of the present one nobody else has these rows
+        if table is not present:  # no other thread writes into these rows of the present array
             present[rows] = table[rows]
         self.count = int(rows.stop)
 
     def widen(self, width: int) -> None:
-        """Give rows that were all empty so far their width."""
+        """Set the width of rows that have all been empty so far."""
         if self._table is not None and self._table.shape[1:] != (width,):
             self._table = np.full((len(self._table), width), np.nan)
 
@@ -91,15 +90,15 @@ class Rows:
 
 
 class _FieldRows:
-    """One field's values of all decoded messages; `elsewhere` marks those that name other joints only."""
+    """One field's values of all decoded messages; `elsewhere` marks messages that name other joints only."""
 
     def __init__(self, expected: int) -> None:
         self.rows = Rows(expected)
         self.elsewhere: Rows | None = None
-        self.exact = False  # its numbers' type is one that float64 holds
+        self.exact = False  # float64 represents every number of its type
 
     def append(self, count: int, values: Values, width: int | None) -> None:
-        """Add a batch's rows, whose arrays have this width; None: all so far are empty."""
+        """Append a batch's rows, whose arrays have this width; None: all arrays so far are empty."""
         rows, other = values
         if width is not None:
             self.rows.widen(width)
@@ -110,13 +109,13 @@ class _FieldRows:
         self.mark(count, other)
 
     def mark(self, count: int, other: npt.NDArray[np.bool_] | None = None) -> None:
-        """Add which of the next rows name other joints only; None: none of them does."""
+        """Append which of the next rows name other joints only; None: none of them does."""
         if self.elsewhere is not None:
             self.elsewhere.append(np.zeros(count, np.bool_) if other is None else other)
 
 
-class Gathering(Topic):
-    """A topic whose rows are kept in memory; `expected` hints how many messages of a topic there will be."""
+class TopicColumns(Topic):
+    """A topic whose columns are in memory; `expected` is an estimate of the number of messages by topic."""
 
     def __init__(
         self,
@@ -129,35 +128,35 @@ class Gathering(Topic):
     ) -> None:
         super().__init__(path, topic, texts, clock, joints)
         self._rows = {text: _FieldRows(expected.get(topic, 0)) for text in self.fields}
-        # A header's stamp may lie before 1970.
+        # A header's stamp may be before 1970.
         self._stamps = Rows(expected.get(topic, 0), np.int64 if self.clock == "header" else np.uint64)
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
 
     def add(self, stream: Stream, batch: Batch) -> None:
-        """Take a batch; raises RecordingError where a field or the header's stamp is not there."""
-        taken = self.take(stream, batch)
-        if taken is not None:
-            stamps, values = taken
+        """Decode a batch and append its rows; raises RecordingError if a field or the header's stamp is missing."""
+        decoded = self.decode(stream, batch)
+        if decoded is not None:
+            stamps, values = decoded
             self._stamps.append(stamps)
             for text, rows in self._rows.items():
                 rows.append(len(stamps), values[text], self.fields[text].width)
 
-    def bound(self, channel: int) -> Bound:
-        """Return how more messages of the topic's channel (its id) become rows here; None where they do not."""
-        recipe = self.decoders.recipe(channel, self.wanted, self.joints, self.clock == "header")
-        if recipe is None:
+    def binding(self, channel: int) -> Binding:
+        """Return layout and columns for the fast path of a channel (by id); None if it cannot be used."""
+        row_layout = self.decoders.row_layout(channel, self.wanted, self.joints, self.clock == "header")
+        if row_layout is None:
             return None
         stamps, tables = self._stamps.share(()), []
-        for rows, numbers in zip(self._rows.values(), recipe.fields, strict=True):
+        for rows, numbers in zip(self._rows.values(), row_layout.fields, strict=True):
             tables.append(rows.rows.share(() if numbers.single else (len(numbers.at),)))
             rows.exact = numbers.dtype not in ("i8", "u8")
-        there = tuple(table for table in tables if table is not None)
-        if stamps is None or len(there) < len(tables) or any(each.elsewhere for each in self.fields.values()):
+        shared = tuple(table for table in tables if table is not None)
+        if stamps is None or len(shared) < len(tables) or any(each.elsewhere for each in self.fields.values()):
             return None
-        return recipe, Destination(there, stamps, self._stamps.count)
+        return row_layout, Destination(shared, stamps, self._stamps.count)
 
-    def confirm(self, stream: Stream, parts: Sequence[Part]) -> None:
-        """Take messages that were put into rows by `bound`."""
+    def confirm(self, stream: Stream, parts: Sequence[WrittenRows]) -> None:
+        """Add messages that the fast path wrote into rows, using the result of `binding`."""
         for part in _joined(parts):
             self.decoders.decoded += part.count
             self._stamps.confirm(part.destination.stamps, part.rows)
@@ -174,21 +173,21 @@ class Gathering(Topic):
         values = rows.rows.values
         rounded = 0 if rows.exact else rounded_integers(values)
         if rows.elsewhere is not None:
-            there = ~rows.elsewhere.values
-            values, (time, order) = values[there], in_order(self._stamps.values[there], self.origin)
+            present = ~rows.elsewhere.values
+            values, (time, order) = values[present], sort_times(self._stamps.values[present], self.origin)
         else:
             if self._clock is None:
-                self._clock = in_order(self._stamps.values, self.origin)
+                self._clock = sort_times(self._stamps.values, self.origin)
             time, order = self._clock
         column = replace(column, values=values if order is None else values[order], time=time)
         return column, [*findings, *rounding_finding(column.name, rounded)]
 
 
-def _joined(parts: Sequence[Part]) -> list[Part]:
-    """Return the same, those one behind the other as one."""
-    joined: list[Part] = []
+def _joined(parts: Sequence[WrittenRows]) -> list[WrittenRows]:
+    """Return the same rows, with adjacent parts joined."""
+    joined: list[WrittenRows] = []
     for part in parts:
-        together = joined[-1].before(part) if joined else None
+        together = joined[-1].joined(part) if joined else None
         if together is None:
             joined.append(part)
         else:

@@ -1,4 +1,4 @@
-"""Clocks that start again, wrap, stand still or have nothing in common: what is told of a log with them."""
+"""Findings on logs whose clocks restart, wrap, stand still or do not overlap."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from cdtool.findings import Finding
 from cdtool.findings.clocks import BackwardStamps, ClockRestart, ClocksApart
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.reading import read_recording
-from tests.ingest.test_channel_assembly import gate_columns, table, told
+from tests.ingest.test_channel_assembly import channels_and_facts, gate_columns, table
 
 
-def test_what_is_dropped_behind_a_clocks_restart_is_a_loss(log, machine):
+def test_rows_dropped_after_a_restart_of_the_clock_are_a_loss(log, machine):
     columns = gate_columns()
     columns["t"][40:] = 10.0 * np.arange(10)
-    found = [item for item in read_recording(log(table(columns)), machine()).findings if item.severity == "loss"]
+    losses = [item for item in read_recording(log(table(columns)), machine()).findings if item.severity == "loss"]
     restart = BackwardStamps(10, 50, (42, 43, 44), "line", ClockRestart())
-    assert found == [Finding(restart, "time", "loss")]
+    assert losses == [Finding(restart, "time", "loss")]
 
 
-def test_a_counters_wrap_is_told_in_what_the_file_counts(log, machine):
+def test_a_counters_wrap_is_reported_for_the_counter_in_the_file(log, machine):
     columns = gate_columns()
     columns["t"] = np.mod(65536.0 - 300.0 + 10.0 * np.arange(50), 65536.0)
-    facts = [fact for _, fact in told(read_recording(log(table(columns)), machine()))]
+    facts = [fact for _, fact in channels_and_facts(read_recording(log(table(columns)), machine()))]
     assert [fact.restart for fact in facts if isinstance(fact, BackwardStamps)] == [ClockRestart(wrapped_bits=16)]
 
 
@@ -37,7 +37,7 @@ def test_a_clock_that_stands_still_is_a_clear_error(log, machine):
 
 
 def two_topics(path, starts, stamps=40):
-    """Speed and torque whose headers' clocks start at these times [s]."""
+    """Write speed and torque whose header clocks start at these times [s]."""
     time = np.arange(stamps) / 100
     names = (("/drive", "velocity[0]"), ("/gripper", "effort[0]"))
     streams = [
@@ -56,7 +56,7 @@ torque = { topic = "/gripper", field = "effort[0]" }
 
 
 @pytest.mark.parametrize(("starts", "distance"), [((0.0, 100.0), 99.61), ((7e8, 0.0), 7e8), ((0.0, 0.3), 0.0)])
-def test_channels_whose_clocks_have_no_time_in_common_are_told_with_their_distance(tmp_path, machine, starts, distance):
+def test_channels_whose_times_do_not_overlap_are_reported_with_their_distance(tmp_path, machine, starts, distance):
     path = tmp_path / "run.mcap"
     two_topics(path, starts)
     findings = [
@@ -67,6 +67,6 @@ def test_channels_whose_clocks_have_no_time_in_common_are_told_with_their_distan
     assert all(item.fact == ClocksApart(pytest.approx(distance, rel=1e-6), before) for item in findings)
 
 
-def test_a_clock_that_runs_backward_throughout_is_counted_in_plain_figures():
-    (found,) = clean_time(np.arange(5000, 0, -1) * 1e-3).findings
-    assert isinstance(found.fact, BackwardStamps) and (found.fact.count, found.fact.rows) == (4999, 5000)
+def test_every_row_of_a_clock_that_runs_backward_is_counted():
+    (finding,) = clean_time(np.arange(5000, 0, -1) * 1e-3).findings
+    assert isinstance(finding.fact, BackwardStamps) and (finding.fact.count, finding.fact.rows) == (4999, 5000)

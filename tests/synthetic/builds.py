@@ -1,4 +1,4 @@
-"""Results of made-up builds: latencies that a test chooses, everything else as a benchmark would write it."""
+"""Results of fictitious builds: latencies chosen by the test, everything else as written by a benchmark."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from cdtool.evaluation.results import (
     Results,
 )
 
-MISSED, BLIND = "missed", "not_assessable"
+MISSED, NOT_ASSESSABLE = "missed", "not_assessable"
 Outcome = float | str
-"""A latency [ms], or what else became of the contact."""
+"""A latency [ms], or another outcome of the contact."""
 
 RULES = {
     "onset": "load cell above 20 N for 3 ms, followed back to 8 N",
@@ -37,7 +37,7 @@ SETTINGS = {
 ONSET, UNCERTAINTY = 5.0, 0.001
 
 
-def build(
+def build_results(
     outcomes: Mapping[tuple[str, str], Sequence[Outcome]],
     *,
     bytes_of: str = "run",
@@ -50,10 +50,11 @@ def build(
     holdout: Sequence[str] = (),
     **provenance: object,
 ) -> Results:
-    """One contact a recording for each (detector, group); a force at the alarm that grows with the latency.
+    """Return results with one contact per recording for each (detector, group).
 
-    `bytes_of` and `names` tell the recordings of two builds apart by hash and by name; `holdout` detectors watched 40
-    impact-free operations; every contact `begins` at that time [s]. `campaigns`: one a recording of every group.
+    The force at the alarm grows with the latency. `bytes_of` and `names` distinguish the recordings of two builds by
+    hash and by name. `holdout` detectors monitored 40 impact-free operations. Every contact `begins` at that time [s].
+    `campaigns` has one entry per recording of a group.
     """
     groups = list(dict.fromkeys(group for _, group in outcomes))
     detectors = list(dict.fromkeys([*(detector for detector, _ in outcomes), *holdout]))

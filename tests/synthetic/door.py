@@ -26,7 +26,7 @@ STROKE = 4.0
 
 
 def write_log(path: Path, strokes: int, contacts: dict[int, float], seed: int) -> None:
-    """Strokes forth and back at 0.25 m/s, 4 s each; contacts: stroke -> force that the drive has to overcome [N]."""
+    """Write strokes back and forth at 0.25 m/s, 4 s each; `contacts` are forces [N] on the drive by stroke number."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(strokes * STROKE / 1e-3)) * 1e-3
     phase = time % STROKE

@@ -1,4 +1,4 @@
-"""Messages without tags, walked one after another: where the wanted places are in each."""
+"""Messages without tags, walked one after another to locate the wanted members in each."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import walk_kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
-from cdtool.messages.columns.slots import Found
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
+from cdtool.messages.columns.member_locations import MemberLocations
 from cdtool.messages.columns.walk_program import Program
 from cdtool.messages.layouts.layout import Number
 from cdtool.recording import FloatArray
 
 
 @dataclass(frozen=True)
-class WalkedSlot:
-    """Numbers of one type in the messages themselves: those of message i begin at byte `at[i] + offset`.
+class SequentialSlot:
+    """A slot of numbers of one type in the file's bytes: those of message i begin at byte `at[i] + offset`.
 
-    `swapped` (n,): the message is big-endian; None: none is. Either all have `uniform` numbers, or message i
-    `counted[i]`.
+    Either all messages have `uniform` numbers, or message i has `counted[i]`. `swapped` (n,) marks big-endian messages;
+    None: no message is big-endian.
     """
 
     data: ByteArray
@@ -34,18 +34,18 @@ class WalkedSlot:
 
     @property
     def count(self) -> IntArray:
-        """(n,)."""
+        """The number of elements (n,)."""
         return np.full(len(self.at), self.uniform) if self.counted is None else self.counted
 
     def numbers(self, rows: IntArray | None, first: int, width: int) -> FloatArray:
-        """(rows, width) float64; an int64 beyond 2^53 is rounded to the nearest."""
+        """Return (rows, width) float64; an int64 beyond 2^53 is rounded to the nearest."""
         if self.kind is None:
-            raise TypeError("texts and messages are no numbers")
+            raise TypeError("strings and messages are not numbers")
         at = self.at if rows is None else self.at[rows]
         size, name = self.kind.size, self.kind.name
-        found = np.empty((len(at), width * size), dtype=np.uint8)
-        walk_kernel.fetch(self.data, at, self.offset + first * size, found)
-        raw = found.view(f"<{self.kind.dtype}")
+        fetched = np.empty((len(at), width * size), dtype=np.uint8)
+        walk_kernel.fetch(self.data, at, self.offset + first * size, fetched)
+        raw = fetched.view(f"<{self.kind.dtype}")
         if name == "bool":
             raw = raw != 0
         elif self.swapped is not None:
@@ -55,8 +55,8 @@ class WalkedSlot:
 
 
 @dataclass(frozen=True)
-class WalkedNames:
-    """Arrays of texts that lie in the messages from byte `begin[i]` to `end[i]`; `body`: alignment's origin."""
+class SequentialNames:
+    """String arrays in the file's bytes, of message i from `begin[i]` to `end[i]`; alignment counts from `body`."""
 
     data: ByteArray
     begin: IntArray
@@ -67,23 +67,23 @@ class WalkedNames:
     swapped: ByteArray
     _read: dict[tuple[int, int, bool, bytes], tuple[str, ...]] = field(default_factory=dict)
 
-    def alike(self, rows: IntArray) -> bool:
-        """False where there is more than one message: others have to be read."""
+    def are_equal(self, rows: IntArray) -> bool:
+        """Return False for more than one message: their strings would have to be read first."""
         return len(rows) == 1
 
     def of(self, row: int) -> tuple[str, ...]:
-        """The texts, without their closing NUL."""
+        """Return the strings of one message, without their closing NUL."""
         if self.count[row] < 0:
             return ()
         block = self.data[self.begin[row] : self.end[row]].tobytes()
         phase = int(self.begin[row] - self.body[row]) % 4 if self.aligned else 0
         key = (int(self.count[row]), phase, bool(self.swapped[row]), block)
         if key not in self._read:
-            self._read[key] = tuple(_texts(*key, self.aligned))
+            self._read[key] = tuple(_strings(*key, self.aligned))
         return self._read[key]
 
 
-def _texts(count: int, phase: int, big: bool, block: bytes, aligned: bool) -> Iterator[str]:
+def _strings(count: int, phase: int, big: bool, block: bytes, aligned: bool) -> Iterator[str]:
     at = 0
     for _ in range(count):
         at += -(at + phase) % 4 if aligned else 0
@@ -93,20 +93,20 @@ def _texts(count: int, phase: int, big: bool, block: bytes, aligned: bool) -> It
         at += 4 + size
 
 
-def walk_all(program: Program, batch: Batch, header: int) -> Found:
-    """The places of all messages, one after another; `status` is walk_kernel's."""
-    walked = Walked(program, batch, header, 0)
-    swapped = walked.swapped if walked.swapped.any() else None
+def locate_all(program: Program, batch: Batch, header: int) -> MemberLocations:
+    """Locate the members of all messages, one after another; `status` is that of walk_kernel."""
+    walk = SequentialWalk(program, batch, header, 0)
+    swapped = walk.swapped if walk.swapped.any() else None
     slots = {
-        place: WalkedSlot(batch.data, walked.at[:, slot], 0, kind, counted=walked.count[:, slot], swapped=swapped)
-        for place, (slot, kind) in program.places.items()
+        path: SequentialSlot(batch.data, walk.at[:, slot], 0, kind, counted=walk.count[:, slot], swapped=swapped)
+        for path, (slot, kind) in program.members.items()
     }
-    names = {place: walked.names(slot, batch) for place, (slot, kind) in program.places.items() if kind is None}
-    return Found(walked.status, "", slots, names)
+    names = {path: walk.names(slot, batch) for path, (slot, kind) in program.members.items() if kind is None}
+    return MemberLocations(walk.status, "", slots, names)
 
 
-class Walked:
-    """The walk over messages: `at`, `count` (n, slots), up to so many `lengths` (walk_kernel.walk)."""
+class SequentialWalk:
+    """The result of walk_kernel.walk over messages: `at`, `count` (n, slots), and at most `lengths` lengths."""
 
     def __init__(self, program: Program, batch: Batch, header: int, lengths: int) -> None:
         n = len(batch.start)
@@ -131,9 +131,9 @@ class Walked:
         )
         self.count[self.status != walk_kernel.WHOLE] = -1
 
-    def names(self, slot: int, batch: Batch) -> WalkedNames:
-        """The texts of a slot, empty where it is none of texts."""
-        return WalkedNames(
+    def names(self, slot: int, batch: Batch) -> SequentialNames:
+        """Return the strings of a slot; empty if it is not a slot of strings."""
+        return SequentialNames(
             batch.data,
             self.at[:, slot],
             self.at[:, slot + 1],

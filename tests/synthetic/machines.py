@@ -1,4 +1,4 @@
-"""The axis and the planar arm of known parameters that many tests share."""
+"""The axis and the planar arm with known parameters that many tests use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GATE = {
 
 
 def machine_of(values: dict[str, object]) -> LinearAxis:
-    """A linear axis from the keys of its [machine] table."""
+    """Return a linear axis from the keys of its [machine] table."""
     machine = LinearAxis.from_table(Table(values, "machine.toml", "machine."))
     assert isinstance(machine, LinearAxis)
     return machine
@@ -35,5 +35,5 @@ ARM = {
 
 
 def arm_of(values: dict[str, object]) -> PlanarArm:
-    """A planar arm from the keys of its [machine] table."""
+    """Return a planar arm from the keys of its [machine] table."""
     return PlanarArm.from_table(Table(values, "machine.toml", "machine."))

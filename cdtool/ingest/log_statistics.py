@@ -1,4 +1,4 @@
-"""Figures of a log that is read once, piece by piece: they take the same memory however long it is."""
+"""Statistics of a log that is read once, piece by piece; the memory they need does not depend on its length."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from cdtool.recording import FloatArray
 
 
 @dataclass
-class ColumnFigures:
-    """A column's values so far: how many are finite, their extremes; of a table's column also its steps.
+class ColumnStatistics:
+    """A column's values so far: the count of finite ones, their extremes, and for a column of a table its steps.
 
-    `steps` are those between finite values, `forward` of them do not go back; `by_one`: each is 1 and no value missing.
+    `steps` counts the steps between finite values, `forward` those that are not negative. `by_one`: every step is 1 and
+    no value is missing.
     """
 
     present: int = 0
@@ -33,7 +34,7 @@ class ColumnFigures:
     last: float = np.nan
 
     def add(self, values: FloatArray, in_table: bool) -> None:
-        """Take the rows of a piece."""
+        """Add the rows of a piece."""
         numbers = values.ravel()
         present = numbers[np.isfinite(numbers)]
         if in_table and values.ndim == 1:
@@ -53,8 +54,8 @@ class ColumnFigures:
 
 
 @dataclass
-class ClockFigures:
-    """A clock's times so far [s]; `digest` tells clocks apart that are not the same to the bit."""
+class ClockStatistics:
+    """A clock's times so far [s]; clocks with the same `digest` are equal to the bit."""
 
     rows: int = 0
     first: float = np.nan
@@ -65,7 +66,7 @@ class ClockFigures:
     digest: Any = field(default_factory=lambda: hashlib.blake2b(digest_size=16))
 
     def add(self, time: FloatArray | None, rows: int) -> None:
-        """Take the times of a piece."""
+        """Add the times of a piece."""
         if time is not None and rows:
             steps = np.diff(time) if self.rows == 0 else np.diff(time, prepend=self.last)
             self.steps.add(steps[np.isfinite(steps)])
@@ -80,22 +81,22 @@ class ClockFigures:
 
     @property
     def rate(self) -> float | None:
-        """Samples a second by the median step [Hz]; None where there is none."""
+        """The sample rate from the median step [Hz]; None if there is no step."""
         period = self.steps.median
         return 1.0 / period if period > 0.0 else None
 
 
-class LogFigures:
-    """A log's `source` (its columns without rows), and figures: of each column, and of its clock (`clock_of`).
+class LogStatistics:
+    """A log's `source` (its columns without rows), and the statistics of each column and of its clock (`clock_of`).
 
-    `read` opens the log, for some of its columns or all. `in_order`: rows are to be in the order of their times, as
-    messages of topics are, and not as they stand. `late` [s] is how long rows then wait for earlier ones (by_time).
+    `read` opens the log, for some of its columns or all. `in_order`: rows are sorted by their times, as for messages of
+    topics, instead of in the order of the file. `late` [s] is how long rows then wait for earlier ones (by_time).
     """
 
     def __init__(self, read: Callable[[Collection[str] | None], Pieces], in_order: bool) -> None:
         self._read, self.sorted = read, in_order
-        self.columns: dict[str, ColumnFigures] = {}
-        self.clocks: dict[str, ClockFigures] = {}
+        self.columns: dict[str, ColumnStatistics] = {}
+        self.clocks: dict[str, ClockStatistics] = {}
         self.clock_of: dict[str, str] = {}
         self.digests: dict[str, Any] = {}  # of columns of tables: one may be the clock of others
         lateness = Lateness()
@@ -106,36 +107,36 @@ class LogFigures:
                 lateness.add(piece.time)
         self.source: Source = run.source
         for name in self.source.columns.keys() - self.columns.keys():  # a table without a row
-            self.columns[name] = ColumnFigures()
+            self.columns[name] = ColumnStatistics()
         self.late = lateness.late
         if self.sorted and any(clock.lateness.late > 0.0 for clock in self.clocks.values()):
-            self._again_in_order()
+            self._repeat_in_order()
 
     def pieces(self, keys: Collection[str] | None = None) -> Iterator[Piece]:
-        """The log once more."""
+        """Read the log again."""
         return iter(PieceRun(self._read(keys)))
 
     def values_of(self, name: str) -> Iterator[FloatArray]:
-        """A column's values once more, piece by piece."""
+        """Read a column's values again, piece by piece."""
         return (piece.values[name] for piece in self.pieces([name]) if name in piece.values)
 
     def rows(self, name: str) -> int:
-        """How many rows a column has."""
+        """Return the number of rows of a column."""
         clock = self.clock_of.get(name)
         return 0 if clock is None else self.clocks[clock].rows
 
     def _add(self, piece: Piece) -> None:
-        self.clocks.setdefault(piece.clock, ClockFigures()).add(piece.time, piece.rows)
+        self.clocks.setdefault(piece.clock, ClockStatistics()).add(piece.time, piece.rows)
         for name, values in piece.values.items():
             self.clock_of.setdefault(name, piece.clock)
-            self.columns.setdefault(name, ColumnFigures()).add(values, piece.time is None)
+            self.columns.setdefault(name, ColumnStatistics()).add(values, piece.time is None)
             if piece.time is None and values.ndim == 1:
                 digest = self.digests.setdefault(name, hashlib.blake2b(digest_size=16))
                 digest.update(np.ascontiguousarray(values))
 
-    def _again_in_order(self) -> None:
-        """The clocks' figures in the order of their times, which the file does not keep."""
-        self.clocks = {clock: ClockFigures() for clock in self.clocks}
+    def _repeat_in_order(self) -> None:
+        """Compute the statistics of the clocks again in the order of their times, which is not that of the file."""
+        self.clocks = {clock: ClockStatistics() for clock in self.clocks}
         for ready in by_time(self.pieces(), dict.fromkeys(self.clocks, ()), self.late, sort=True):
             for clock, piece in ready.items():
                 self.clocks[clock].add(piece.time, piece.rows)

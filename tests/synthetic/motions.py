@@ -1,4 +1,4 @@
-"""Made-up but exact recordings of any machine: a smooth motion, the torque that it needs, and a contact."""
+"""Synthetic, exact recordings of any machine: a smooth motion, the torque it requires, and a contact."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdtool.recording import Recording, Series
 PERIOD = 1e-3
 
 
-def moving(
+def moving_recording(
     machine: Any,
     *,
     seconds: float = 6.0,
@@ -24,10 +24,11 @@ def moving(
     period: float = PERIOD,
     rest: float = 0.5,
 ) -> Recording:
-    """All joints swing after `rest` s at a standstill; from `contact_at` on the contact takes `contact` (J,) [N m].
+    """Return a recording in which all joints oscillate after `rest` s at standstill.
 
-    Torque, speed, position and acceleration are exact but for `noise`, a share of each channel's own spread: the motion
-    is as it is, and the drives give what it needs and what the contact takes.
+    From `contact_at` [s] on, the drives also apply the contact torque `contact` (J,) [N m], which does not change the
+    motion. Torque, speed, position and acceleration are exact except for `noise`, as a share of each channel's standard
+    deviation.
     """
     joints = len(machine.joints)
     rng = np.random.default_rng(seed)
@@ -35,7 +36,7 @@ def moving(
     rates, start = rng.uniform(0.8, 1.6, joints), rng.uniform(-0.5, 0.5, joints)
     phase = rates * np.maximum(time - rest, 0.0)[:, np.newaxis]
     sine, cosine = np.sin(phase), np.cos(phase)
-    # sin^3 leaves its rest with two derivatives that are 0.
+    # sin^3 starts from standstill with two derivatives of 0.
     position = start + amplitude * sine**3
     speed = 3.0 * amplitude * rates * sine**2 * cosine
     acceleration = 3.0 * amplitude * rates**2 * (2.0 * sine * cosine**2 - sine**3)
@@ -52,24 +53,26 @@ def moving(
         ("reference_position", position, units["position"]),
         ("reference_speed", speed, units["speed"]),
     ):
-        spoilt = values
+        measured = values
         if noise and not name.startswith("reference"):
-            spoilt = values + noise * values.std(axis=0) * rng.standard_normal(values.shape)
-        channels[name] = Series(time, spoilt, unit)
-    return Recording(f"moving{seed}", "made up", machine.joints, channels, digest=f"moving{seed}")
+            measured = values + noise * values.std(axis=0) * rng.standard_normal(values.shape)
+        channels[name] = Series(time, measured, unit)
+    return Recording(f"moving{seed}", "synthetic", machine.joints, channels, digest=f"moving{seed}")
 
 
-def standing(machine: Any, position: Sequence[float], torque: Sequence[float], seconds: float = 3.0) -> Recording:
-    """A machine at rest in a pose (J,) while its drives give a constant torque (J,)."""
+def resting_recording(
+    machine: Any, position: Sequence[float], torque: Sequence[float], seconds: float = 3.0
+) -> Recording:
+    """Return a recording of a machine at rest in a pose (J,), with a constant torque (J,) of the drives."""
     time = np.arange(round(seconds / PERIOD)) * PERIOD
-    nothing = np.zeros((len(time), len(machine.joints)))
+    zeros = np.zeros((len(time), len(machine.joints)))
     units = machine.load_units
-    pose = Series(time, nothing + np.asarray(position), units["position"])
+    pose = Series(time, zeros + np.asarray(position), units["position"])
     channels = {
-        "torque": Series(time, nothing + np.asarray(torque), units["torque"]),
+        "torque": Series(time, zeros + np.asarray(torque), units["torque"]),
         "position": pose,
         "reference_position": pose,
-        "speed": Series(time, nothing, units["speed"]),
-        "acceleration": Series(time, nothing, units["acceleration"]),
+        "speed": Series(time, zeros, units["speed"]),
+        "acceleration": Series(time, zeros, units["acceleration"]),
     }
-    return Recording("standing", "made up", machine.joints, channels)
+    return Recording("resting", "synthetic", machine.joints, channels)

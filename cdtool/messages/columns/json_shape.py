@@ -1,8 +1,8 @@
-"""The shape of a JSON message: what other messages must share to be read alike, and where in it a field's values stand.
+"""The shape of a JSON message: the text that messages of one shape share, and the indices of a field's values.
 
-Every number, true and false of one message is replaced by its place in the row of values (0, 1, 2, ...). What Python's
-json makes of that text holds places instead of numbers, and the field language, applied to it, tells a field's places
-in all messages of the shape: there are no second rules for JSON.
+Every number, true and false of one message is replaced by its index among the values (0, 1, 2, ...). Python's json
+module reads that text into an object with indices instead of numbers. The field language, applied to this object,
+returns a field's indices in all messages of the shape; JSON needs no rules of its own.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from cdtool.decimal_kernel import powers_of_five
 from cdtool.messages.columns import json_kernel as kernel
-from cdtool.messages.columns.gathered import ByteArray, IntArray
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 from cdtool.messages.fields import STAMPS, Field, FieldMissingError, numeric_fields
 
 _TOKEN = re.compile(rb'"((?:[^"\\]|\\.)*)"\s*(:)?|(-?\d[\d.eE+-]*|true|false)|[^"\d\-tf]+|.', re.DOTALL)
@@ -28,19 +28,19 @@ _MOST_TOKENS = 20_000
 
 @dataclass(frozen=True)
 class Resolved:
-    """A field in all messages of a shape: the `places` of its values, -1 being NaN.
+    """A field in all messages of a shape: the `indices` of its values, where -1 is NaN.
 
-    Without places it is absent for the reason `fault`, or belongs to other joints, or is NaN or an empty array.
+    Without indices the field is absent for the reason `fault`, belongs to other joints, or is NaN or an empty array.
     """
 
-    places: tuple[int, ...]
+    indices: tuple[int, ...]
     other_joints: bool = False
     fault: FieldMissingError | None = None
 
 
 @dataclass
-class JsonPattern:
-    """Messages of one shape; `content` is what Python's json reads, with the place of each value instead of it."""
+class JsonShape:
+    """The shape of JSON messages; `content` is the object read by Python, with indices in place of values."""
 
     literals: ByteArray
     tokens: IntArray
@@ -48,22 +48,22 @@ class JsonPattern:
     _resolved: dict[tuple[Field, tuple[str, ...]], Resolved] = field(default_factory=dict)
 
     def resolve(self, wanted: Field, joints: Sequence[str]) -> Resolved:
-        """Where the field's values stand."""
+        """Return the indices of a field's values."""
         key = wanted, tuple(joints)
         if key not in self._resolved:
             self._resolved[key] = _resolve(self.content, wanted, joints)
         return self._resolved[key]
 
     def stamp(self) -> tuple[int, int] | None:
-        """The places of the header stamp's seconds and nanoseconds; None where they are not numbers."""
+        """Return the indices of the header stamp's seconds and nanoseconds; None if they are not numbers."""
         for names in STAMPS:
             pair = tuple(self._member("header", "stamp", name) for name in names)
             if all(value is not None for value in pair):
-                return pair if all(isinstance(place, int) for place in pair) else None
+                return pair if all(isinstance(index, int) for index in pair) else None
         return None
 
     def has_stamp(self) -> bool:
-        """True if the header has a stamp, of whatever kind."""
+        """Return True if the header has a stamp, of whatever type."""
         return self._member("header", "stamp") is not None
 
     def _member(self, *names: str) -> Any:
@@ -73,25 +73,25 @@ class JsonPattern:
         return value
 
     def fields(self) -> list[str]:
-        """The numeric fields."""
+        """Return the numeric fields."""
         return list(numeric_fields(self.content))
 
     def read(
-        self, data: ByteArray, start: IntArray, length: IntArray, places: IntArray
+        self, data: ByteArray, start: IntArray, length: IntArray, indices: IntArray
     ) -> tuple[ByteArray, npt.NDArray[np.float64]]:
-        """Which messages fit (n,), as the kernel says it, and their values at `places` (n, k)."""
+        """Return which messages match (n,), as codes of the kernel, and their values with `indices` (n, k)."""
         tokens = self.tokens.copy()
         values = np.flatnonzero(tokens[:, 2] == kernel.VALUE)
-        tokens[values[places], 3] = np.arange(len(places))
-        bits = np.empty((len(start), len(places)), dtype=np.uint64)
-        fits = np.empty(len(start), dtype=np.uint8)
+        tokens[values[indices], 3] = np.arange(len(indices))
+        bits = np.empty((len(start), len(indices)), dtype=np.uint64)
+        matches = np.empty(len(start), dtype=np.uint8)
         words = np.ndarray((max(0, len(data) - 7),), np.uint64, data, strides=(1,))
-        kernel.read_alike(data, words, start, length, self.literals, tokens, powers_of_five(), bits, fits)
-        return fits, bits.view(np.float64)
+        kernel.read_matching(data, words, start, length, self.literals, tokens, powers_of_five(), bits, matches)
+        return matches, bits.view(np.float64)
 
 
-def pattern_of(content: bytes) -> JsonPattern | None:
-    """The shape of a message that Python's json reads; None where it has none that others could share."""
+def learn_shape(content: bytes) -> JsonShape | None:
+    """Return the shape of a JSON message; None if it has too many tokens or an infinite number."""
     literals, pending, rebuilt = bytearray(), bytearray(), bytearray()
     rows: list[tuple[int, int, int, int]] = []
     values = 0
@@ -131,7 +131,7 @@ def pattern_of(content: bytes) -> JsonPattern | None:
     except (ValueError, RecursionError):
         return None
     tokens = np.array(rows, dtype=np.int64).reshape(-1, 4)
-    return JsonPattern(np.frombuffer(bytes(literals), dtype=np.uint8).copy(), tokens, shape)
+    return JsonShape(np.frombuffer(bytes(literals), dtype=np.uint8).copy(), tokens, shape)
 
 
 def _not_a_number(name: str) -> float:
@@ -148,5 +148,5 @@ def _resolve(content: dict[str, Any], wanted: Field, joints: Sequence[str]) -> R
     if value is None:
         return Resolved((), other_joints=True)
     if isinstance(value, list):
-        return Resolved(tuple(-1 if math.isnan(place) else int(place) for place in value))
+        return Resolved(tuple(-1 if math.isnan(index) else int(index) for index in value))
     return Resolved(() if math.isnan(value) else (int(value),))

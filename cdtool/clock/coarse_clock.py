@@ -1,4 +1,4 @@
-"""The times of samples whose clock is coarser than they are: 1 kHz under stamps of 10 ms, say."""
+"""The times of samples whose clock is coarser than the sample period, for example 1 kHz with stamps every 10 ms."""
 
 from __future__ import annotations
 
@@ -9,30 +9,31 @@ import numpy as np
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
-# The stamp step, and the period of samples, are medians of this many steps before: the rate so far, not a later one.
+# The stamp step and the sample period are medians of this many preceding steps, so that they are causal.
 RECENT_STEPS = 9
-# A stamp step longer than this many usual ones holds a pause.
+# A stamp step longer than this many usual ones contains a pause.
 _PAUSE = 1.5
-# After so many changes of the stamp the fit has mostly forgotten one: sample clock and stamp clock drift.
+# Time constant of the fit in stamp changes: the fit must follow the drift between sample clock and stamp clock.
 _MEMORY = 100.0
-# A sample of which the line says that its stamp should have changed so many stamp steps ago is one of a stuck clock.
+# The clock is stuck if, by the line, the stamp should have changed more than this many stamp steps ago.
 _STUCK = 1.0
-# Where the line goes back, times go on by this share of a period until it has come up with them.
+# If the line steps back, times advance by this share of a period until the line has caught up.
 _CREEP = 0.5
 
 
-def line_through(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Times (n,) [s] of stamps (n,) [s] that never decrease and of which two differ at least; and those that are kept.
+def fit_line(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return the times (n,) [s] of the samples of a coarse clock, and which samples are kept (n,).
 
-    A stamp is the last tick of its clock, so that its first sample lies at most one period behind it. The times are the
-    line through (index, stamp) of the first samples of the stamps so far: least squares, recursive, with the weight
-    1 - 1/100 from one change of the stamp to the next. The line restarts where it is off by more than a stamp step
-    (the median of the last 9): after a pause with its slope, else with a new one. A sample lies within a stamp step
-    of the line where the stamp changes, and never more than two from its stamp: what would is not kept, its clock is
-    stuck. With a clock that rounds, all times are half a stamp step late.
+    `stamps` (n,) [s] never decrease, and at least two of them differ. A stamp is the last tick of its clock, so the
+    first sample with a new stamp is at most one period after the tick. The times are on the line through (index, stamp)
+    of these first samples: recursive least squares with a forgetting factor of 1 - 1/100 per stamp change. The line
+    restarts if its error exceeds a stamp step (median of the last 9): after a pause with the same slope, otherwise with
+    a new one. A sample is within a stamp step of the line where the stamp changes, and at most two stamp steps from its
+    stamp; beyond that the clock is stuck and the sample is not kept. If the clock rounds instead of truncating, all
+    times are half a stamp step late.
 
-    Where nothing before gives a time, what comes next does: the start of the log is placed by the next two changes of
-    the stamp, the samples of the first stamp after a pause by the next change. No other time depends on a later stamp.
+    Times are causal with two exceptions, where no earlier stamp determines them: the start of the log depends on the
+    next two stamp changes, and the samples of the first stamp after a pause on the next one.
     """
     changes = np.flatnonzero(np.diff(stamps) > 0.0) + 1
     first = np.concatenate(([0], changes))
@@ -47,7 +48,7 @@ def line_through(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
 
 
 def recent_medians(steps: FloatArray, before: float) -> FloatArray:
-    """(n,) at each step the median of the last 9 up to it; the steps before the first are taken to be `before`."""
+    """Return the median of the last 9 steps at each step (n,); steps before the first are assumed to be `before`."""
     padded = np.concatenate((np.full(RECENT_STEPS - 1, before), steps))
     medians: FloatArray = np.median(np.lib.stride_tricks.sliding_window_view(padded, RECENT_STEPS), axis=1)
     return medians
@@ -55,7 +56,7 @@ def recent_medians(steps: FloatArray, before: float) -> FloatArray:
 
 @kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY})")
 def _first_period(stamps: FloatArray, counts: FloatArray, step: FloatArray) -> float:
-    """The sample period of the first stamps: the log may begin within one, which then has too few samples."""
+    """Return the sample period from the first stamps, where the log may begin within a stamp, with too few samples."""
     period = math.inf
     for i in range(min(2, len(stamps) - 1)):
         if stamps[i + 1] - stamps[i] <= _PAUSE * step[0]:
@@ -67,7 +68,7 @@ def _first_period(stamps: FloatArray, counts: FloatArray, step: FloatArray) -> f
 
 @kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64, float64)")
 def _anchor(stamps: FloatArray, counts: FloatArray, step: FloatArray, i: int, period: float) -> float:
-    """The time of the first sample of stamp i where a line begins: counted back from the next change of the stamp."""
+    """Return the time of the first sample of stamp i at the start of a line, counted back from the next change."""
     if i + 1 == len(stamps) or stamps[i + 1] - stamps[i] > _PAUSE * step[i]:
         return float(stamps[i])
     return float(min(max(stamps[i + 1] - counts[i] * period, stamps[i]), stamps[i] + step[i]))
@@ -75,10 +76,10 @@ def _anchor(stamps: FloatArray, counts: FloatArray, step: FloatArray, i: int, pe
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64[:])")
 def _follow(stamps: FloatArray, counts: FloatArray, step: FloatArray, time: FloatArray) -> None:
-    """Recursive least squares over the changes of the stamp; `time` stays NaN where a sample is not kept.
+    """Fill `time` by recursive least squares over the stamp changes; it stays NaN where a sample is not kept.
 
-    The covariance (a, b; b, c) of the line's value and slope is in units of the variance of one change, which lies
-    anywhere within a period.
+    The covariance (a, b; b, c) of the line's value and slope is in units of the variance of one stamp change, which is
+    uniformly distributed over a period.
     """
     period = _first_period(stamps, counts, step)
     value = _anchor(stamps, counts, step, 0, period)

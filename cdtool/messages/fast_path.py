@@ -1,0 +1,142 @@
+"""The fast path of reading: chunks whose messages all match a known layout are written straight into the columns.
+
+These types pass between the container, which reads chunks, the decoders, which know the layouts, and the columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.recording import FloatArray
+
+Words = npt.NDArray[np.uint64]
+# Whether a definition (opcode, content) has been read before.
+IsKnownDefinition = Callable[[int, bytes], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class MessageTemplate:
+    """What messages must share with a decoded one so that its byte offsets apply to them.
+
+    Their length is from `shortest` to `longest` bytes. In the words at the byte offsets `compared` (m,), the bits set
+    in `mask` are as in `pattern`. All words begin at least 8 bytes before `shortest`.
+    """
+
+    shortest: int
+    longest: int
+    compared: Words
+    mask: Words
+    pattern: Words
+
+
+@dataclass(frozen=True)
+class FieldOffsets:
+    """The numbers of one field: their byte offsets in a message, in the order of the column, and their type.
+
+    `dtype` is numpy's code without byte order; `?` is one byte that is not 0. `single`: the field is one number, not an
+    array.
+    """
+
+    at: tuple[int, ...]
+    dtype: str
+    single: bool
+
+
+@dataclass(frozen=True)
+class StampOffset:
+    """A header's time stamp: the byte offset of its seconds, followed by nanoseconds (uint32); both have 4 bytes."""
+
+    at: int
+    signed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RowLayout:
+    """How matching messages become rows: the wanted fields in order, and the `stamp` if the header's time is wanted."""
+
+    template: MessageTemplate
+    fields: tuple[FieldOffsets, ...]
+    stamp: StampOffset | None
+
+
+@dataclass(frozen=True, eq=False)
+class Destination:
+    """The columns of a topic: `tables` (n,) or (n, k), one per field, and `stamps` (n,) in ns; n may differ.
+
+    Rows before `first` already contain messages.
+    """
+
+    tables: tuple[FloatArray, ...]
+    stamps: npt.NDArray[Any]
+    first: int
+
+    @property
+    def free(self) -> range:
+        """The rows that may be written: those that all columns have."""
+        return range(self.first, min(len(table) for table in (*self.tables, self.stamps)))
+
+
+# The layout and the columns of a channel. None: its messages are only counted, or it has no layout.
+Binding = tuple[RowLayout, Destination] | None
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenRows:
+    """The rows of a destination that contain one channel's messages of one chunk.
+
+    `ascending`: their time stamps are in ascending order.
+    """
+
+    destination: Destination
+    rows: slice
+    ascending: bool
+
+    @property
+    def count(self) -> int:
+        """The number of messages."""
+        return int(self.rows.stop - self.rows.start)
+
+    def joined(self, other: WrittenRows) -> WrittenRows | None:
+        """Return these rows and the `other` ones as one; None if the others do not follow directly."""
+        if other.destination is not self.destination or other.rows.start != self.rows.stop:
+            return None
+        stamps, border = self.destination.stamps, self.rows.stop
+        ascending = self.ascending and other.ascending and bool(stamps[border - 1] <= stamps[border])
+        return WrittenRows(self.destination, slice(self.rows.start, other.rows.stop), ascending)
+
+
+@dataclass(frozen=True)
+class ChunkRows:
+    """A chunk read on the fast path: message counts and written rows by channel id, and log times [ns].
+
+    `times` are the earliest and the latest log time, `first_time` is that of the first message.
+    """
+
+    counts: Mapping[int, int]
+    parts: Mapping[int, WrittenRows]
+    times: tuple[int, int]
+    first_time: int
+
+
+class ChunkReader(Protocol):
+    """Reads chunks on the fast path; called by several threads at once."""
+
+    @property
+    def ready(self) -> bool:
+        """True if layouts are known."""
+        ...
+
+    def take(
+        self, content: npt.NDArray[np.uint8], rows: Mapping[int, range], knows: IsKnownDefinition
+    ) -> ChunkRows | None:
+        """Return all messages of a chunk; None if one does not match its layout, or a definition is not known.
+
+        `rows` are, by channel id, the expected row numbers of the chunk's messages among all messages of the channel,
+        as computed from the counts in the file's summary.
+        """
+        ...

@@ -1,1 +1,0 @@
-"""What many tests are made from: machines, motions, logs, results of builds. No tests."""

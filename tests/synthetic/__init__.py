@@ -1,0 +1,1 @@
+"""Synthetic machines, motions, logs and results of builds that many tests use. No tests."""
