@@ -25,6 +25,7 @@ from cdtool.findings.tables import (
     PinnedLinesSkipped,
     WordsAboveRows,
 )
+from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
 from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
 from cdtool.formats.csv.dialect import Dialect
@@ -49,6 +50,9 @@ _STRONG = "\t;|"
 _SHOWN_ENCODINGS = {"cp1252": "Windows-1252", "latin-1": "Latin-1"}
 _LOOKED = 200
 _MOST = 12
+# Dialects of the last tables: those of alike files are soon confirmed.
+_KNOWN: dict[tuple[object, ...], Dialect] = {}
+_MOST_KNOWN = 64
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
 _NO_VALUES = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
@@ -219,7 +223,28 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
 
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
+    """The dialect of a sample, footer and doubtful marks apart: by fewer of its rows where these show the same."""
     refuse_long_line(text, stream)
+    shorter = shorter_sample(text, stream, pins)
+    if shorter is None:
+        return _by_lines(path, text, stream, pins)
+    known = (text.encoding, pins, shorter.above, shorter.shape)
+    dialect = _KNOWN.get(known)
+    if dialect is None:
+        try:
+            dialect = shorter.whole(_by_lines(path, text, shorter.stream, pins))
+        except RecordingError:  # the whole sample has the line that it names
+            dialect = None
+        if dialect is None:
+            return _by_lines(path, text, stream, pins)
+        if len(_KNOWN) >= _MOST_KNOWN:
+            _KNOWN.clear()
+        _KNOWN[known] = dialect = replace(dialect, sampled=dialect.sampled - shorter.rows)
+    return replace(dialect, text=text, sampled=dialect.sampled + shorter.rows)
+
+
+def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
+    """The dialect by all lines of a sample."""
     lines = sort_lines(path, text, stream, pins)
     grid = cut_rows(path, lines, pins)
     head = grid.head
