@@ -12,7 +12,7 @@ from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
 from cdtool.formats.csv import find_dialect as finding
 from cdtool.formats.csv.alike_rows import shorter_sample
-from cdtool.formats.csv.encoding import find_text
+from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.text import SAMPLE_BYTES
 from tests.formats.csv_cases import cases
 
@@ -105,7 +105,7 @@ def assert_alike(path, content, pins=TablePins()):  # noqa: B008
     if not sample.strip():
         return
     try:
-        text, stream = find_text(path, sample, pins.encoding)
+        text, stream = detect_text(path, sample, pins.encoding)
     except RecordingError:
         return
     expected = outcome(lambda: by_all_rows(path, text, stream, pins))
@@ -136,7 +136,7 @@ def plain(rows=2000, head="t;a;b\n", row="{0}.5;{0};0.25\n"):
 def shorter(tmp_path, content):
     path = tmp_path / "plain.csv"
     path.write_bytes(content)
-    text, stream = find_text(path, content[:SAMPLE_BYTES])
+    text, stream = detect_text(path, content[:SAMPLE_BYTES])
     return shorter_sample(text, stream, TablePins())
 
 

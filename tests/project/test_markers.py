@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from types import ModuleType
 
 import pytest
 
@@ -33,10 +34,19 @@ def test_a_marker_follows_from_what_a_test_and_its_fixtures_use(function, marker
     assert markers_of("tests.project.marker_samples", function) == markers
 
 
-def test_what_a_test_imports_from_another_module_of_the_tests_counts_too():
-    # Pytest's own fixtures are not analysed, and for a module imported as a whole everything counts.
-    assert markers_of("tests.whole_runs.test_full_disk", "table") == frozenset()
-    assert markers_of("tests.project.test_markers", "marker_samples") == {"external", "browser"}
+def uses_another_module() -> object:
+    return marker_samples.starts_a_program()
+
+
+def names_a_module_that_it_does_not_use(script: ModuleType) -> object:
+    return script.subprocess
+
+
+def test_what_a_test_uses_of_another_module_of_the_tests_counts_too():
+    assert markers_of(__name__, "uses_another_module") == {"external"}
+    assert markers_of(__name__, "names_a_module_that_it_does_not_use") == frozenset()
+    # Pytest's own fixtures are not analysed.
+    assert markers_of("tests.project.marker_samples", "tmp_path") == frozenset()
     assert marker_samples.starts_nothing(ROOT) == ROOT
 
 
