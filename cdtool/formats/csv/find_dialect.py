@@ -25,6 +25,7 @@ from cdtool.findings.tables import (
     PinnedLinesSkipped,
     WordsAboveRows,
 )
+from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.ambiguous_marks import (
     refuse_commas_that_may_be_decimal,
     refuse_one_column_of_decimals,
@@ -49,6 +50,9 @@ _STRONG = "\t;|"
 _SHOWN_ENCODINGS = {"cp1252": "Windows-1252", "latin-1": "Latin-1"}
 _LOOKED = 200
 _MOST = 12
+# Dialects of the last tables: those of alike files are soon confirmed.
+_KNOWN: dict[tuple[object, ...], Dialect] = {}
+_MOST_KNOWN = 64
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
 _MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
@@ -220,7 +224,28 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
 
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
+    """The dialect of a sample, without footer and ambiguous marks: from fewer of its rows if these show the same."""
     refuse_long_line(text, stream)
+    shorter = shorter_sample(text, stream, pins)
+    if shorter is None:
+        return _by_lines(path, text, stream, pins)
+    known = (text.encoding, pins, shorter.above, shorter.shape)
+    dialect = _KNOWN.get(known)
+    if dialect is None:
+        try:
+            dialect = shorter.whole(_by_lines(path, text, shorter.stream, pins))
+        except RecordingError:  # the whole sample has the line that it names
+            dialect = None
+        if dialect is None:
+            return _by_lines(path, text, stream, pins)
+        if len(_KNOWN) >= _MOST_KNOWN:
+            _KNOWN.clear()
+        _KNOWN[known] = dialect = replace(dialect, sampled=dialect.sampled - shorter.rows)
+    return replace(dialect, text=text, sampled=dialect.sampled + shorter.rows)
+
+
+def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
+    """The dialect by all lines of a sample."""
     lines = classify_lines(path, text, stream, pins)
     grid = split_rows(path, lines, pins)
     head = grid.head

@@ -1,0 +1,183 @@
+"""The dialect of a table by some of its rows is that by all of them; and that of a file before is confirmed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.channels import TablePins
+from cdtool.errors import RecordingError
+from cdtool.formats.csv import find_dialect as finding
+from cdtool.formats.csv.alike_rows import shorter_sample
+from cdtool.formats.csv.encoding import detect_text
+from cdtool.formats.csv.text import SAMPLE_BYTES
+from tests.formats.csv_cases import cases
+
+HEADS = (
+    "",
+    "t,a,b,c\n",
+    "t;a;b;c\n",
+    "t\ta\tb\tc\n",
+    "t|a|b|c\n",
+    "time [s];torque [Nm];speed;position\n",
+    "t,a,b,c\ns,Nm,rad/s,m\n",
+    "# made by a bench\n# t,a,b,c\n",
+    "Bench 7\nOperator: X\n\nt;a;b;c\n[s];[Nm];[-];[mm]\n",
+    "sep=;\nt;a;b;c\n",
+    "0,1,2,3\n",
+    "1,2,3,4\n",
+    "t,1,2,3\n",
+    "t;a;b;c;\n",
+    "-----+-----\nt,a,b,c\n-----+-----\n",
+    "5;6;7;8\n9;1;2;3\nt;a;b;c\n",
+    "t,a,b,c\n0.0,1,x,3\n0.1,nan,2,?\n",
+)
+INTEGER = st.integers(-2000, 2000).map(str)
+POINT = st.floats(-1e4, 1e4, allow_nan=False).map(repr) | st.sampled_from(
+    ["1.234", "999.125", "0.500", ".5", "5.", "+1.5"]
+)
+COMMA = st.floats(-1e3, 1e3).map(lambda value: f"{value:.3f}".replace(".", ",")) | st.sampled_from(["1,5", "1,234"])
+RARE = st.sampled_from(
+    ["", "nan", "NaN", "inf", "1e5", "1.5e-3", "1,5e3", "1.234.567", "x", "2.5.2020", '"1.5"', " 1.5", "1 234", "-"]
+)
+CELLS = {"integer": INTEGER, "point": POINT, "comma": COMMA, "empty": st.just("")}
+
+
+@st.composite
+def tables(draw):
+    """A head, and up to 400 rows of columns of one kind each, in some of which other cells are strewn."""
+    head = draw(st.sampled_from(HEADS))
+    separator = draw(st.sampled_from([",", ";", "\t", "|", ", ", " "])) if not head else ""
+    if not separator:
+        separator = next((mark for mark in "\t;|," if mark in head), ",")
+    kinds = draw(st.lists(st.sampled_from(sorted(CELLS)), min_size=4, max_size=4))
+    drawn = [draw(st.lists(CELLS[kind], min_size=1, max_size=7)) for kind in kinds]
+    count = draw(st.sampled_from([99, 100, 130, 260, 400]))
+    rows = [[cells[i % len(cells)] for cells in drawn] for i in range(count)]
+    for _ in range(draw(st.integers(0, 3))):
+        column, cell = draw(st.integers(0, 3)), draw(RARE)
+        first = draw(st.integers(0, count - 1))
+        for row in rows[first : first + draw(st.sampled_from([1, 3, 60]))]:
+            row[column] = cell
+    end = draw(st.sampled_from(["\n", "\r\n"]))
+    lines = [*head.splitlines(), *(separator.join(row) for row in rows)]
+    for _ in range(draw(st.integers(0, 1))):
+        lines.insert(
+            draw(st.integers(0, len(lines))), draw(st.sampled_from(["", "# a comment", "Sum;1", "End", "1,2"]))
+        )
+    return end.join(lines) + draw(st.sampled_from(["", end, end + end]))
+
+
+PINS = st.sampled_from(
+    [
+        TablePins(),
+        TablePins(separator=";"),
+        TablePins(decimal=","),
+        TablePins(decimal=".", thousands=","),
+        TablePins(header=1),
+        TablePins(header=False),
+        TablePins(skip_lines=3),
+        TablePins(comment="1"),
+        TablePins(missing=("1", "-2000")),
+    ]
+)
+
+
+def outcome(read):
+    try:
+        return read()
+    except RecordingError as fault:
+        return str(fault)
+
+
+def by_all_rows(path, text, stream, pins):
+    finding.refuse_long_line(text, stream)
+    return finding._by_lines(path, text, stream, pins)
+
+
+def assert_alike(path, content, pins=TablePins()):  # noqa: B008
+    """Compare the dialect by some rows, then the confirmed one, with that by all rows."""
+    path.write_bytes(content)
+    sample = content[:SAMPLE_BYTES]
+    if not sample.strip():
+        return
+    try:
+        text, stream = detect_text(path, sample, pins.encoding)
+    except RecordingError:
+        return
+    expected = outcome(lambda: by_all_rows(path, text, stream, pins))
+    finding._KNOWN.clear()
+    assert outcome(lambda: finding._dialect(path, text, stream, pins)) == expected
+    assert outcome(lambda: finding._dialect(path, text, stream, pins)) == expected
+
+
+@settings(max_examples=150)
+@given(tables(), PINS)
+def test_some_rows_show_the_dialect_of_all(tmp_path_factory, table, pins):
+    assert_alike(tmp_path_factory.getbasetemp() / "table.csv", table.encode(), pins)
+
+
+@pytest.mark.parametrize("case", cases(0), ids=lambda case: case.name)
+def test_a_case_with_its_last_rows_repeated_has_the_same_dialect_by_some_rows(tmp_path, case):
+    content = case.content
+    lines = content.splitlines(keepends=True)
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")) or not lines or not lines[-1].endswith(b"\n"):
+        pytest.skip("not of whole lines of single bytes")
+    assert_alike(tmp_path / "table.csv", b"".join([*lines, *lines[-2:] * 80]))
+
+
+def plain(rows=2000, head="t;a;b\n", row="{0}.5;{0};0.25\n"):
+    return (head + "".join(row.format(i) for i in range(rows))).encode()
+
+
+def shorter(tmp_path, content):
+    path = tmp_path / "plain.csv"
+    path.write_bytes(content)
+    text, stream = detect_text(path, content[:SAMPLE_BYTES])
+    return shorter_sample(text, stream, TablePins())
+
+
+def test_of_a_plain_table_few_rows_are_read(tmp_path):
+    found = shorter(tmp_path, plain())
+    assert found is not None
+    assert found.stream.count(b"\n") < 20 < found.rows
+    assert found.stream.startswith(found.above) and found.above == b"t;a;b\n"
+
+
+def test_the_first_row_with_another_mark_is_read_too(tmp_path):
+    content = (
+        plain().replace(b"\n150.5;150;0.25", b"\n150.5;150;0.2", 1).replace(b"\n90.5;90;0.25", b"\n90.5;90;1.234", 1)
+    )
+    found = shorter(tmp_path, content)
+    assert found is not None and b";1.234\n" in found.stream
+
+
+def test_a_column_that_is_seldom_filled_is_read_in_all_rows(tmp_path):
+    assert shorter(tmp_path, plain(row="{0};{0};\n")) is not None  # never filled
+    once = plain(row="{0};{0};\n").replace(b"\n700;700;", b"\n700;700;1")
+    assert shorter(tmp_path, once) is None
+
+
+def test_a_file_whose_head_differs_is_not_confirmed_by_the_one_before(tmp_path):
+    path = tmp_path / "one.csv"
+    finding._KNOWN.clear()
+    names = []
+    for head in ("t;a;b\n", "t;a;c\n", "t;a;c\ns;Nm;m\n"):
+        path.write_bytes(plain(head=head))
+        dialect = finding.find_dialect(path, path.read_bytes()[:SAMPLE_BYTES], TablePins())
+        names.append((dialect.names, dialect.units, dialect.first_line))
+    assert names == [(("t", "a", "b"), (), 2), (("t", "a", "c"), (), 2), (("t", "a", "c"), ("s", "Nm", "m"), 3)]
+
+
+def test_a_confirmed_dialect_has_its_own_file_and_rows(tmp_path):
+    finding._KNOWN.clear()
+    found = []
+    for name, rows in (("one.csv", 300), ("two.csv", 500)):
+        path = tmp_path / name
+        path.write_bytes(plain(rows))
+        found.append(finding.find_dialect(path, path.read_bytes(), TablePins()))
+    assert [(each.text.path.name, each.sampled) for each in found] == [("one.csv", 300), ("two.csv", 500)]
+    assert found[0] == replace(found[1], text=found[0].text, sampled=300)
