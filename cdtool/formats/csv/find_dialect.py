@@ -25,14 +25,14 @@ from cdtool.findings.tables import (
     PinnedLinesSkipped,
     WordsAboveRows,
 )
-from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
-from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
-from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.doubtful_marks import (
+from cdtool.formats.csv.ambiguous_marks import (
     refuse_commas_that_may_be_decimal,
     refuse_one_column_of_decimals,
     settled_marks,
 )
+from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
+from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
+from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.encoding import find_text
 from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv.head_words import column_kinds

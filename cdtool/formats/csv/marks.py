@@ -1,7 +1,7 @@
 """Decimal mark and thousands separator, by the evidence of every number of the sample.
 
 `1,5`, `0,250` and `1234,567` can only have a decimal comma; `1.234,5` and `1,234,567` show both marks or the groups.
-`1,234` alone says nothing, and is refused; so is `1.234` among whole numbers (doubtful_marks.py).
+`1,234` alone says nothing, and is refused; so is `1.234` among whole numbers (ambiguous_marks.py).
 """
 
 from __future__ import annotations

@@ -19,9 +19,9 @@ from cdtool.cores import usable_cores
 from cdtool.formats.csv.blank_lines import filled
 from cdtool.formats.csv.cells import NARROW_BLANKS
 from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.irregular_lines import OddLine, OddLines
 from cdtool.formats.csv.marks import thousands_byte
 from cdtool.formats.csv.number_kernel import powers
-from cdtool.formats.csv.odd_lines import OddLine, OddLines
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, STAMP, Integers, count_lines, read_rows
 from cdtool.formats.csv.stamp_kernel import STEPS

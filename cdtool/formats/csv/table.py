@@ -21,8 +21,8 @@ from cdtool.findings.clocks import WrittenTimes
 from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.irregular_lines import OddLines, not_numeric
 from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
-from cdtool.formats.csv.odd_lines import OddLines, not_numeric
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
 from cdtool.formats.csv.rows import RowReader

@@ -16,9 +16,9 @@ from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.formats.column_names import with_topics
-from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
+from cdtool.formats.mcap.container.read_ahead import ahead
 from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times, with_exact_pieces, with_exact_times
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps

@@ -9,9 +9,9 @@ from mcap.writer import CompressionType, Writer
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap.container import chunks_ahead
 from cdtool.formats.mcap.container import messages as table
-from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.container.read_ahead import ahead
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
 

@@ -14,7 +14,9 @@ from itertools import pairwise
 import numpy as np
 
 from cdtool.formats.mcap.container import walk_kernel as why
+from cdtool.formats.mcap.container.arena import Piece, Room, Walked
 from cdtool.formats.mcap.container.attachments import check_attachment
+from cdtool.formats.mcap.container.chunk_read_ahead import ChunksAhead
 from cdtool.formats.mcap.container.chunks import (
     HEADER_LENGTH,
     LARGEST,
@@ -23,7 +25,6 @@ from cdtool.formats.mcap.container.chunks import (
     Decompressor,
     chunk_header,
 )
-from cdtool.formats.mcap.container.chunks_ahead import ChunksAhead
 from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
@@ -41,8 +42,7 @@ from cdtool.formats.mcap.container.records import (
     Metadata,
     Schema,
 )
-from cdtool.formats.mcap.container.room import Piece, Room, Walked
-from cdtool.formats.mcap.container.skim import only_message_indexes
+from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, same_figures
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.taken import Taker

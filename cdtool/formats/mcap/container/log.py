@@ -22,14 +22,14 @@ from cdtool.findings.containers import (
     SummaryDamaged,
     Unverified,
 )
+from cdtool.formats.mcap.container.arena import Piece
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss
 from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
-from cdtool.formats.mcap.container.room import Piece
-from cdtool.formats.mcap.container.skim import skippable
+from cdtool.formats.mcap.container.skippable_chunks import skippable
 from cdtool.formats.mcap.container.summary import read_summary, same_figures
 from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import NO_BATCH, Batch

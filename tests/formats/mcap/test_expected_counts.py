@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from cdtool.formats.mcap.container.chunks_ahead import foretold_messages
+from cdtool.formats.mcap.container.chunk_read_ahead import foretold_messages
 from cdtool.formats.mcap.container.log import Log
 from tests.formats.mcap.small_files import COMPRESSIONS, small_file
 

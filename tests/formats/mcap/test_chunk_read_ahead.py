@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cdtool.formats.mcap.container import chunks_ahead
+from cdtool.formats.mcap.container.chunk_read_ahead import Buffers
 from cdtool.formats.mcap.container.chunks import Decompressor
-from cdtool.formats.mcap.container.chunks_ahead import Buffers
 from cdtool.formats.mcap.container.log import Log
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
