@@ -207,7 +207,7 @@ _refused(
 _refused(
     "1.234 beside 0,5",
     lambda table: _thousand_or_decimal(table, lambda a, b: f"{a}.{b};0,{a}5").replace("n;v", "n;v;w"),
-    "beside",
+    "next to",
 )
 _refused(
     "decimal point here, comma there",
@@ -379,7 +379,7 @@ _plain(
 _refused("a header of another width", lambda table: table.text(header=False, above="t,a,b,c"), "4 names")
 _refused("a preamble close above the rows", lambda table: table.text(header=False, above="rate,1000"), "2 names")
 _refused(
-    "a first row that may be names", lambda table: table.text(header=False, above="0.000,OVL,1.5"), "may hold names"
+    "a first row that may be names", lambda table: table.text(header=False, above="0.000,OVL,1.5"), "may be the names"
 )
 _refused("numbers that may be names", lambda table: table.text(header=False, above="0,1,2"), "may number")
 _plain(

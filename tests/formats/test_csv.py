@@ -159,7 +159,7 @@ def test_a_short_last_line_with_its_end_is_ragged(log):
 def test_a_duplicate_name_matters_only_where_it_is_asked_for(log, machine):
     assert values(read(log("t,i_motor,n_motor,x,x\n0,1,2,3,4\n"), machine().columns), "i_motor") == [1]
     path = log("t,i_motor,n_motor,n_motor\n0,1,2,3\n")
-    with pytest.raises(RecordingError, match=r"column 'n_motor' .* is there 2 times .*2 or 3"):
+    with pytest.raises(RecordingError, match=r"2 columns have the name 'n_motor' .*2 or 3"):
         read(path, machine().columns)
     numbered = machine(
         '[channels]\ntime = { column = "t", unit = "ms" }\nspeed = { column = 3, unit = "rad/s" }\n'
@@ -186,9 +186,9 @@ def test_a_column_number_beyond_the_file_is_an_error(log, machine):
     [
         (b"", "is empty"),
         (b"\n\n  \n", "is empty"),
-        (b"t,a\n", "holds a header in line 1 and no row of numbers"),
-        (b"# only\n# comments\n", "holds no row of numbers"),
-        (b"some words\nand more words\n", "holds no row of numbers: line 2"),
+        (b"t,a\n", "contains a header in line 1 and no row of numbers"),
+        (b"# only\n# comments\n", "contains no row of numbers"),
+        (b"some words\nand more words\n", "contains no row of numbers: line 2"),
         (b"t,a\n\x00\x01\x02\x03,\xff\n", "binary"),
         (b"\x89PNG\r\n\x1a\n1,2", "binary or markup"),
         (b"<html><body>1,2</body></html>", "binary or markup"),

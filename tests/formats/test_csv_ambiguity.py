@@ -32,7 +32,7 @@ THOUSANDS = ["997", "998", "999", "1.000", "1.001"]
 @pytest.mark.parametrize("separator", ["\t", ";", "|", " ", ","], ids=["tab", "semicolon", "pipe", "blank", "comma"])
 def test_whole_numbers_beside_points_before_three_digits_are_refused_and_can_be_pinned(log, separator):
     path = log(f"t{separator}pos\n" + rows(THOUSANDS, separator))
-    with pytest.raises(RecordingError, match=r"line 5, column 'pos': '1\.000' beside '997' is 1000 .* or 1\.000 "):
+    with pytest.raises(RecordingError, match=r"line 5, column 'pos': '1\.000' next to '997' may be 1000 .* or 1\.000 "):
         Csv().columns(path)
     assert pinned(path, decimal=".").tolist() == [997, 998, 999, 1.0, 1.001]
     if separator != ",":
@@ -42,7 +42,7 @@ def test_whole_numbers_beside_points_before_three_digits_are_refused_and_can_be_
 
 def test_a_point_that_comes_only_behind_the_sample_is_refused_too(log):
     table = "t;pos\n" + rows([900] * BEYOND) + rows(["1.000", "1.001"], first=BEYOND)
-    with pytest.raises(RecordingError, match=rf"line {BEYOND + 2}, column 'pos': '1\.000' beside '900'"):
+    with pytest.raises(RecordingError, match=rf"line {BEYOND + 2}, column 'pos': '1\.000' next to '900'"):
         Csv().columns(log(table))
 
 
@@ -99,7 +99,7 @@ def test_one_column_of_decimal_commas_is_read_as_its_refusal_says(log):
 
 @pytest.mark.parametrize("above", ["990.000\n997.700", "997.700", "-1", "nan"])
 def test_a_number_above_rows_of_two_cells_is_a_row_of_the_same_column(log, above):
-    with pytest.raises(RecordingError, match=r"line [34]: '1,005\.400' is one number .* or two cells"):
+    with pytest.raises(RecordingError, match=r"line [34]: '1,005\.400' may be one number .* or two cells"):
         Csv().columns(log(f"F0\n{above}\n1,005.400\n1,013.100\n1,020.800\n"))
 
 
@@ -113,7 +113,7 @@ def test_a_blank_that_does_not_break_parts_no_cells(log, blank):
 @pytest.mark.parametrize("mark", [":", "."])
 def test_milliseconds_without_zeros_are_refused_where_they_would_run_backward(log, mark):
     stamps = [f"12:00:00{mark}{ms}" for ms in (8, 9, 10, 99, 100)]
-    with pytest.raises(RecordingError, match=rf"column 't': '10' behind '12:00:00{mark}9' is 0\.10 s or 10 ms"):
+    with pytest.raises(RecordingError, match=rf"column 't': '10' after '12:00:00{mark}9' may be 0\.10 s or 10 ms"):
         Csv().columns(log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps)))
 
 
@@ -125,7 +125,9 @@ def test_parts_of_a_second_without_their_last_zeros_are_read(log):
 
 def test_two_pairs_of_digits_are_minutes_or_seconds_unless_one_proves_it(log, machine):
     path = log("t;x\n" + "".join(f"00:0{i};1\n" for i in range(5)))
-    with pytest.raises(RecordingError, match=r"'00:01' is 00:01:00 \(%H:%M\) or 00:00:01 \(%M:%S\.%f\) .*time_format"):
+    with pytest.raises(
+        RecordingError, match=r"'00:01' may be 00:01:00 \(%H:%M\) or 00:00:01 \(%M:%S\.%f\) .*time_format"
+    ):
         Csv().columns(path)
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n[csv]\n'
     for pattern, step in (("%H:%M", 60), ("%M:%S", 1)):

@@ -66,7 +66,7 @@ def test_the_first_time_that_no_layout_fits_is_named_and_not_a_good_one(log, mac
     stamps = [*STAMPS[:at], bad, *STAMPS[at:]]
     path = log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps))
     with pytest.raises(
-        RecordingError, match=rf"line {at + 2}, column 't': '{bad}' is no time written as %H:%M:%S\.%f"
+        RecordingError, match=rf"line {at + 2}, column 't': '{bad}' is not a time with the layout %H:%M:%S\.%f"
     ) as e:
         read_recording(path, machine(SECONDS))
     assert "time_format" in e.value.hint and "decimal mark" not in str(e.value)
@@ -77,7 +77,7 @@ def test_the_first_time_that_no_layout_fits_is_named_and_not_a_good_one(log, mac
 
 def test_dates_in_no_known_layout_are_named_with_time_format(log, machine):
     path = log("t;x\n" + "".join(f"04.13.2025 12:00:0{i};1\n" for i in range(5)))
-    with pytest.raises(RecordingError, match=r"line 2, .* nor a date or time in a layout that is known") as fault:
+    with pytest.raises(RecordingError, match=r"line 2, .* nor a date or time with a known layout") as fault:
         read_recording(path, machine(SECONDS))
     assert "time_format" in fault.value.hint
     layout = SECONDS + '[csv]\ntime_format = "%m.%d.%Y %H:%M:%S"\n'
@@ -94,13 +94,13 @@ def test_a_first_row_of_empty_cells_is_no_header(log, head):
 
 def test_a_line_longer_than_the_sample_is_named(log):
     wide = "t;" + ";".join(f"c{i}" for i in range(60_000))
-    with pytest.raises(RecordingError, match="line 1 goes on beyond the 128 KB"):
+    with pytest.raises(RecordingError, match="line 1 continues after the first 128 KB"):
         Csv().columns(log(wide + "\n" + "0;" * 60_000 + "1\n"))
 
 
 def test_a_control_character_in_the_header_is_named(log):
     path = log("\x1b[31mt;x\n0;1\n1;2\n")
-    with pytest.raises(RecordingError, match=r"line 1 holds a control character \(byte 0x1b\)"):
+    with pytest.raises(RecordingError, match=r"line 1 contains a control character \(byte 0x1b\)"):
         choose_format(path).columns(path)
 
 

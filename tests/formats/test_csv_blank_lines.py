@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cdtool.findings import Fact
 from cdtool.findings.tables import BlankLines, BlankRows
 from cdtool.formats.csv import Csv
-from cdtool.formats.pieces import joined
+from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 
 RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
@@ -63,6 +63,6 @@ def test_every_line_between_the_first_and_the_last_number_is_a_sample(tmp_path, 
     path.write_bytes(end.join(["x", *lines, ""]).encode())
     monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", blocks)
     truth = [float(line) if line.strip() else np.nan for line in lines]
-    for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
         assert np.array_equal(source.columns["x"].values, truth, equal_nan=True)
         assert source.first_row == 2

@@ -9,8 +9,8 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Fact
 from cdtool.findings.clocks import BackwardStamps, WrittenTimes
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.stamps import NS, unwrapped
-from cdtool.formats.pieces import joined
+from cdtool.formats.csv.stamps import NS, unwrap
+from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 from tests.formats.conftest import COLUMNS
 
@@ -73,7 +73,7 @@ def test_minutes_and_seconds_go_on_past_the_full_hour(log, machine, pin):
 def test_the_full_hour_is_passed_between_two_blocks_too(log, monkeypatch):
     monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 1 << 9)
     times = 3590.0 + 0.5 * np.arange(400)
-    source = joined(Csv().pieces(log(table(map(minutes, times)))), sort=False)
+    source = join_pieces(Csv().pieces(log(table(map(minutes, times)))), sort=False)
     assert source.columns["t"].values.tolist() == times.tolist()
 
 
@@ -96,5 +96,5 @@ def test_half_days_without_their_letters_go_on_past_noon(log, machine):
 def test_stamps_that_begin_anew_are_counted_on_in_whole_periods(period):
     truth = period * NS // 3 * np.arange(20, dtype=np.int64)
     stamps = truth % (period * NS)
-    assert unwrapped(stamps, np.ones(20, dtype=bool), period * NS) == 6
+    assert unwrap(stamps, np.ones(20, dtype=bool), period * NS) == 6
     assert stamps.tolist() == truth.tolist()

@@ -84,7 +84,7 @@ def test_a_clock_for_each_channel_is_kept(log, machine):
     recording = read_recording(path, machine(channels + 'speed = { column = "speed", unit = "rad/s" }\n'))
     assert recording["force"].time.tolist() == [i / 1000 for i in range(40)]
     assert recording["speed"].time.tolist() == [i / 250 for i in range(40)]
-    with pytest.raises(RecordingError, match="column 'speed' stands beside the clock 'X_Value#2'"):
+    with pytest.raises(RecordingError, match="column 'speed' is beside the clock 'X_Value#2'"):
         read_recording(
             path, machine(channels.replace('"time"', "0") + 'speed = { column = "speed", unit = "rad/s" }\n')
         )

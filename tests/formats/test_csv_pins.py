@@ -14,7 +14,7 @@ from cdtool.findings.clocks import SampleGaps
 from cdtool.findings.tables import UnreadCells
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
-from cdtool.formats.csv.table import is_whole
+from cdtool.formats.csv.table import is_complete
 from cdtool.ingest.reading import read_recording
 from cdtool.tables import Table
 from tests.formats.conftest import COLUMNS
@@ -36,12 +36,12 @@ def pinned(text: str) -> str:
         ('separator = "x"', "csv.separator: is 'x'.*comma"),
         ('decimal = ";"', "csv.decimal: is ';'"),
         ('thousands = "_"', "csv.thousands: is '_'"),
-        ('decimal = ","\nthousands = ","', "csv.thousands: is ',', as decimal is"),
+        ('decimal = ","\nthousands = ","', "csv.thousands: is ',', the same as decimal"),
         ('encoding = "klingon"', "csv.encoding: is 'klingon'.*utf-8"),
         ('encoding = "cp037"', "csv.encoding: is 'cp037'"),
         ("header = true", "csv.header: is true.*number of its line"),
         ("header = 0", "csv.header: is 0"),
-        ("header = false\nunits = 2", "csv.units: is 2 beside header = false"),
+        ("header = false\nunits = 2", "csv.units: is 2, but header is false"),
         ("skip_lines = -1", "csv.skip_lines: is -1"),
         ('missing = "ok"\ncomment = 3', "csv.comment: is 3"),
         ('time_format = "%Q"', "csv.time_format: is '%Q'.*not known"),
@@ -57,7 +57,7 @@ def test_a_wrong_pin_is_one_line_that_names_the_key(machine, text, words):
 
 def test_a_pinned_mark_decides_what_the_file_leaves_open(log, machine):
     path = log(ROWS)
-    with pytest.raises(RecordingError, match=r"'1,025' is 1\.025 \(decimal comma\) or 1025 \(thousands\)"):
+    with pytest.raises(RecordingError, match=r"'1,025' may be 1\.025 \(decimal comma\) or 1025 \(thousands\)"):
         Csv().columns(path, machine().columns)
     decimal = Csv().columns(path, machine(pinned('decimal = ","')).columns)
     thousands = Csv().columns(path, machine(pinned('decimal = "."\nthousands = ","')).columns)
@@ -140,7 +140,7 @@ def test_dates_are_a_clock_in_seconds_whose_origin_is_kept(log, machine):
     recording = read_recording(log(rows), machine(COLUMNS.replace('"ms"', '"s"')))
     assert recording["speed"].time.tolist() == [i / 1000 for i in range(20)]
     assert np.datetime64(int(recording.origin), "s") == np.datetime64("2025-04-03T12:00:00")
-    with pytest.raises(RecordingError, match="holds dates or times of day"):
+    with pytest.raises(RecordingError, match="has dates or times of day"):
         read_recording(log(rows), machine())
 
 
@@ -162,4 +162,4 @@ def test_dates_are_a_clock_in_seconds_whose_origin_is_kept(log, machine):
     ],
 )
 def test_a_last_number_is_believed_by_the_digits_of_those_above(cell, above, expected):
-    assert is_whole(cell, above) == expected
+    assert is_complete(cell, above) == expected

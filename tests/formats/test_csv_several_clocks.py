@@ -11,7 +11,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.csv import Csv
-from cdtool.formats.pieces import joined
+from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 
 OWN = """[channels]
@@ -62,7 +62,7 @@ def test_each_channel_gets_the_clock_before_it(log, machine, header):
 
 def test_clocks_in_ms_that_do_not_say_so_are_refused_rather_than_read_in_s(log, machine):
     path = log(table("time,force,time2,torque,speed", 1e3 * CELL, 1e3 * DRIVE))
-    with pytest.raises(RecordingError, match="stands beside the clock 'time2'") as fault:
+    with pytest.raises(RecordingError, match="is beside the clock 'time2'") as fault:
         read_recording(path, machine(OWN.replace('unit = "s"', 'unit = "ms"')))
     assert "in the unit of its header ('time2 [ms]')" in fault.value.hint
     path = log(table("time [ms],force,time2 [ms],torque,speed", 1e3 * CELL, 1e3 * DRIVE))
@@ -85,7 +85,7 @@ def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start
     count = np.arange(4000)
     path = log(table(HEADERS[0], 0.0005 * count, start + step * count))
     wrong, other = ("torque", "time2") if clock == "time1" else ("force", "time1")
-    text = rf"column '{wrong}' stands beside the clock '{other}', the machine file says '{clock}': "
+    text = rf"column '{wrong}' is beside the clock '{other}', but the machine file names '{clock}': "
     if clock == "time1":
         text += why
     with pytest.raises(RecordingError, match=text) as fault:
@@ -94,7 +94,7 @@ def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start
     only = "\n".join(line for line in named(clock).splitlines() if wrong not in line and "speed" not in line)
     kept = "force" if clock == "time1" else "torque"
     assert len(read_recording(path, machine(only))[kept]) == 4000
-    for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
         (told,) = said(source)
         assert told.channel == "time2" and isinstance(told.fact, OtherClock)
         assert (told.fact.first, told.fact.columns) == ("time1", ("torque", "speed"))
@@ -142,7 +142,7 @@ def test_units_and_an_epoch_are_taken_from_each_clocks_header(log, machine):
 
 def test_a_channel_that_no_clock_is_beside_is_refused(log, machine):
     rows = "".join(f"{i},{i / 2000},{10 * i},{i / 1000},{100 * i}\n" for i in range(50))
-    with pytest.raises(RecordingError, match="no clock stands before column 'force'"):
+    with pytest.raises(RecordingError, match="no clock is beside column 'force'"):
         read_recording(log("force,time1,torque,time2,speed\n" + rows), machine(OWN))
 
 
@@ -166,5 +166,5 @@ def test_no_channel_is_ever_on_another_ones_clock(log, machine, rates, counts, m
     recording = read_recording(path, machine(OWN))
     assert recording["force"].time.tolist() == first.tolist()
     assert recording["torque"].time.tolist() == second.tolist()
-    with pytest.raises(RecordingError, match="stands beside the clock"):
+    with pytest.raises(RecordingError, match="is beside the clock"):
         read_recording(path, machine(named("time1")))

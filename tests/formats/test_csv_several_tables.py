@@ -11,7 +11,7 @@ from cdtool.findings.tables import NumbersAboveRows
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.find_dialect import find_dialect
 from cdtool.formats.csv.text import read_sample
-from cdtool.formats.pieces import Run
+from cdtool.formats.pieces import PieceRun
 
 PREAMBLE = ("Measurement of gate 7", "Operator: Jones", "Sample rate,1000", "Date;2024-03-01 12:00:00", "")
 BETWEEN = ("", "\n", "Second table\n", "\n[channels]\n", "# next\n", "Result;ok\n\n")
@@ -69,21 +69,21 @@ def rows(count: int, width: int, first: float = 0.0) -> str:
 
 def test_rows_above_a_second_header_of_another_width_are_refused_with_their_lines(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
-    with pytest.raises(RecordingError, match=r"lines 2 to 401 above the header in line 402 hold numbers") as fault:
+    with pytest.raises(RecordingError, match=r"lines 2 to 401 above the header in line 402 have numbers") as fault:
         Csv().columns(path)
     assert "skip_lines = 401" in fault.value.hint
 
 
 def test_a_thousand_rows_of_24_columns_below_which_another_table_follows_are_refused(tmp_path):
     path = log(tmp_path, ",".join("abcdefghijklmnopqrstuvwx") + "\n" + rows(700, 24) + "t,a\n" + rows(4000, 2))
-    with pytest.raises(RecordingError, match=r"hold numbers|has 2 cells"):
+    with pytest.raises(RecordingError, match=r"have numbers|has 2 cells"):
         Csv().columns(path)
 
 
 def test_a_text_preamble_above_two_tables_does_not_hide_the_rows_of_the_first(tmp_path):
     preamble = "Measurement of gate 7\nOperator: Jones\n\n"
     path = log(tmp_path, preamble + "t,a,b\n" + rows(400, 3) + "\nSecond table\nt,a,b,c,d\n" + rows(1600, 5))
-    with pytest.raises(RecordingError, match=r"lines 5 to 404 above the header in line 407 hold numbers"):
+    with pytest.raises(RecordingError, match=r"lines 5 to 404 above the header in line 407 have numbers"):
         Csv().columns(path)
 
 
@@ -118,7 +118,7 @@ def test_a_comment_without_line_end_below_the_rows_costs_no_row_and_no_warning(t
     source = Csv().columns(path)
     assert len(source.columns["t"].values) == 50
     assert {finding.severity for finding in source.findings} == {"note"}
-    run = Run(Csv().pieces(path))
+    run = PieceRun(Csv().pieces(path))
     assert sum(piece.rows for piece in run) == 50 and run.source.findings == source.findings
 
 

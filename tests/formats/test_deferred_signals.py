@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdtool.formats import hdf5_writing
-from cdtool.formats.hdf5_writing import held_signals
+from cdtool.formats.hdf5_writing import deferred_signals
 from cdtool.workflows.convert.converting import convert
 
 
@@ -21,10 +21,10 @@ def test_a_signal_waits_until_it_is_delivered_or_the_end(number):
     before = signal.signal(number, end)
     try:
         reached = []
-        with pytest.raises(KeyboardInterrupt), held_signals():
+        with pytest.raises(KeyboardInterrupt), deferred_signals():
             signal.raise_signal(number)
             reached.append("behind the signal")
-        with pytest.raises(KeyboardInterrupt), held_signals() as deliver:
+        with pytest.raises(KeyboardInterrupt), deferred_signals() as deliver:
             signal.raise_signal(number)
             deliver()
             reached.append("behind its delivery")
@@ -37,14 +37,14 @@ def test_a_signal_waits_until_it_is_delivered_or_the_end(number):
 def test_a_signal_that_is_ignored_stays_so_and_another_thread_holds_none():
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
-        with held_signals() as deliver:
+        with deferred_signals() as deliver:
             signal.raise_signal(signal.SIGTERM)
             deliver()
         assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
         seen = []
 
         def elsewhere() -> None:
-            with held_signals():
+            with deferred_signals():
                 seen.append(signal.getsignal(signal.SIGTERM))
 
         thread = threading.Thread(target=elsewhere)

@@ -106,7 +106,7 @@ def test_links_out_of_the_file_and_in_circles_are_not_followed(tmp_path):
         file.create_virtual_dataset("virtual", layout)
     source = survey(path)
     assert list(source.columns) == ["v"]
-    assert [found.fact.what for found in source.findings] == ["kept in other files"] * 2
+    assert [found.fact.what for found in source.findings] == ["stored in other files"] * 2
 
 
 def test_a_dataset_that_is_declared_but_not_there_is_refused_by_its_size(tmp_path):

@@ -106,7 +106,7 @@ def test_any_date_is_the_one_of_the_calendar(date, minutes, gap):
 @pytest.mark.parametrize(
     ("attributes", "why"),
     [
-        ({"units": "seconds since the start"}, "the date of 'seconds since the start' is not understood"),
+        ({"units": "seconds since the start"}, "the date of 'seconds since the start' cannot be read"),
         ({"units": "seconds since 2024-01-01", "calendar": "360_day"}, "its calendar '360_day'"),
     ],
     ids=["date", "calendar"],

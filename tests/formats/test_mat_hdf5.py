@@ -147,7 +147,7 @@ def test_a_complex_column_that_is_asked_for_is_an_error(tmp_path):
 
 
 def test_a_file_without_a_vector_says_so(tmp_path):
-    with pytest.raises(RecordingError, match="holds no vector or matrix of numbers"):
+    with pytest.raises(RecordingError, match="has no vector or matrix of numbers"):
         Mat().columns(save_v73(tmp_path / "a.mat", {"s": {"a": 1.0}}))
 
 
@@ -169,7 +169,7 @@ def test_without_h5py_the_error_says_what_to_install_or_how_to_save(tmp_path, mo
     with pytest.raises(RecordingError) as fault:
         Mat().columns(path)
     assert fault.value.message == f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed"
-    assert fault.value.hint == "pip install 'cdtool[hdf5]'; or save it with: save(name, ..., '-v7')"
+    assert fault.value.hint == "pip install 'cdtool[hdf5]'; or save it in MATLAB with save(name, ..., '-v7')"
 
 
 def test_a_dataset_in_other_files_is_not_followed(tmp_path):
@@ -182,7 +182,7 @@ def test_a_dataset_in_other_files_is_not_followed(tmp_path):
         file.create_virtual_dataset("v", layout)
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
-    assert [found.fact.what for found in source.findings] == ["a array kept in other files"] * 2
+    assert [found.fact.what for found in source.findings] == ["an array stored in other files"] * 2
 
 
 @pytest.mark.parametrize("kept", [400, 520, 700, 1500, -1])

@@ -59,7 +59,7 @@ def test_only_plain_arithmetic_is_evaluated_in_a_formula(saved):
     path = saved([good, signal("evil", np.arange(4, dtype=np.uint8), 1.0, conversion={"formula": "where(X1, X1, X1)"})])
     source = survey(path)
     assert list(source.columns) == ["good"]
-    what = "given by the formula 'where(X1, X1, X1)', which is not evaluated"
+    what = "defined by the formula 'where(X1, X1, X1)', which is not evaluated"
     assert source.findings[0].fact == ColumnLeftOut("evil", what)
 
 

@@ -17,7 +17,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings.clocks import WrittenTimes
 from cdtool.formats import slices
 from cdtool.formats.csv import text
-from cdtool.formats.pieces import Pieces, Run, as_pieces, joined, read_pieces
+from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces, split_by_clock
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.ingest.log_figures import LogFigures
@@ -28,7 +28,7 @@ from tests.workflows.convert.kinds import needs
 
 
 def pieces_of(path: Path) -> list[Piece]:
-    return list(Run(read_pieces(choose_format(path), path)))
+    return list(PieceRun(read_pieces(choose_format(path), path)))
 
 
 def same(one: Source, other: Source) -> bool:
@@ -54,13 +54,13 @@ def test_a_container_in_many_pieces_holds_what_it_holds_in_one(suffix, tmp_path,
     found = choose_format(path)
     at_once = found.columns(path)
     assert len({piece.clock for piece in pieces_of(path)}) == len(pieces_of(path))
-    monkeypatch.setattr(slices, "VALUES_A_PIECE", 100)
+    monkeypatch.setattr(slices, "VALUES_PER_PIECE", 100)
     pieces = pieces_of(path)
     assert len(pieces) > 20
     # Clocks that run side by side come side by side.
     starts = np.array([float(piece.time[0]) for piece in pieces if piece.time is not None and piece.rows])
     assert np.max(np.maximum.accumulate(starts) - starts) < 0.06  # the accelerometer ends that much before the drive
-    assert same(at_once, joined(read_pieces(found, path), sort=False))
+    assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
 
 @pytest.mark.parametrize("end", ["\n", "", "\n# the end\n"])
@@ -76,7 +76,7 @@ def test_a_table_in_many_blocks_holds_what_it_holds_at_once(end, tmp_path, monke
     at_once = found.columns(path)
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
     assert len(pieces_of(path)) > 20
-    assert same(at_once, joined(read_pieces(found, path), sort=False))
+    assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
 
 def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
@@ -84,7 +84,7 @@ def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
     seconds = np.arange(0, 200_000, 20) + 80_000
     path = tmp_path / "a.csv"
     path.write_text("clock,v\n" + "".join(f"{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d},1\n" for s in seconds))
-    source = joined(read_pieces(choose_format(path), path), sort=False)
+    source = join_pieces(read_pieces(choose_format(path), path), sort=False)
     assert np.array_equal(source.columns["clock"].values, seconds)
     assert any(isinstance(item.fact, WrittenTimes) and item.fact.wrapped == 3 for item in source.findings)
 
@@ -152,7 +152,7 @@ def test_columns_in_memory_are_one_piece_a_clock():
     time = np.arange(3.0)
     columns = [Column("a", time, time), Column("b", time, time), Column("c", np.arange(4.0))]
     source = Source(Path("a"), "mat", {column.name: column for column in columns})
-    run = Run(as_pieces(source))
+    run = PieceRun(split_by_clock(source))
     assert [sorted(piece.values) for piece in run] == [["a", "b"], ["c"]]
-    assert same(source, joined(as_pieces(source), sort=False))
+    assert same(source, join_pieces(split_by_clock(source), sort=False))
     assert all(len(column.values) == 0 for column in run.source.columns.values())

@@ -9,7 +9,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import NoStartTime
 from cdtool.findings.containers import ColumnLeftOut, LibraryMessage, RoundedIntegers
-from cdtool.formats.tdms import Tdms, collected_lines
+from cdtool.formats.tdms import Tdms, collect_warnings
 from cdtool.ingest.reading import survey
 
 nptdms = pytest.importorskip("nptdms")
@@ -61,7 +61,7 @@ def test_texts_and_time_stamps_are_named_and_left_out(saved):
     )
     assert list(source.columns) == ["v"]
     told = {finding.fact for finding in source.findings}
-    assert {ColumnLeftOut("word", "no number"), ColumnLeftOut("when", "of time stamps")} <= told
+    assert {ColumnLeftOut("word", "not numeric"), ColumnLeftOut("when", "of time stamps")} <= told
 
 
 def test_of_a_file_that_is_cut_off_the_whole_part_is_read_and_the_loss_told(saved):
@@ -171,7 +171,7 @@ def test_what_the_library_would_print_is_told_and_not_printed(saved, capfd, capl
 
 def test_only_the_lines_of_the_library_are_collected(caplog):
     ours, other = logging.getLogger("nptdms.reader"), logging.getLogger("another")
-    with collected_lines("nptdms") as lines:
+    with collect_warnings("nptdms") as lines:
         ours.warning("odd %d", 3)
         ours.debug("not worth a word")
         other.warning("of another one")

@@ -18,12 +18,12 @@ from cdtool.findings import Finding
 from cdtool.formats.column_names import with_topics
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
-from cdtool.formats.mcap.container.read_ahead import ahead
+from cdtool.formats.mcap.container.read_ahead import read_ahead
 from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times, with_exact_pieces, with_exact_times
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
-from cdtool.formats.mcap.uniform import UniformTaker
-from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.mcap.uniform import UniformChunkReader
+from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
@@ -51,7 +51,7 @@ class Mcap:
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
         if wanted is None:
-            return joined(self.pieces(path), sort=True)
+            return join_pieces(self.pieces(path), sort=True)
         return with_exact_times(_wanted(path, wanted), wanted, partial(_wanted, path))
 
     def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
@@ -60,7 +60,7 @@ class Mcap:
         topics: dict[str, TopicSurvey] = {}
         jumps = SequenceJumps()
         origin: int | None = None
-        for piece in ahead(log.pieces()):
+        for piece in read_ahead(log.pieces()):
             origin = _origin(path, log) if origin is None else origin
             jumps.add(piece, origin)
             for messages in piece:
@@ -99,12 +99,12 @@ class Mcap:
 
 def _wanted(path: Path, wanted: ChannelMap) -> Source:
     asked = {source.topic for source in wanted.sources}
-    taker = UniformTaker(publish=wanted.time.clock == "publish")
+    taker = UniformChunkReader(publish=wanted.time.clock == "publish")
     log = Log(path, asked.__contains__, taker=taker)
     topics = wanted_topics(path, wanted, partial(Gathering, expected={topic: log.expected(topic) for topic in asked}))
     pieces = log.pieces()
     # The taker has to learn from the first piece before the second one is made.
-    for piece in chain(islice(pieces, 1), ahead(pieces)):
+    for piece in chain(islice(pieces, 1), read_ahead(pieces)):
         for messages in piece:
             topic = topics[messages.stream.topic]
             if messages.parts:
@@ -131,7 +131,7 @@ def _bound(log: Log, topics: Mapping[str, Gathering]) -> dict[int, Bound]:
 
 def _origin(path: Path, log: Log) -> int:
     """Time [ns] of a log's first message, once its first piece is there."""
-    first = log.section.room.first_time or 0
+    first = log.section.arena.first_time or 0
     if first >= NO_DATE:  # those so far are of no clock: which is the first that is shows at the end
         log = Log(path)
         for _ in log.pieces():
@@ -161,8 +161,8 @@ class MappedFields:
         topics = wanted_topics(self.path, self.wanted, Topic, () if self._converted is None else (EXACT_TIME,))
         log = Log(self.path, topics.__contains__)
         start = self.origin
-        for piece in ahead(log.pieces()):
-            first = log.section.room.first_time
+        for piece in read_ahead(log.pieces()):
+            first = log.section.arena.first_time
             if start is None and self.wanted.time.clock == "log" and first is not None and first < NO_DATE:
                 start = first
             for messages in piece:

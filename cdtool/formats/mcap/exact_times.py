@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.columns import Piece
-from cdtool.formats.pieces import Pieces, Run
+from cdtool.formats.pieces import PieceRun, Pieces
 from cdtool.formats.source import Source
 
 # The metadata record of such a file, the package of its message types, and the field that holds a message's time [s].
@@ -59,7 +59,7 @@ def with_exact_pieces(pieces: Pieces, path: Path) -> Pieces:
     if metadata is None:
         return (yield from pieces)
     origin = float(metadata.get("cdtool.origin_s", "0"))
-    run = Run(pieces)
+    run = PieceRun(pieces)
     for piece in run:
         time = piece.values.get(f"{piece.clock} {EXACT_TIME}")
         values = {name: column for name, column in piece.values.items() if not name.endswith(f" {EXACT_TIME}")}

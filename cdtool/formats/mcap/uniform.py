@@ -36,7 +36,7 @@ class _Tables:
     stamps: Words
 
 
-class UniformTaker:
+class UniformChunkReader:
     """A Taker (taken.py); `publish`: of a record's two times the publish time is wanted, not the log time."""
 
     def __init__(self, publish: bool = False) -> None:

@@ -30,7 +30,7 @@ def cores(monkeypatch):
 def read_in_turn(monkeypatch):
     """Places of the chunks that were read when their turn came, and of those read ahead."""
     places = {True: [], False: []}
-    reading, filling = Decompressor.read, chunks_ahead.ChunksAhead._fill
+    reading, filling = Decompressor.read, chunks_ahead.ChunkReadAhead._fill
     threads = []
 
     def fill(self, index, content):
@@ -41,7 +41,7 @@ def read_in_turn(monkeypatch):
         places[header.at in threads].append(header.at)
         return reading(self, file, header, room)
 
-    monkeypatch.setattr(chunks_ahead.ChunksAhead, "_fill", fill)
+    monkeypatch.setattr(chunks_ahead.ChunkReadAhead, "_fill", fill)
     monkeypatch.setattr(Decompressor, "read", read_chunk)
     return places
 

@@ -10,7 +10,7 @@ import pytest
 from cdtool.formats.mcap.container.chunks import Decompressor, chunk_header
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.records import MAGIC, Chunk, MessageIndex
-from cdtool.formats.mcap.container.summary import parsed
+from cdtool.formats.mcap.container.summary import parse_records
 from tests.data_folder import data, needs_data
 from tests.formats.mcap.small_files import read
 
@@ -39,7 +39,7 @@ def every_record(path):
     content = memoryview(path.read_bytes())
     assert bytes(content[: len(MAGIC)]) == bytes(content[-len(MAGIC) :]) == MAGIC
     at = len(MAGIC)
-    for record in parsed(content[at : -len(MAGIC)]):
+    for record in parse_records(content[at : -len(MAGIC)]):
         length = 9 + int.from_bytes(content[at + 1 : at + 9], "little")
         if isinstance(record, Chunk):
             room = np.empty(record.uncompressed_size, np.uint8)
@@ -49,7 +49,7 @@ def every_record(path):
                 Decompressor().fill(header, packed, room)
             else:
                 room[:] = packed
-            yield from parsed(room.data)
+            yield from parse_records(room.data)
         elif not isinstance(record, MessageIndex):
             yield record
         at += length

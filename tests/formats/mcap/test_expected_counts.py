@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from cdtool.formats.mcap.container.chunk_read_ahead import foretold_messages
+from cdtool.formats.mcap.container.chunk_read_ahead import expected_rows
 from cdtool.formats.mcap.container.log import Log
 from tests.formats.mcap.small_files import COMPRESSIONS, small_file
 
@@ -22,7 +22,7 @@ def test_messages_are_numbered_channel_by_channel_through_all_chunks(tmp_path, c
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression, messages=50, chunk_size=chunk_size)
     chunks = indexes(path)
-    foretold = foretold_messages(chunks)
+    foretold = expected_rows(chunks)
     assert list(foretold) == [index.chunk_start_offset for index in chunks]
     passed = Counter()
     for index in chunks:
@@ -39,13 +39,13 @@ def test_it_ends_where_message_indexes_cannot_be_as_long_as_they_claim(tmp_path)
     chunks = indexes(path)
     assert len(chunks) > 3
     chunks[2] = replace(chunks[2], message_index_length=chunks[2].message_index_length + 1)
-    assert list(foretold_messages(chunks)) == [index.chunk_start_offset for index in chunks[:2]]
+    assert list(expected_rows(chunks)) == [index.chunk_start_offset for index in chunks[:2]]
     chunks[1] = replace(chunks[1], message_index_length=3)
-    assert list(foretold_messages(chunks)) == [chunks[0].chunk_start_offset]
+    assert list(expected_rows(chunks)) == [chunks[0].chunk_start_offset]
 
 
 def test_without_message_indexes_nothing_is_foretold(tmp_path):
     path = tmp_path / "log.mcap"
     small_file(path)
     bare = [replace(index, message_index_offsets={}, message_index_length=0) for index in indexes(path)]
-    assert all(not rows for rows in foretold_messages(bare).values())
+    assert all(not rows for rows in expected_rows(bare).values())

@@ -11,7 +11,7 @@ from cdtool.formats.mcap.container import chunks_ahead
 from cdtool.formats.mcap.container import messages as table
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.log import Log
-from cdtool.formats.mcap.container.read_ahead import ahead
+from cdtool.formats.mcap.container.read_ahead import read_ahead
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
 
@@ -74,7 +74,7 @@ def test_one_ahead_gives_the_same_items_and_the_same_error():
 
     found = []
     with pytest.raises(RecordingError, match="the drive is lost"):
-        for item in ahead(items()):
+        for item in read_ahead(items()):
             found.append(item)
     assert found == list(range(5))
 

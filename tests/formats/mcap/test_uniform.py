@@ -18,7 +18,7 @@ from cdtool.errors import RecordingError
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.container import chunks_ahead
 from cdtool.formats.mcap.container.log import Log
-from cdtool.formats.mcap.uniform import UniformTaker
+from cdtool.formats.mcap.uniform import UniformChunkReader
 from cdtool.messages.schemas import DEFINITIONS
 from tests.formats.mcap_damage.assembly import Ending, assemble, blocks_of, lying
 from tests.formats.mcap_damage.messages import DEFINITIONS as TOPICS
@@ -36,7 +36,7 @@ JOINTS = ("c", "a", "b")
 def taken():
     """How many chunks were taken, and how many were not."""
     counted = {True: 0, False: 0}
-    take = UniformTaker.take
+    take = UniformChunkReader.take
 
     def counting(self, content, rows, knows):
         found = take(self, content, rows, knows)
@@ -44,7 +44,7 @@ def taken():
         return found
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(UniformTaker, "take", counting)
+        patch.setattr(UniformChunkReader, "take", counting)
         yield counted
 
 
@@ -246,7 +246,7 @@ def test_a_channel_that_is_defined_anew_is_lost_the_same(tmp_path, at, kind):
 
 
 def shorter(index):
-    """Claims one message fewer of a channel and one more of the next."""
+    """ClaimedSizes one message fewer of a channel and one more of the next."""
     return replace(index, offsets={channel: at - 16 * (channel == 3) for channel, at in index.offsets.items()})
 
 

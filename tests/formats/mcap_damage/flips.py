@@ -145,8 +145,8 @@ def _silent(log: Log, spans: list[Span | None], hit: list[int]) -> bool:
     style = log.style
     if style.chunked and style.crcs and (style.summary or style.indexed):
         return len(hit) > 1
-    framed = [span for span, at in zip(spans, hit, strict=True) if span is None or at < span.start + 9]
-    return bool(framed) or not style.crcs or not style.chunked
+    read_prefix = [span for span, at in zip(spans, hit, strict=True) if span is None or at < span.start + 9]
+    return bool(read_prefix) or not style.crcs or not style.chunked
 
 
 KINDS = {

@@ -17,7 +17,7 @@ from cdtool.messages.taken import Taken
 
 
 @dataclass(frozen=True)
-class Piece:
+class MessageBlock:
     """Messages in one piece of memory, channel by channel.
 
     `covered`: a CRC covers the bytes; `cuts`: channels whose definition changes at a place of `data`. `taken`: chunks
@@ -32,7 +32,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Walked:
+class WalkResult:
     """Where a walk ended and why (walk_kernel), the log times' span [ns] where it is known, and definitions' faults."""
 
     at: int
@@ -41,7 +41,7 @@ class Walked:
     faults: tuple[str, ...]
 
 
-class Room:
+class Arena:
     """Memory that is filled, walked and handed out: `flush` leaves it to those who got it."""
 
     def __init__(self, definitions: Definitions) -> None:
@@ -58,23 +58,23 @@ class Room:
         """`size` more bytes can lie beside what is there, and a CRC covers both or neither."""
         return self._covered == covered and size <= len(self._data) - self._used
 
-    def take(self, size: int) -> Bytes:
+    def reserve(self, size: int) -> Bytes:
         """Memory for the next chunk; it counts once `walk` is told of it."""
         return self._data[self._used : self._used + size]
 
-    def renew(self, memory: Bytes, covered: bool) -> None:
+    def reset(self, memory: Bytes, covered: bool) -> None:
         """Start again with `memory`, once what is there was handed out."""
         self._data, self._covered = memory, covered
 
-    def pass_over(self, size: int, taken: Taken) -> Iterator[Piece]:
+    def add_decoded(self, size: int, taken: Taken) -> Iterator[MessageBlock]:
         """The next `size` bytes are a chunk whose messages are columns already."""
         if self._table.count:
             yield from self._hand_out()
         self._taken.append(taken)
         self._used += size
 
-    def walk(self, size: int, top_level: bool = False) -> Generator[Piece, None, Walked]:
-        """Take the records of the next `size` bytes; gives a Walked. Hands out pieces where the table is full."""
+    def walk(self, size: int, top_level: bool = False) -> Generator[MessageBlock, None, WalkResult]:
+        """Take the records of the next `size` bytes; gives a WalkResult. Hands out pieces where the table is full."""
         if self._taken:
             yield from self._hand_out()
         at, end, before = self._used, self._used + size, self._table.count
@@ -89,17 +89,17 @@ class Room:
             yield from self._hand_out()
         times = None if emptied else self._table.times(before)
         begin, self._used = self._used, end
-        return Walked(at - begin, reason, times, tuple(faults))
+        return WalkResult(at - begin, reason, times, tuple(faults))
 
-    def take_window(self, window: Bytes) -> Generator[Piece, None, Walked]:
-        """Start again with records that stand in the file itself, outside of chunks; gives a Walked."""
+    def take_window(self, window: Bytes) -> Generator[MessageBlock, None, WalkResult]:
+        """Start again with records that stand in the file itself, outside of chunks; gives a WalkResult."""
         yield from self.flush()
         self._data, self._covered = window, False
         walked = yield from self.walk(len(window), top_level=True)
         yield from self.flush()
         return walked
 
-    def flush(self) -> Iterator[Piece]:
+    def flush(self) -> Iterator[MessageBlock]:
         """Hand out what is there."""
         yield from self._hand_out()
         self._data, self._used, self._cuts = np.empty(0, np.uint8), 0, {}
@@ -118,15 +118,15 @@ class Room:
                 yield str(fault)
             self._cuts.update(dict.fromkeys(set(self._definitions.ambiguous) - before, start))
 
-    def _hand_out(self) -> Iterator[Piece]:
+    def _hand_out(self) -> Iterator[MessageBlock]:
         if self._taken:
             taken, self._taken = tuple(self._taken), []
             if self.first_time is None or self.first_time >= NO_DATE:
                 self.first_time = taken[0].first_time
-            yield Piece(self._data, (), self._covered, {}, taken)
+            yield MessageBlock(self._data, (), self._covered, {}, taken)
         if not self._table.count:
             return
         if self.first_time is None or self.first_time >= NO_DATE:
             self.first_time = self._table.first_time()
         cuts = {channel: self._cuts.get(channel, 0) for channel in self._definitions.ambiguous}
-        yield Piece(self._data, tuple(self._table.by_channel(self._data)), self._covered, cuts)
+        yield MessageBlock(self._data, tuple(self._table.by_channel(self._data)), self._covered, cuts)

@@ -27,7 +27,7 @@ from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
-from cdtool.formats.mcap.container.summary import Summary, same_figures
+from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.taken import Taken, Taker
 
@@ -84,7 +84,7 @@ _BUFFERS = Buffers(JOINED)
 
 
 @dataclass(frozen=True)
-class _Filled:
+class _CheckedChunk:
     """A chunk that was checked: its header, and either its messages, if they were taken, or its address in memory."""
 
     header: ChunkHeader
@@ -98,13 +98,13 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         self.file = FileBytes(path)
         self.decompressor = Decompressor()
-        self._room = np.empty(0, np.uint8)
+        self._buffer = np.empty(0, np.uint8)
 
-    def room(self, size: int) -> Bytes:
+    def buffer(self, size: int) -> Bytes:
         """Memory that is used for one chunk after another, so that it stays in the processor's cache."""
-        if size > len(self._room):
-            self._room = np.empty(size, np.uint8)
-        return self._room[:size]
+        if size > len(self._buffer):
+            self._buffer = np.empty(size, np.uint8)
+        return self._buffer[:size]
 
 
 @dataclass(frozen=True)
@@ -112,10 +112,10 @@ class _Group:
     """Memory for a group of chunks, and what becomes of each; None: it has to be read when its turn comes."""
 
     memory: Bytes
-    chunks: tuple[Future[list[_Filled | None]], ...]
+    chunks: tuple[Future[list[_CheckedChunk | None]], ...]
 
 
-class ChunksAhead:
+class ChunkReadAhead:
     """The chunks of `summary` at places that are not in `skip`; without a CRC of the summary, none.
 
     `taker` is given each one, as long as `definitions` are of one meaning.
@@ -126,12 +126,12 @@ class ChunksAhead:
     ) -> None:
         self._path, self._definitions, self._taker = path, definitions, taker
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
-        self._rows = foretold_messages(chunks) if taker is not None else {}
+        self._rows = expected_rows(chunks) if taker is not None else {}
         threads = min(usable_cores(), _MOST_THREADS, len(chunks))
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
         self._following = dict(pairwise(self._groups))
         self._started: dict[int, _Group] = {}
-        self._there: dict[ChunkHeader, _Filled] = {}
+        self._there: dict[ChunkHeader, _CheckedChunk] = {}
         self._threads = ThreadPoolExecutor(threads, "chunks") if threads > 1 else None
         self._readers: SimpleQueue[_Reader] = SimpleQueue()
 
@@ -191,10 +191,10 @@ class ChunksAhead:
         several = [places[i : i + _SUBMITTED] for i in range(0, len(places), _SUBMITTED)]
         return _Group(memory, tuple(self._threads.submit(self._fill_all, some) for some in several))
 
-    def _fill_all(self, places: list[tuple[ChunkIndex, Bytes]]) -> list[_Filled | None]:
+    def _fill_all(self, places: list[tuple[ChunkIndex, Bytes]]) -> list[_CheckedChunk | None]:
         return [self._fill(index, content) for index, content in places]
 
-    def _fill(self, index: ChunkIndex, content: Bytes) -> _Filled | None:
+    def _fill(self, index: ChunkIndex, content: Bytes) -> _CheckedChunk | None:
         at = index.chunk_start_offset
         try:
             reader = self._reader()
@@ -202,25 +202,25 @@ class ChunksAhead:
             return None
         try:
             header = chunk_header(at, reader.file.read(at, HEADER_LENGTH))
-            if header is None or not header.uncompressed_crc or not same_figures(index, header):
+            if header is None or not header.uncompressed_crc or not matches_header(index, header):
                 return None
             header.check()
             if self._taker is None or not self._taker.ready or at not in self._rows:
                 reader.decompressor.read(reader.file, header, content)
-                return _Filled(header, content.ctypes.data)
-            room = reader.room(len(content))
-            reader.decompressor.read(reader.file, header, room)
-            taken = self._taker.take(room, self._rows[at], self._knows)
+                return _CheckedChunk(header, content.ctypes.data)
+            buffer = reader.buffer(len(content))
+            reader.decompressor.read(reader.file, header, buffer)
+            taken = self._taker.take(buffer, self._rows[at], self._is_known)
             if taken is not None:
-                return _Filled(header, taken=taken)
-            content[:] = room
-            return _Filled(header, content.ctypes.data)
+                return _CheckedChunk(header, taken=taken)
+            content[:] = buffer
+            return _CheckedChunk(header, content.ctypes.data)
         except (DamageError, OSError):
             return None
         finally:
             self._readers.put(reader)
 
-    def _knows(self, opcode: int, body: bytes) -> bool:
+    def _is_known(self, opcode: int, body: bytes) -> bool:
         return self._definitions.knows(opcode, body, covered=True)
 
     def _reader(self) -> _Reader:
@@ -245,7 +245,7 @@ def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
         yield group
 
 
-def foretold_messages(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]]:
+def expected_rows(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]]:
     """By a chunk's place and a channel's id the numbers of its messages among all of the channel in these chunks.
 
     A message index has 16 bytes for each message of its channel, and its place in the file is in the chunk's

@@ -84,7 +84,7 @@ def chunk_header(at: int, head: memoryview) -> ChunkHeader | None:
 
 
 @dataclass
-class Claims:
+class ClaimedSizes:
     """What the chunks of a file become together: many small bombs are one large one."""
 
     packed: int = 0
@@ -105,26 +105,26 @@ class Decompressor:
     def __init__(self) -> None:
         self._into: dict[str, Callable[[Bytes, Bytes], int]] = {}
 
-    def read(self, file: FileBytes, header: ChunkHeader, room: Bytes) -> None:
-        """Read a whole chunk from the file into `room` (uncompressed_size,) and check it; raises DamageError."""
+    def read(self, file: FileBytes, header: ChunkHeader, target: Bytes) -> None:
+        """Read a whole chunk from the file into `target` (uncompressed_size,) and check it; raises DamageError."""
         if header.compression:
-            self.fill(header, file.passing(header.data, header.size), room)
+            self.fill(header, file.read_scratch(header.data, header.size), target)
         else:
-            file.read_into(header.data, room)
-            check_crc(header, room)
+            file.read_into(header.data, target)
+            check_crc(header, target)
 
-    def fill(self, header: ChunkHeader, packed: Bytes, room: Bytes) -> None:
-        """Decompress a whole chunk into `room` (uncompressed_size,) and check it; raises DamageError."""
-        size = self.fill_what_there_is(header, packed, room)
-        if size != len(room):
-            raise DamageError(f"a chunk of {size} bytes claims {len(room)}")
-        check_crc(header, room)
+    def fill(self, header: ChunkHeader, packed: Bytes, target: Bytes) -> None:
+        """Decompress a whole chunk into `target` (uncompressed_size,) and check it; raises DamageError."""
+        size = self.fill_available(header, packed, target)
+        if size != len(target):
+            raise DamageError(f"a chunk of {size} bytes claims {len(target)}")
+        check_crc(header, target)
 
-    def fill_what_there_is(self, header: ChunkHeader, packed: Bytes, room: Bytes) -> int:
+    def fill_available(self, header: ChunkHeader, packed: Bytes, target: Bytes) -> int:
         """The same of a chunk that is cut off: how many bytes could be had. Nothing tells whether they are right."""
         if header.compression not in self._into:
             self._into[header.compression] = _zstd() if header.compression == "zstd" else _lz4()
-        return self._into[header.compression](packed, room)
+        return self._into[header.compression](packed, target)
 
 
 def check_crc(header: ChunkHeader, content: Bytes) -> None:
@@ -138,27 +138,27 @@ def _zstd() -> Callable[[Bytes, Bytes], int]:
 
     made = zstandard.ZstdDecompressor(max_window_size=LARGEST)
 
-    def into(packed: Bytes, room: Bytes) -> int:
+    def decompress(packed: Bytes, target: Bytes) -> int:
         # All at once into memory of the declared size: zstd then needs no window of its own, and cannot go beyond.
         with made.stream_reader(packed.data, read_size=max(1, len(packed)), read_across_frames=True) as stream:
             filled = 0
             try:
-                while filled < len(room) and (got := stream.readinto(room.data[filled:])):
+                while filled < len(target) and (got := stream.readinto(target.data[filled:])):
                     filled += got
-                more = stream.read(1) if filled == len(room) else b""
+                more = stream.read(1) if filled == len(target) else b""
             except zstandard.ZstdError as fault:
                 raise DamageError(f"zstd: {fault}") from fault
         if more:
-            raise DamageError(f"a chunk holds more than the {len(room)} bytes it claims")
+            raise DamageError(f"a chunk holds more than the {len(target)} bytes it claims")
         return filled
 
-    return into
+    return decompress
 
 
 def _lz4() -> Callable[[Bytes, Bytes], int]:
     import lz4.frame  # type: ignore[import-untyped]
 
-    def into(packed: Bytes, room: Bytes) -> int:
+    def decompress(packed: Bytes, target: Bytes) -> int:
         filled, left = 0, packed.data
         try:
             for _ in range(_LZ4_FRAMES):  # one frame after another, as a file of them would be read
@@ -169,10 +169,10 @@ def _lz4() -> Callable[[Bytes, Bytes], int]:
                     given = left[:0]
                     if made.needs_input:
                         given, left = left[:_LZ4_IN], left[_LZ4_IN:]
-                    part = made.decompress(given, max_length=min(len(room) - filled + 1, _LZ4_OUT))
-                    if len(part) > len(room) - filled:
-                        raise DamageError(f"a chunk holds more than the {len(room)} bytes it claims")
-                    room[filled : filled + len(part)] = np.frombuffer(part, np.uint8)
+                    part = made.decompress(given, max_length=min(len(target) - filled + 1, _LZ4_OUT))
+                    if len(part) > len(target) - filled:
+                        raise DamageError(f"a chunk holds more than the {len(target)} bytes it claims")
+                    target[filled : filled + len(part)] = np.frombuffer(part, np.uint8)
                     filled += len(part)
                     if not (len(part) or len(given) or made.needs_input):
                         break
@@ -182,4 +182,4 @@ def _lz4() -> Callable[[Bytes, Bytes], int]:
             raise DamageError(f"lz4: {fault}") from fault
         return filled
 
-    return into
+    return decompress

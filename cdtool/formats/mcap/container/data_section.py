@@ -14,14 +14,14 @@ from itertools import pairwise
 import numpy as np
 
 from cdtool.formats.mcap.container import walk_kernel as why
-from cdtool.formats.mcap.container.arena import Piece, Room, Walked
+from cdtool.formats.mcap.container.arena import Arena, MessageBlock, WalkResult
 from cdtool.formats.mcap.container.attachments import check_attachment
-from cdtool.formats.mcap.container.chunk_read_ahead import ChunksAhead
+from cdtool.formats.mcap.container.chunk_read_ahead import ChunkReadAhead
 from cdtool.formats.mcap.container.chunks import (
     HEADER_LENGTH,
     LARGEST,
     ChunkHeader,
-    Claims,
+    ClaimedSizes,
     Decompressor,
     chunk_header,
 )
@@ -43,7 +43,7 @@ from cdtool.formats.mcap.container.records import (
     Schema,
 )
 from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
-from cdtool.formats.mcap.container.summary import Summary, same_figures
+from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.taken import Taker
 
@@ -78,23 +78,23 @@ class DataSection:
         self.extras: dict[tuple[int, int, int], None] = {}
         self.end: DataEnd | None = None
         self.end_at = self.other_times = 0
-        self.room = Room(definitions)
+        self.arena = Arena(definitions)
         self._file, self._summary, self._skip = file, summary, skip
         self._following = dict(pairwise(sorted(summary.chunks)))
         self._decompressor = Decompressor()
-        self._ahead = ChunksAhead(file.path, summary, skip, definitions, taker)
+        self._ahead = ChunkReadAhead(file.path, summary, skip, definitions, taker)
         self._window = _SMALLEST_WINDOW
-        self._claims = Claims()
+        self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
 
-    def pieces(self) -> Iterator[Piece]:
+    def pieces(self) -> Iterator[MessageBlock]:
         """All messages that can be had."""
         with self._ahead:
             yield from self._records()
-            yield from self.room.flush()
+            yield from self.arena.flush()
 
-    def _records(self) -> Iterator[Piece]:
+    def _records(self) -> Iterator[MessageBlock]:
         at = len(MAGIC)
         if bytes(self._file.read(0, at)) != MAGIC:
             self.losses.add(Loss(0, min(at, self._file.size), "the file does not begin as an MCAP file"))
@@ -140,21 +140,21 @@ class DataSection:
         self.losses.add(Loss(begin, behind - begin, reason))
         return behind
 
-    def _chunk(self, header: ChunkHeader) -> Iterator[Piece]:
+    def _chunk(self, header: ChunkHeader) -> Iterator[MessageBlock]:
         self._lost = None
         self.chunks[header.at] = header
         if header.at in self._skip:
-            self._resync.proven = header.at + header.length
+            self._resync.verified_to = header.at + header.length
             return
-        self._resync.proven = header.at + 1
+        self._resync.verified_to = header.at + 1
         covered = header.uncompressed_crc != 0
         try:
             header.check()
             self._claims.add(header)
-            if self._ahead.begins(header.at) or not self.room.fits(header.uncompressed_size, covered):
-                yield from self.room.flush()  # before the next group is waited for: it may be taken by these
-                self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered)
-            content = self.room.take(header.uncompressed_size)
+            if self._ahead.begins(header.at) or not self.arena.fits(header.uncompressed_size, covered):
+                yield from self.arena.flush()  # before the next group is waited for: it may be taken by these
+                self.arena.reset(self._ahead.memory(header.at, header.uncompressed_size), covered)
+            content = self.arena.reserve(header.uncompressed_size)
             taken = self._ahead.taken(header)
             if taken is None and not self._ahead.holds(header, content):
                 self._decompressor.read(self._file, header, content)
@@ -162,12 +162,12 @@ class DataSection:
             loss = Loss.of_chunk(header, self._summary, str(fault), refused=isinstance(fault, RefusedError))
             self._lost = self.losses.add(loss)
             return
-        self._resync.proven = header.at + header.length
+        self._resync.verified_to = header.at + header.length
         if taken is not None:
-            yield from self.room.pass_over(len(content), taken)
+            yield from self.arena.add_decoded(len(content), taken)
             times: tuple[int, int] | None = taken.times
         else:
-            walked = yield from self.room.walk(len(content))
+            walked = yield from self.arena.walk(len(content))
             self._note(walked, header.at, len(content))
             times = walked.times if walked.why == why.DONE else None
         if times is not None:
@@ -179,13 +179,13 @@ class DataSection:
     def _behind(self, header: ChunkHeader) -> int:
         """The next place to look at: the next chunk, where a verified summary has only message indexes before it."""
         end, index = header.at + header.length, self._summary.chunks.get(header.at)
-        if self._lost is None and index is not None and self._summary.verified and same_figures(index, header):
+        if self._lost is None and index is not None and self._summary.verified and matches_header(index, header):
             following = self._following.get(header.at)
             if following == end + index.message_index_length and only_message_indexes(self._file, end, following):
                 return following
         return end
 
-    def _cut_chunk(self, header: ChunkHeader) -> Iterator[Piece]:
+    def _cut_chunk(self, header: ChunkHeader) -> Iterator[MessageBlock]:
         """A chunk that the end of the file cuts off: what lies before the cut."""
         left = self._file.size - header.data
         loss = Loss.of_chunk(header, self._summary, f"the file ends within a chunk: {left} of {header.size} bytes")
@@ -195,34 +195,34 @@ class DataSection:
         header.check()
         self.losses.stopped = True
         self.losses.add(loss)
-        yield from self.room.flush()
-        self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
-        content = self.room.take(header.uncompressed_size)
-        packed = self._file.passing(header.data, left)
+        yield from self.arena.flush()
+        self.arena.reset(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
+        content = self.arena.reserve(header.uncompressed_size)
+        packed = self._file.read_scratch(header.data, left)
         if header.compression:
             try:
-                left = self._decompressor.fill_what_there_is(header, packed, content)
+                left = self._decompressor.fill_available(header, packed, content)
             except DamageError as fault:
                 loss.reason = str(fault)
                 return
         else:
             content[:left] = packed
-        yield from self.room.walk(left)
+        yield from self.arena.walk(left)
 
-    def _outside_chunks(self, at: int, length: int) -> Generator[Piece, None, int]:
+    def _outside_chunks(self, at: int, length: int) -> Generator[MessageBlock, None, int]:
         """Schemas, channels and messages outside of chunks, as many as a window holds; gives the place behind them."""
         if length > LARGEST:
             raise DamageError(f"a record claims {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
         window = self._file.array(at, max(self._window, length))
-        walked = yield from self.room.take_window(window)
-        self._resync.proven = at + walked.at
+        walked = yield from self.arena.take_window(window)
+        self._resync.verified_to = at + walked.at
         self._note(walked, at, len(window))
         self._window = min(4 * self._window, _LARGEST_WINDOW) if 2 * walked.at > len(window) else _SMALLEST_WINDOW
         if walked.why == why.SHORT_MESSAGE:
             return self._resume(at + walked.at, _REASONS[walked.why])
         return at + walked.at
 
-    def _note(self, walked: Walked, at: int, size: int) -> None:
+    def _note(self, walked: WalkResult, at: int, size: int) -> None:
         """What is wrong with records in a chunk or window at byte `at`."""
         for fault in walked.faults:
             self.losses.add(Loss(at, 0, f"a definition: {fault}"))
@@ -252,7 +252,7 @@ class DataSection:
             else:
                 self.extras[opcode, at, length] = None
                 if opcode == Attachment.opcode:
-                    self._resync.proven = at + length
+                    self._resync.verified_to = at + length
 
 
 def record_length(at: int, head: memoryview, size: int) -> int:
@@ -279,7 +279,7 @@ class Resync:
     """
 
     def __init__(self, file: FileBytes, summary: Summary) -> None:
-        self.proven = len(MAGIC)
+        self.verified_to = len(MAGIC)
         self._file = file
         self._known = sorted(summary.chunks) if summary.verified else []
         self._back = file.size  # bytes that may still be gone back
@@ -294,14 +294,14 @@ class Resync:
 
     def after(self, at: int) -> tuple[int, int | None]:
         """Behind byte `at`, which begins no record: from where on bytes are lost, and the next chunk (None: none)."""
-        found = self._next(self.proven)
+        found = self._next(self.verified_to)
         if found is not None and found <= at:
             self._back -= at - found
             if found == at or self._back < 0:
                 found = self._next(at + 1)
         if found is None:
             return at, None
-        begin, self.proven = min(at, self.proven) if found < at else at, found + 1
+        begin, self.verified_to = min(at, self.verified_to) if found < at else at, found + 1
         return begin, found
 
     def _next(self, at: int) -> int | None:

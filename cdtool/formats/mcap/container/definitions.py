@@ -34,7 +34,7 @@ class Definitions:
         self._streams: dict[int, DefinedStream | DamageError] = {}
         self._taken: dict[tuple[int, bytes, bool], bytes] = {}
 
-    def knows(self, opcode: int, body: bytes, covered: bool) -> bool:
+    def is_known(self, opcode: int, body: bytes, covered: bool) -> bool:
         """True where one more look tells nothing new: writers repeat definitions, and half a million fit into 8 kB."""
         if opcode == Channel.opcode and len(body) > 1 and int.from_bytes(body[:2], "little") in self.ambiguous:
             return True
@@ -78,7 +78,7 @@ class Definitions:
         found = (self._find(channel) for channel in self._channels | self._fallback.channels)
         return [stream for stream in found if isinstance(stream, DefinedStream)]
 
-    def told_otherwise(self) -> list[str]:
+    def redefined_topics(self) -> list[str]:
         """Topics whose channel or schema the summary defines otherwise than the data."""
         known = {stream.id: stream for stream in self.streams()}
         return [

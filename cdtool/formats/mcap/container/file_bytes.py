@@ -48,21 +48,21 @@ class FileBytes:
 
     def array(self, at: int, length: int) -> Bytes:
         """The same as an array of its own."""
-        room = np.empty(max(0, min(length, self.size - at)), np.uint8)
-        self.read_into(at, room)
-        return room
+        target = np.empty(max(0, min(length, self.size - at)), np.uint8)
+        self.read_into(at, target)
+        return target
 
-    def passing(self, at: int, length: int) -> Bytes:
+    def read_scratch(self, at: int, length: int) -> Bytes:
         """The same in memory that the next call uses again; raises DamageError where the file ends before."""
         if length > len(self._scratch):
             self._scratch = np.empty(max(length, _PIECE), np.uint8)
         self.read_into(at, self._scratch[:length])
         return self._scratch[:length]
 
-    def read_into(self, at: int, room: Bytes) -> None:
-        """Fill `room` from `at` on; raises DamageError where the file ends before."""
+    def read_into(self, at: int, target: Bytes) -> None:
+        """Fill `target` from `at` on; raises DamageError where the file ends before."""
         self._file.seek(at)
-        view, filled = room.data, 0
+        view, filled = target.data, 0
         while filled < len(view):
             got = self._file.readinto(view[filled:])
             if not got:
@@ -71,9 +71,9 @@ class FileBytes:
 
     def crc(self, at: int, end: int) -> int:
         """CRC-32 of the bytes from `at` to `end`."""
-        crc, room = 0, np.empty(_PIECE, np.uint8)
+        crc, target = 0, np.empty(_PIECE, np.uint8)
         while at < end:
-            piece = room[: min(_PIECE, end - at)]
+            piece = target[: min(_PIECE, end - at)]
             self.read_into(at, piece)
             crc = crc32(piece, crc)
             at += len(piece)

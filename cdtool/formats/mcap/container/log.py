@@ -22,15 +22,15 @@ from cdtool.findings.containers import (
     SummaryDamaged,
     Unverified,
 )
-from cdtool.formats.mcap.container.arena import Piece
+from cdtool.formats.mcap.container.arena import MessageBlock
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss
 from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
-from cdtool.formats.mcap.container.skippable_chunks import skippable
-from cdtool.formats.mcap.container.summary import read_summary, same_figures
+from cdtool.formats.mcap.container.skippable_chunks import skippable_chunks
+from cdtool.formats.mcap.container.summary import matches_header, read_summary
 from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import NO_BATCH, Batch
 from cdtool.messages.taken import Part, Taker
@@ -84,7 +84,7 @@ class Log:
         self._wanted = wanted or (lambda _: True)
         self._file = FileBytes(path)
         self.summary = read_summary(self._file)
-        self._skip = skippable(self._file, self.summary, self._wanted) if use_index and wanted else {}
+        self._skip = skippable_chunks(self._file, self.summary, self._wanted) if use_index and wanted else {}
         self._definitions = Definitions(self.summary)
         self.section = DataSection(self._file, self.summary, self._definitions, self._skip, taker)
         self.profile = profile_of(self._file)
@@ -124,7 +124,7 @@ class Log:
         counts = summary.statistics.channel_message_counts
         return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
-    def _usable(self, piece: Piece) -> Iterator[Messages]:
+    def _usable(self, piece: MessageBlock) -> Iterator[Messages]:
         for channel in dict.fromkeys(channel for taken in piece.taken for channel in taken.counts):
             count = sum(taken.counts.get(channel, 0) for taken in piece.taken)
             parts = tuple(taken.parts[channel] for taken in piece.taken if channel in taken.parts)
@@ -163,9 +163,9 @@ class Log:
             topic = self.topics.setdefault(name, Topic(name, schema, stream.encoding))
             topic.count += self.counts[stream.id]
             topic.channels += bool(self.counts[stream.id])
-        self.origin = section.room.first_time or 0
+        self.origin = section.arena.first_time or 0
         self._check_data_crc()
-        self._look_behind()
+        self._check_appended_data()
         if self._strict and not self.count and section.losses:
             self._raise_nothing_left()
 
@@ -185,7 +185,7 @@ class Log:
             text += "" if self.unverified else " (those of the chunks with messages do)"
             self.section.losses.add(Loss(self.section.end_at, 0, text))
 
-    def _look_behind(self) -> None:
+    def _check_appended_data(self) -> None:
         """Bytes behind the end: of a file that is joined to it, whose summary is none of this log's."""
         if not self.summary.problem or self.section.end is None:
             return
@@ -232,7 +232,7 @@ class Log:
             missing = len(chunks.keys() - summary.chunks.keys())
             absent = len(summary.chunks.keys() - chunks.keys())
             both = chunks.keys() & summary.chunks.keys()
-            other = sum(not same_figures(summary.chunks[at], chunks[at]) for at in both)
+            other = sum(not matches_header(summary.chunks[at], chunks[at]) for at in both)
             differences = (
                 IndexDisagrees(missing, "not indexed"),
                 IndexDisagrees(absent, "only indexed"),
@@ -247,7 +247,7 @@ class Log:
             read = {channel: count for channel, count in self.counts.items() if count}
             if stated != read and statistics.message_count == self.count:
                 found.append(Finding(ChannelCountsDiffer()))
-        return found + [Finding(DefinedOtherwise(), topic) for topic in self._definitions.told_otherwise()]
+        return found + [Finding(DefinedOtherwise(), topic) for topic in self._definitions.redefined_topics()]
 
 
 def profile_of(file: FileBytes) -> str:

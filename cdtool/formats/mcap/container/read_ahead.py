@@ -9,7 +9,7 @@ from typing import TypeVar
 _Item = TypeVar("_Item")
 
 
-def ahead(items: Iterator[_Item]) -> Iterator[_Item]:
+def read_ahead(items: Iterator[_Item]) -> Iterator[_Item]:
     """The same items; each is made in a second thread while the one before it is used. Two are held at a time."""
     end = object()
     with ThreadPoolExecutor(1) as thread:

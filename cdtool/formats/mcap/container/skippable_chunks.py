@@ -18,10 +18,10 @@ from cdtool.formats.mcap.container.records import (
     MessageIndex,
     Schema,
 )
-from cdtool.formats.mcap.container.summary import Summary, same_figures
+from cdtool.formats.mcap.container.summary import Summary, matches_header
 
 
-def skippable(file: FileBytes, summary: Summary, wanted: Callable[[str], bool]) -> dict[int, dict[int, int]]:
+def skippable_chunks(file: FileBytes, summary: Summary, wanted: Callable[[str], bool]) -> dict[int, dict[int, int]]:
     """Places of the chunks that hold no wanted topic -> their messages by channel; empty unless that can be trusted.
 
     It can where the summary's CRC fits, the chunks stand where the index has them with the same figures, no message
@@ -75,7 +75,7 @@ def _indexed_messages(file: FileBytes, summary: Summary) -> dict[int, dict[int, 
             return held if same and len(held) == len(summary.chunks) else None
         if head[0] == Chunk.opcode:
             index = summary.chunks.get(at)
-            if header is None or index is None or not same_figures(index, header):
+            if header is None or index is None or not matches_header(index, header):
                 return None
             place = at
             held[place] = {}

@@ -55,7 +55,7 @@ def read_summary(file: FileBytes) -> Summary:
         crc = crc32(file.read(at, PREFIX + 16), crc32(section))
         if footer.summary_crc and crc != footer.summary_crc:
             raise DamageError("the checksum of the summary does not fit")
-        records = tuple(parsed(section))
+        records = tuple(parse_records(section))
     except DamageError as fault:
         return Summary(footer, problem=str(fault))
     counts = [record for record in records if isinstance(record, Statistics)]
@@ -70,7 +70,7 @@ def read_summary(file: FileBytes) -> Summary:
     )
 
 
-def same_figures(index: ChunkIndex, header: ChunkHeader) -> bool:
+def matches_header(index: ChunkIndex, header: ChunkHeader) -> bool:
     """The index of a chunk tells what the chunk's own header tells."""
     return (
         index.chunk_length == header.length
@@ -82,17 +82,17 @@ def same_figures(index: ChunkIndex, header: ChunkHeader) -> bool:
     )
 
 
-def parsed(section: memoryview) -> Iterator[Record]:
+def parse_records(section: memoryview) -> Iterator[Record]:
     """The known records of a piece of a file, one after the other; raises DamageError."""
     at = 0
     while at < len(section):
-        opcode, length = framed(section[at:])
+        opcode, length = read_prefix(section[at:])
         if opcode in KINDS:
             yield KINDS[opcode].read(section[at + PREFIX : at + PREFIX + length])
         at += PREFIX + length
 
 
-def framed(rest: memoryview) -> tuple[int, int]:
+def read_prefix(rest: memoryview) -> tuple[int, int]:
     """Opcode and content length of the record with which `rest` begins; raises DamageError where it is not whole."""
     if len(rest) < PREFIX:
         raise DamageError(f"the file ends within a record: {len(rest)} bytes are left")
@@ -109,6 +109,6 @@ def _footer(file: FileBytes) -> tuple[Footer, int]:
     end = file.read(max(0, at), file.size)
     if at < len(MAGIC) or bytes(end[-len(MAGIC) :]) != MAGIC:
         raise DamageError("the file does not end as an MCAP file")
-    if end[0] != Footer.opcode or framed(end[: -len(MAGIC)])[1] != _FOOTER - PREFIX:
+    if end[0] != Footer.opcode or read_prefix(end[: -len(MAGIC)])[1] != _FOOTER - PREFIX:
         raise DamageError("the file does not end with a footer")
     return Footer.read(end[PREFIX:]), at
