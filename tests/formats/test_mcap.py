@@ -186,7 +186,7 @@ def test_writing_refuses_what_a_message_cannot_hold(written):
         written([stream("std_msgs/msg/Float64", data=np.zeros(3))])
     with pytest.raises(UsageError, match="number them from 0"):
         written([Stream("/a", "sensor_msgs/msg/JointState", TIME, {"position[1]": TIME})])
-    with pytest.raises(UsageError, match="written twice"):
+    with pytest.raises(UsageError, match="several streams have the same topic"):
         written([STREAMS[3], STREAMS[3]])
 
 

@@ -109,7 +109,7 @@ def test_a_wrong_checksum_of_unchunked_data_is_an_error(by_hand):
     whole = path.read_bytes()
     assert not Mcap().columns(path).findings
     path.write_bytes(whole.replace(b'{"x": 5}', b'{"x": 6}'))
-    with pytest.raises(RecordingError, match="checksum of the data does not fit"):
+    with pytest.raises(RecordingError, match="checksum of the data does not match"):
         Mcap().columns(path)
 
 
@@ -124,7 +124,7 @@ def test_a_record_that_claims_more_than_the_file_holds_is_refused_without_readin
     path = tmp_path / "lie.mcap"
     path.write_bytes(b"\x89MCAP0\r\n\x01" + struct.pack("<Q", 2**40) + b"abc")
     with pytest.raises(
-        RecordingError, match="damaged at byte 8, before its first message: a record claims 1099511627776"
+        RecordingError, match="damaged at byte 8, before its first message: a record declares 1099511627776"
     ):
         Mcap().columns(path)
 

@@ -126,16 +126,16 @@ def resolve_marks(dialect: Dialect) -> Marks:
     Raises RecordingError if the rows can be read in two ways.
     """
     pins, path = dialect.pins, dialect.text.path
-    seen: list[tuple[str, int]] = []
+    numbers: list[tuple[str, int]] = []
     points: dict[int, tuple[str, int]] = {}
     for text, line, column in _marked_cells(dialect):
         if _MARKED.search(text) is None:
             continue
-        seen.append((text, line))
-        if _GROUPED.fullmatch(text) is None or len(seen) == _ENOUGH:
+        numbers.append((text, line))
+        if _GROUPED.fullmatch(text) is None or len(numbers) == _ENOUGH:
             break  # this number decides, or enough of them were seen
         points.setdefault(column, (text, line))
-    marks = find_marks(path, seen, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
+    marks = find_marks(path, numbers, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
     if marks.sure or marks.decimal != ".":
         return marks
     for column, (text, line) in points.items():

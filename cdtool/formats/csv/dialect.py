@@ -99,7 +99,7 @@ def _pins_text(dialect: Dialect) -> str:
         lines.append(f"comment = {quoted(pins.comment)}")
     if pins.missing:
         lines.append(f"missing = [{', '.join(map(quoted, pins.missing))}]")
-    layouts = {item.layout.pattern for item in dialect.stamped.values() if item.layout}
+    layouts = {each.layout.pattern for each in dialect.stamped.values() if each.layout}
     if len(layouts) == 1:
         lines.append(f"time_format = {quoted(layouts.pop())}")
     elif pins.time_format:

@@ -32,10 +32,10 @@ class Line:
     @property
     def separator(self) -> str | None:
         """Return the separator that a line `sep=;` of Excel names; None for any other line."""
-        found = _EXCEL.fullmatch(self.text.strip("\r\n ")) if self.number < 3 else None
-        if found is None:
+        match = _EXCEL.fullmatch(self.text.strip("\r\n ")) if self.number < 3 else None
+        if match is None:
             return None
-        mark = found["separator"] or "\t"
+        mark = match["separator"] or "\t"
         return "\t" if mark == "\\t" else mark
 
     def is_comment(self, mark: str) -> bool:

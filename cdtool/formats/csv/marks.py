@@ -96,18 +96,18 @@ def find_marks(
     # A single cell with a blank may be two cells without a separator.
     if evidence.blank_groups < 2 or separator == " ":
         evidence.thousands.pop(" ", None)
-    found = decimal or {",": ".", ".": ","}.get(thousands or "") or _decimal(path, evidence)
+    mark = decimal or {",": ".", ".": ","}.get(thousands or "") or _decimal(path, evidence)
     if thousands is not None:
-        return Marks(found, thousands)
-    other = "." if found == "," else ","
+        return Marks(mark, thousands)
+    other = "." if mark == "," else ","
     # Numbers in quotes, in a table separated by commas, usually have a comma as thousands separator.
-    assumed = evidence.either.get(other) if decimal or (separator == "," and found == ".") else None
-    groups = {mark: cell for mark, cell in evidence.thousands.items() if mark != found}
+    assumed = evidence.either.get(other) if decimal or (separator == "," and mark == ".") else None
+    groups = {group: cell for group, cell in evidence.thousands.items() if group != mark}
     if assumed and other not in groups:
         groups[other] = assumed
     ambiguous = evidence.either.get(other)
     if ambiguous and other not in groups:
-        sure = evidence.decimal.get(found)
+        sure = evidence.decimal.get(mark)
         raise RecordingError(
             f"{path}: {ambiguous} next to {sure}: '{other}' may separate thousands, or be a decimal mark, too",
             "pin decimal and thousands in [csv] of the machine file",
@@ -117,8 +117,8 @@ def find_marks(
         raise RecordingError(f"{path}: two thousands separators: {cells}", "pin thousands in [csv]")
     group_mark = next(iter(groups), "")
     certain = bool(decimal or evidence.decimal or groups)
-    is_ambiguous = separator != "," and found == "." and not certain
-    return Marks(found, group_mark, evidence.either.get(found) if is_ambiguous else None, certain)
+    is_ambiguous = separator != "," and mark == "." and not certain
+    return Marks(mark, group_mark, evidence.either.get(mark) if is_ambiguous else None, certain)
 
 
 def _decimal(path: Path, evidence: _Evidence) -> str:

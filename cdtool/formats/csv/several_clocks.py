@@ -48,16 +48,16 @@ class Clocks:
         """Return the clocks: columns of numbers with a clock's name, and the column `stated` by the machine file."""
         names, count = dialect.names, len(dialect.names)
         numbers = [i for i in range(count) if dialect.kinds[i] == "N" and _NAMES.match(names[i])]
-        found = sorted({*numbers, *(i for i in range(count) if names[i] == stated)})
-        starts = [i for i in found if i - 1 not in found]
-        groups = [tuple(i for i in found if start <= i < end) for start, end in pairwise([*starts, count])]
-        behind = bool(found) and found[0] > 0 and found[-1] == count - 1
+        clock_columns = sorted({*numbers, *(i for i in range(count) if names[i] == stated)})
+        starts = [i for i in clock_columns if i - 1 not in clock_columns]
+        groups = [tuple(i for i in clock_columns if start <= i < end) for start, end in pairwise([*starts, count])]
+        is_after_columns = bool(clock_columns) and clock_columns[0] > 0 and clock_columns[-1] == count - 1
         of = {}
         for column in range(count):
             before = [k for k, group in enumerate(groups) if group[0] < column]
             after = [k for k, group in enumerate(groups) if group[0] > column]
-            nearest = after[:1] if behind else before[-1:]
-            if column not in found and nearest:
+            nearest = after[:1] if is_after_columns else before[-1:]
+            if column not in clock_columns and nearest:
                 of[column] = nearest[0]
         return cls(tuple(groups), of)
 

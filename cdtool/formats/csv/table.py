@@ -242,20 +242,20 @@ def _sort_columns(
     """Return columns of numbers, columns of stamps, and columns that a survey leaves out, with the finding."""
     numeric, stamps, left_out = [], [], {}
     for column in columns:
-        name, found = dialect.names[column], dialect.stamped.get(column)
-        if found is None or not (survey or name == clock):
+        name, stamped = dialect.names[column], dialect.stamped.get(column)
+        if stamped is None or not (survey or name == clock):
             if survey and column in dialect.words:
                 words = dialect.words[column]
                 left_out[column] = not_numeric(name, words.line, words.text)
             else:
                 numeric.append(column)
-        elif found.layout is None:
-            timed = found.layouts[0].timed or _clock_beside(dialect, column) is not None
+        elif stamped.layout is None:
+            timed = stamped.layouts[0].timed or _clock_beside(dialect, column) is not None
             if not survey or timed:
                 raise RecordingError(
-                    f"{path}: column '{name}': {found.readings}", "pin time_format in [csv] of the machine file"
+                    f"{path}: column '{name}': {stamped.readings}", "pin time_format in [csv] of the machine file"
                 )
-            left_out[column] = Finding(AmbiguousTimes(name, found.readings))
+            left_out[column] = Finding(AmbiguousTimes(name, stamped.readings))
         else:
             stamps.append(column)
     return numeric, stamps, left_out
@@ -264,8 +264,8 @@ def _sort_columns(
 def _clock_beside(dialect: Dialect, column: int) -> int | None:
     """Return the column of times of day next to a column of days; None if there is no such column."""
     for other in (column + 1, column - 1):
-        found = dialect.stamped.get(other)
-        if found is not None and found.layouts[0].timed and not found.layouts[0].dated:
+        stamped = dialect.stamped.get(other)
+        if stamped is not None and stamped.layouts[0].timed and not stamped.layouts[0].dated:
             return other
     return None
 
@@ -279,12 +279,12 @@ def _date_beside(path: Path, dialect: Dialect, column: int) -> int | None:
     if layout.dated or not layout.timed:
         return None
     for other in (column - 1, column + 1):
-        found = dialect.stamped.get(other)
-        if found is None or not found.layouts[0].dated or found.layouts[0].timed:
+        stamped = dialect.stamped.get(other)
+        if stamped is None or not stamped.layouts[0].dated or stamped.layouts[0].timed:
             continue
-        if found.layout is None:
+        if stamped.layout is None:
             raise RecordingError(
-                f"{path}: column '{dialect.names[other]}': {found.readings}",
+                f"{path}: column '{dialect.names[other]}': {stamped.readings}",
                 "pin time_format in [csv] of the machine file",
             )
         return other
@@ -366,11 +366,11 @@ class _Shape:
 
     @classmethod
     def of(cls, cell: str) -> _Shape | None:
-        found = _SHAPE.fullmatch(cell)
-        if found is None:
+        match = _SHAPE.fullmatch(cell)
+        if match is None:
             return None
-        decimals, power = found["decimals"], found["power"]
-        return cls(len(found["whole"]), -1 if decimals is None else len(decimals), -1 if power is None else len(power))
+        decimals, power = match["decimals"], match["power"]
+        return cls(len(match["whole"]), -1 if decimals is None else len(decimals), -1 if power is None else len(power))
 
 
 def is_complete(cell: str, above: Sequence[str]) -> tuple[bool, bool]:

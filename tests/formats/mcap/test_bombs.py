@@ -139,7 +139,7 @@ def test_a_record_that_claims_more_than_the_file_holds_is_not_read(tmp_path, opc
     path = file_of(tmp_path / "lie.mcap", good, struct.pack("<BQ", opcode, length) + bytes(40), good)
     found, findings = read_or_refused(path)
     assert found == [("/a", 0, b"{}")] * 2
-    assert f"claims {length} bytes" in findings[0]
+    assert f"declares {length} bytes" in findings[0]
 
 
 @pytest.mark.parametrize(

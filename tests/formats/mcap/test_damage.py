@@ -159,4 +159,4 @@ def test_a_wrong_checksum_of_an_attachment_is_a_loss(tmp_path):
     found, findings, _ = read(path)
     assert len(found) == 1
     assert findings[0].severity == "loss"
-    assert findings[0].fact.reason == "the checksum of an attachment does not fit"
+    assert findings[0].fact.reason == "the checksum of an attachment does not match"

@@ -59,14 +59,14 @@ def test_a_channel_that_is_not_there_loses_its_messages_only(tmp_path):
     path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, message(1, 1), message(7, 2), message(7, 3)))
     found, findings = read_or_refused(path)
     assert [time for _, time, _ in found] == [1]
-    assert findings == ["a message names channel 7, which is not there: 2 messages lost"]
+    assert findings == ["a message names channel 7, which is not defined: 2 messages lost"]
 
 
 def test_a_schema_that_is_not_there_loses_its_messages_only(tmp_path):
     path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, channel(3, b"/c", 9), message(1, 1), message(3, 2)))
     found, findings = read_or_refused(path)
     assert [time for _, time, _ in found] == [1]
-    assert findings == ["channel '/c' names schema 9, which is not there: 1 message lost"]
+    assert findings == ["channel '/c' names schema 9, which is not defined: 1 message lost"]
 
 
 def test_a_schema_with_the_id_0_is_ignored(tmp_path):

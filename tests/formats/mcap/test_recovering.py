@@ -100,7 +100,7 @@ def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path
         recover(source, output, force=True)
     done = recover(source, output, unverified=True, force=True)
     assert not done.whole
-    assert "the checksum of the data section does not fit" in said(output)["lost"]
+    assert "the checksum of the data section does not match" in said(output)["lost"]
     assert read(output)[2].unverified == len(sent)
 
 

@@ -141,4 +141,4 @@ def test_a_damaged_summary_is_said_and_the_data_read_without_it(tmp_path):
     path.write_bytes(whole)
     found, findings, _ = read(path)
     assert found == sent
-    assert findings[0].fact == SummaryDamaged("the checksum of the summary does not fit", len(sent))
+    assert findings[0].fact == SummaryDamaged("the checksum of the summary does not match", len(sent))

@@ -144,7 +144,7 @@ def test_a_file_joined_behind_the_end_is_told_and_not_blamed_on_the_summary(tmp_
     size, behind = first.stat().st_size, second.stat().st_size
     first.write_bytes(first.read_bytes() + second.read_bytes())
     (fact,) = told_of(Mcap().columns(first))
-    assert fact == DamagedAt(size, "the log ends here: another file joined to it?", LostBytes(behind))
+    assert fact == DamagedAt(size, "the log ends here: was another file appended?", LostBytes(behind))
 
 
 def test_what_is_recovered_keeps_the_profile(tmp_path):

@@ -1,8 +1,8 @@
-"""Chunks that the summary names, decompressed and checked side by side before it is their turn.
+"""Read chunks ahead: decompress and check chunks of the summary in several threads before they are needed.
 
-Groups of them lie side by side in one piece of memory, so that columns are gathered from many messages at once. Nothing
-is believed of them: a group counts only where all its chunks came out right, each under the very header that is met
-when its turn comes. Otherwise its chunks are read one after the other, and what is wrong with them shows there.
+Groups of chunks are consecutive in one memory block, so that columns are gathered from many messages at once. A group
+is used only if all its chunks are correct and have the same headers as the data section. Otherwise its chunks are read
+again one by one, and damage is reported then.
 """
 
 from __future__ import annotations
@@ -32,24 +32,24 @@ from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.taken import Taken, Taker
 
 _LARGE_PAGE = 2 << 20
-_MOST_KEPT = 3
-# Chunks lie side by side up to this many bytes (writers make them of one MiB and a little). More takes its time to come
-# through the processor's cache, with less, what there is to do for each piece of memory counts.
+_MOST_FREE = 3
+# The size of a group [bytes] (writers make chunks of slightly more than one MiB). Larger groups exceed the processor's
+# cache; with smaller ones the effort per group dominates.
 JOINED = 14 << 20
 _LARGEST = 16 << 20  # chunks beyond this size are read one by one
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4
-_SUBMITTED = 3  # chunks to one thread: handing them over costs as much as a tenth of one
-# Channel's id and the length of all entries precede these; each is a time and an offset [bytes].
+_SUBMITTED = 3  # chunks per task of a thread: submitting a task costs as much as a tenth of a chunk
+# In a message index the prefix, the channel's id and the length precede the entries; each is a time and an offset.
 _BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
 
 
 class Buffers:
-    """Memory for decompressed chunks: in large pages, and used again once nothing refers to it any more.
+    """Memory for decompressed chunks, in large pages; it is reused when nothing refers to it.
 
-    Arrays have `size` bytes, a multiple of a large page; larger ones are made where they are asked for. Messages lie
-    far apart, and a page of 4 KiB holds few of them: with small pages most of the time goes into finding where they are
-    (a quarter of decompressing, half of gathering).
+    Arrays have `size` bytes, a multiple of a large page; larger ones are allocated separately. Messages are far apart,
+    and a page of 4 KiB contains few of them: with small pages, address translation needs a quarter of the time of
+    decompressing and half of the time of gathering.
     """
 
     def __init__(self, size: int) -> None:
@@ -57,18 +57,18 @@ class Buffers:
         self._free: list[mmap.mmap] = []
 
     def take(self, size: int) -> Bytes:
-        """An array of at least `size` bytes, with whatever stands in it."""
+        """Return an uninitialised array of at least `size` bytes."""
         if size > self.size:
             return np.empty(size, np.uint8)
         memory = self._free.pop() if self._free else _large_pages(self.size)
         whole: Bytes = np.frombuffer(memory, np.uint8)
-        # Every part of it refers to `whole`, which therefore lives as long as any of them.
+        # Every view refers to `whole`, which therefore exists as long as any of them.
         weakref.finalize(whole, self._give_back, memory)
         start = -whole.ctypes.data % _LARGE_PAGE
         return whole[start : start + self.size]
 
     def _give_back(self, memory: mmap.mmap) -> None:
-        if len(self._free) < _MOST_KEPT:
+        if len(self._free) < _MOST_FREE:
             self._free.append(memory)
 
 
@@ -79,13 +79,13 @@ def _large_pages(size: int) -> mmap.mmap:
     return memory
 
 
-# Memory that was never used before costs as much as decompressing into it does: it is kept from log to log.
+# The first use of memory costs as much time as decompressing into it: buffers are kept for the next logs.
 _BUFFERS = Buffers(JOINED)
 
 
 @dataclass(frozen=True)
 class _CheckedChunk:
-    """A chunk that was checked: its header, and either its messages, if they were taken, or its address in memory."""
+    """A checked chunk: its header, and either its messages, if the fast path has read them, or its address."""
 
     header: ChunkHeader
     address: int = 0
@@ -93,7 +93,7 @@ class _CheckedChunk:
 
 
 class _Reader:
-    """What one thread reads with at a time."""
+    """The file, decompressor and buffer of one thread."""
 
     def __init__(self, path: Path) -> None:
         self.file = FileBytes(path)
@@ -101,7 +101,7 @@ class _Reader:
         self._buffer = np.empty(0, np.uint8)
 
     def buffer(self, size: int) -> Bytes:
-        """Memory that is used for one chunk after another, so that it stays in the processor's cache."""
+        """Return memory that is reused for each chunk, so that it stays in the processor's cache."""
         if size > len(self._buffer):
             self._buffer = np.empty(size, np.uint8)
         return self._buffer[:size]
@@ -109,16 +109,16 @@ class _Reader:
 
 @dataclass(frozen=True)
 class _Group:
-    """Memory for a group of chunks, and what becomes of each; None: it has to be read when its turn comes."""
+    """Memory for a group of chunks, and the future result of each; None if the chunk must be read again."""
 
     memory: Bytes
     chunks: tuple[Future[list[_CheckedChunk | None]], ...]
 
 
 class ChunkReadAhead:
-    """The chunks of `summary` at places that are not in `skip`; without a CRC of the summary, none.
+    """Reads ahead the chunks of a `summary` with a CRC, except those at the bytes `skip`.
 
-    `taker` is given each one, as long as `definitions` are of one meaning.
+    The fast path (`taker`) is applied to each chunk as long as no id in `definitions` is ambiguous.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class ChunkReadAhead:
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
         self._following = dict(pairwise(self._groups))
         self._started: dict[int, _Group] = {}
-        self._there: dict[ChunkHeader, _CheckedChunk] = {}
+        self._checked: dict[ChunkHeader, _CheckedChunk] = {}
         self._threads = ThreadPoolExecutor(threads, "chunks") if threads > 1 else None
         self._readers: SimpleQueue[_Reader] = SimpleQueue()
 
@@ -147,52 +147,52 @@ class ChunkReadAhead:
             self._readers.get().file.close()
 
     def begins(self, at: int) -> bool:
-        """The chunk at byte `at` is the first of a group: it and the others have memory of their own."""
+        """Return whether the chunk at byte `at` is the first of a group, which has its own memory."""
         return at in self._groups
 
     def memory(self, at: int, size: int) -> Bytes:
-        """Memory of `size` bytes at least for the chunk at byte `at`; where it begins a group, the group's."""
-        self._there = {}
+        """Return memory of at least `size` bytes for the chunk at byte `at`; for the first of a group, the group's."""
+        self._checked = {}
         if at not in self._groups:
             return _BUFFERS.take(size)
-        for passed in [place for place in self._started if place < at]:
-            del self._started[passed]
+        for earlier in [start for start in self._started if start < at]:
+            del self._started[earlier]
         following: int | None = at
-        # What a taker learns from the first group holds for the next ones only if it comes before them.
+        # The fast path must learn from the first group before the next ones are started.
         learning = self._taker is not None and at == next(iter(self._groups))
         for _ in range(1 if learning else 1 + _GROUPS_AHEAD):
             if following is not None and following not in self._started:
                 self._started[following] = self._start(self._groups[following])
             following = self._following.get(following) if following is not None else None
         group = self._started.pop(at)
-        chunks = [chunk for several in group.chunks for chunk in several.result()]
+        chunks = [chunk for future in group.chunks for chunk in future.result()]
         if not all(chunks) or len(group.memory) < size:
             return _BUFFERS.take(size)
-        self._there = {chunk.header: chunk for chunk in chunks if chunk is not None}
+        self._checked = {chunk.header: chunk for chunk in chunks if chunk is not None}
         return group.memory
 
-    def holds(self, header: ChunkHeader, content: Bytes) -> bool:
-        """The chunk with this header stands in `content` already, checked."""
-        filled = self._there.get(header)
-        return filled is not None and filled.address == content.ctypes.data
+    def has_filled(self, header: ChunkHeader, content: Bytes) -> bool:
+        """Return whether `content` is the checked chunk with this header."""
+        chunk = self._checked.get(header)
+        return chunk is not None and chunk.address == content.ctypes.data
 
     def taken(self, header: ChunkHeader) -> Taken | None:
-        """The messages of the chunk with this header; None where they have to be looked at."""
-        filled = self._there.get(header)
-        return None if filled is None or self._definitions.ambiguous else filled.taken
+        """Return the messages of the chunk with this header; None if the fast path has not read them."""
+        chunk = self._checked.get(header)
+        return None if chunk is None or self._definitions.ambiguous else chunk.taken
 
     def _start(self, chunks: list[ChunkIndex]) -> _Group:
         assert self._threads is not None
         memory = _BUFFERS.take(sum(index.uncompressed_size for index in chunks))
-        places, end = [], 0
+        targets, end = [], 0
         for index in chunks:
             start, end = end, end + index.uncompressed_size
-            places.append((index, memory[start:end]))
-        several = [places[i : i + _SUBMITTED] for i in range(0, len(places), _SUBMITTED)]
-        return _Group(memory, tuple(self._threads.submit(self._fill_all, some) for some in several))
+            targets.append((index, memory[start:end]))
+        tasks = [targets[i : i + _SUBMITTED] for i in range(0, len(targets), _SUBMITTED)]
+        return _Group(memory, tuple(self._threads.submit(self._fill_all, task) for task in tasks))
 
-    def _fill_all(self, places: list[tuple[ChunkIndex, Bytes]]) -> list[_CheckedChunk | None]:
-        return [self._fill(index, content) for index, content in places]
+    def _fill_all(self, targets: list[tuple[ChunkIndex, Bytes]]) -> list[_CheckedChunk | None]:
+        return [self._fill(index, content) for index, content in targets]
 
     def _fill(self, index: ChunkIndex, content: Bytes) -> _CheckedChunk | None:
         at = index.chunk_start_offset
@@ -231,7 +231,7 @@ class ChunkReadAhead:
 
 
 def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
-    """The first one is a single chunk, as a taker learns from it."""
+    """Yield groups of chunks; the first group is a single chunk, from which the fast path learns."""
     group: list[ChunkIndex] = []
     size = most = 0
     for index in chunks:
@@ -246,23 +246,23 @@ def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
 
 
 def expected_rows(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]]:
-    """By a chunk's place and a channel's id the numbers of its messages among all of the channel in these chunks.
+    """Return the expected row numbers of the messages, by the chunk's byte and the channel's id.
 
-    A message index has 16 bytes for each message of its channel, and its place in the file is in the chunk's
-    index (section "Chunk Index").
-    It ends before the first chunk whose message indexes cannot be as long as they claim.
+    A row number is the position of a message among all messages of its channel in these chunks. They follow from the
+    lengths of the message indexes, which have 16 bytes per message of a channel and whose positions are in the chunk's
+    index (section "Chunk Index"). The result ends before the first chunk whose message indexes have impossible lengths.
     """
-    foretold: dict[int, Mapping[int, range]] = {}
-    passed: Counter[int] = Counter()
+    expected: dict[int, Mapping[int, range]] = {}
+    before: Counter[int] = Counter()
     for index in chunks:
-        places = sorted((at, channel) for channel, at in index.message_index_offsets.items())
-        behind = index.chunk_start_offset + index.chunk_length + index.message_index_length
+        indexes = sorted((at, channel) for channel, at in index.message_index_offsets.items())
+        indexes_end = index.chunk_start_offset + index.chunk_length + index.message_index_length
         rows = {}
-        for (at, channel), (end, _) in pairwise((*places, (behind, 0))):
+        for (at, channel), (end, _) in pairwise((*indexes, (indexes_end, 0))):
             count, rest = divmod(end - at - _BEFORE_ENTRIES, _ENTRY)
             if count < 0 or rest:
-                return foretold
-            rows[channel] = range(passed[channel], passed[channel] + count)
-            passed[channel] += count
-        foretold[index.chunk_start_offset] = rows
-    return foretold
+                return expected
+            rows[channel] = range(before[channel], before[channel] + count)
+            before[channel] += count
+        expected[index.chunk_start_offset] = rows
+    return expected

@@ -1,4 +1,4 @@
-"""One piece ahead: the next is read, decompressed and checked while this one is decoded."""
+"""Read one piece ahead: the next piece is read, decompressed and checked while the current one is decoded."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _Item = TypeVar("_Item")
 
 
 def read_ahead(items: Iterator[_Item]) -> Iterator[_Item]:
-    """The same items; each is made in a second thread while the one before it is used. Two are held at a time."""
+    """Yield the items; a second thread produces the next one while one is used. Two items are in memory at a time."""
     end = object()
     with ThreadPoolExecutor(1) as thread:
-        coming = thread.submit(next, items, end)
-        while (item := coming.result()) is not end:
-            coming = thread.submit(next, items, end)
+        following = thread.submit(next, items, end)
+        while (item := following.result()) is not end:
+            following = thread.submit(next, items, end)
             yield item  # type: ignore[misc]
