@@ -69,7 +69,7 @@ def plain_files(folder: Path) -> list[Path]:
     ],
     ids=lambda item: item if isinstance(item, str) else item.__name__,
 )
-def test_a_bomb_is_refused_without_its_memory(make, name, tmp_path):
+def test_a_bomb_is_refused_without_allocating_its_memory(make, name, tmp_path):
     for library in ("h5py", "pyarrow"):
         pytest.importorskip(library)
     bomb = make(tmp_path / name)
@@ -105,7 +105,7 @@ def chunked(path: Path, **options) -> Path:
     [{}, {"chunks": (100,)}, {"compression": "gzip", "shuffle": True, "fletcher32": True}, {"compression": "lzf"}],
     ids=["contiguous", "chunked", "gzip, shuffled, with a checksum", "lzf"],
 )
-def test_a_dataset_that_is_packed_once_passes(tmp_path, options):
+def test_a_dataset_that_is_compressed_once_passes(tmp_path, options):
     path = chunked(tmp_path / "a.h5", **options)
     with pytest.importorskip("h5py").File(path) as file:
         check_chunks(path, "a", file["a"])
@@ -119,7 +119,7 @@ def test_a_dataset_that_is_packed_once_passes(tmp_path, options):
     ],
     ids=["one chunk", "packed twice"],
 )
-def test_a_chunk_that_unpacks_to_far_more_than_its_file_is_refused(tmp_path, make, message):
+def test_a_chunk_that_decompresses_to_far_more_than_its_file_is_refused(tmp_path, make, message):
     h5py = pytest.importorskip("h5py")
     path = make(tmp_path / "a.h5")
     with h5py.File(path) as file, pytest.raises(RecordingError, match=message):
@@ -136,7 +136,7 @@ def check_parquet(path: Path, *keys: str) -> None:
 @pytest.mark.parametrize("version", ["1.0", "2.0"])
 @pytest.mark.parametrize("compression", ["none", "snappy", "gzip", "zstd"])
 @pytest.mark.parametrize("dictionary", [True, False], ids=["dictionary", "plain"])
-def test_the_pages_of_a_plain_table_unpack_to_what_its_footer_says(tmp_path, version, compression, dictionary):
+def test_the_pages_of_a_plain_table_decompress_to_the_size_in_its_footer(tmp_path, version, compression, dictionary):
     parquet = pytest.importorskip("pyarrow.parquet")
     arrow = pytest.importorskip("pyarrow")
     random = np.random.default_rng(5)
@@ -170,14 +170,14 @@ def test_the_pages_of_a_plain_table_unpack_to_what_its_footer_says(tmp_path, ver
     ],
     ids=["a false page", "false rows"],
 )
-def test_a_parquet_file_whose_footer_hides_what_it_unpacks_to_is_refused(tmp_path, make, message):
+def test_a_parquet_file_whose_footer_hides_its_decompressed_size_is_refused(tmp_path, make, message):
     pytest.importorskip("pyarrow")
     path = make(tmp_path / "a.parquet")
     with pytest.raises(RecordingError, match=message):
         check_parquet(path)
 
 
-def test_a_column_that_nobody_asked_for_may_be_as_large_as_it_likes(tmp_path):
+def test_a_column_that_is_not_requested_may_have_any_size(tmp_path):
     arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     path = bombs.parquet_of_zeros(tmp_path / "a.parquet")
     with pytest.raises(RecordingError, match="refused"):
@@ -186,7 +186,7 @@ def test_a_column_that_nobody_asked_for_may_be_as_large_as_it_likes(tmp_path):
     assert parquet.read_schema(path).equals(arrow.schema([("a", arrow.bool_())]))
 
 
-def test_a_page_whose_header_is_damaged_is_told(tmp_path):
+def test_a_page_with_a_damaged_header_is_reported(tmp_path):
     path = bombs.parquet_with_a_false_page(tmp_path / "a.parquet", claimed=98_304)
     check_parquet(path)
     content = bytearray(path.read_bytes())
@@ -220,7 +220,7 @@ def test_a_plain_feather_file_passes_whole_or_cut_anywhere(tmp_path, compression
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_a_feather_file_whose_batches_unpack_to_far_more_is_refused(tmp_path, compression):
+def test_a_feather_file_whose_batches_decompress_to_far_more_is_refused(tmp_path, compression):
     pytest.importorskip("pyarrow")
     path = bombs.feather_of_zeros(tmp_path / "a.feather", compression, batches=20 if compression == "zstd" else 45)
     if compression == "lz4":  # which packs zeros to a 250th
@@ -229,7 +229,7 @@ def test_a_feather_file_whose_batches_unpack_to_far_more_is_refused(tmp_path, co
         check_batches(path)
 
 
-def test_a_buffer_that_claims_a_tebibyte_is_refused(tmp_path):
+def test_a_buffer_that_declares_a_tebibyte_is_refused(tmp_path):
     path = feather(tmp_path / "a.feather", "zstd", 4000)
     content = path.read_bytes()
     told = struct.pack("<q", 8 * 1000)  # what the first batch's numbers unpack to
@@ -239,7 +239,7 @@ def test_a_buffer_that_claims_a_tebibyte_is_refused(tmp_path):
         check_batches(path)
 
 
-def test_batches_that_only_the_footer_points_to_are_counted(tmp_path):
+def test_batches_that_only_the_footer_names_are_counted(tmp_path):
     pytest.importorskip("pyarrow")
     path = bombs.feather_of_zeros(tmp_path / "a.feather")
     content = bytearray(path.read_bytes())
@@ -250,7 +250,7 @@ def test_batches_that_only_the_footer_points_to_are_counted(tmp_path):
         check_batches(path)
 
 
-def test_bytes_that_are_no_messages_are_left_to_the_library(tmp_path):
+def test_bytes_other_than_messages_are_passed_to_the_library(tmp_path):
     path = tmp_path / "a.feather"
     random = np.random.default_rng(2)
     for size in (1, 7, 8, 30, 400):

@@ -43,7 +43,7 @@ def test_a_column_with_many_words_is_left_out_with_a_warning(log):
 
 @pytest.mark.parametrize("cell", ["#N/A", "#DIV/0!", "#WERT!", "#####", "#error"])
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_a_row_that_begins_with_what_excel_writes_for_no_value_is_a_row(log, cell, separator):
+def test_a_row_that_starts_with_an_error_value_of_excel_is_a_row(log, cell, separator):
     lines = [f"{i}{separator}{i}.5" for i in range(9)]
     lines[4] = f"{cell}{separator}4.5"
     source = Csv().columns(log(f"t{separator}x\n" + "\n".join(lines) + "\n"))
@@ -52,7 +52,7 @@ def test_a_row_that_begins_with_what_excel_writes_for_no_value_is_a_row(log, cel
 
 
 @pytest.mark.parametrize("comment", ["# paused, by hand", "#4,4.5", "# 4,4.5", "#paused"])
-def test_a_line_of_words_or_a_row_made_a_comment_is_a_comment(log, comment):
+def test_a_commented_line_of_words_or_row_is_a_comment(log, comment):
     lines = [f"{i},{i}.5" for i in range(9)]
     lines[4] = comment
     source = Csv().columns(log("t,x\n" + "\n".join(lines) + "\n"))
@@ -62,7 +62,7 @@ def test_a_line_of_words_or_a_row_made_a_comment_is_a_comment(log, comment):
 
 @pytest.mark.parametrize("bad", ["24:00:00.0", "23:59:60", "12:61:00", "24:00"])
 @pytest.mark.parametrize("at", [0, 1, 3])
-def test_the_first_time_that_no_layout_fits_is_named_and_not_a_good_one(log, machine, bad, at):
+def test_the_first_time_that_matches_no_layout_is_named(log, machine, bad, at):
     stamps = [*STAMPS[:at], bad, *STAMPS[at:]]
     path = log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps))
     with pytest.raises(
@@ -75,7 +75,7 @@ def test_the_first_time_that_no_layout_fits_is_named_and_not_a_good_one(log, mac
     assert told(source, "loss") == [Finding(UnreadCells((at + 2,), bad, CellAdvice("time")), "t", "loss")]
 
 
-def test_dates_in_no_known_layout_are_named_with_time_format(log, machine):
+def test_dates_with_an_unknown_layout_are_named_with_time_format(log, machine):
     path = log("t;x\n" + "".join(f"04.13.2025 12:00:0{i};1\n" for i in range(5)))
     with pytest.raises(RecordingError, match=r"line 2, .* nor a date or time with a known layout") as fault:
         read_recording(path, machine(SECONDS))
@@ -85,7 +85,7 @@ def test_dates_in_no_known_layout_are_named_with_time_format(log, machine):
 
 
 @pytest.mark.parametrize("head", ["", "t;x;y\n"], ids=["no header", "header"])
-def test_a_first_row_of_empty_cells_is_no_header(log, head):
+def test_a_first_row_of_empty_cells_is_not_a_header(log, head):
     source = Csv().columns(log(head + ";;\n0;1;2\n1;2;3\n"))
     assert list(source.columns) == (["t", "x", "y"] if head else ["0", "1", "2"])
     assert source.columns[list(source.columns)[1]].values.tolist() == [1, 2]

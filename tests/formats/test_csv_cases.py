@@ -51,11 +51,11 @@ def check(case: Case, folder) -> None:
     assert not case.kind or kinds & set(case.kind.split(" or "))
 
 
-def test_there_are_at_least_eighty_cases_each_with_a_name_of_its_own():
+def test_there_are_at_least_eighty_cases_with_unique_names():
     assert len(set(NAMES)) == len(NAMES) >= 80
 
 
 @pytest.mark.parametrize("number", range(len(NAMES)), ids=NAMES)
-def test_a_case_is_read_as_a_careful_person_would_read_it(tmp_path, number):
+def test_a_case_is_read_as_expected_or_refused(tmp_path, number):
     for seed in SEEDS:
         check(cases(seed)[number], tmp_path)

@@ -58,20 +58,20 @@ def test_a_measurement_file_is_read_by_its_suffix_with_names_units_and_times(log
     assert isinstance(source.findings[0].fact, WordsAboveRows)
 
 
-def test_a_comment_behind_a_row_is_named_and_left_out(log):
+def test_a_comment_after_a_row_is_named_and_left_out(log):
     rows = [f"{row}\t{'gate closed' if i == 3 else ''}\n" for i, row in enumerate(ROWS.splitlines())]
     source = survey(log(MEASUREMENT.replace(ROWS, "".join(rows))))
     assert list(source.columns) == ["X_Value", "Force", "Torque"]
     assert NotNumeric("Comment", 27, "gate closed") in [found.fact for found in source.findings]
 
 
-def test_a_second_heading_is_refused_with_its_line_rather_than_read_on(log):
+def test_a_second_heading_is_refused_with_its_line(log):
     path = log(HEAD.format(headings="Yes") + SEGMENT + ROWS + SEGMENT + ROWS, "two.lvm")
     with pytest.raises(RecordingError, match="line 64 has 2 cells, the header has 3"):
         survey(path)
 
 
-def test_a_clock_for_each_channel_is_kept(log, machine):
+def test_each_channel_has_its_own_clock(log, machine):
     """`X_Columns Multi`: the keys of a channel stand above its values, between them the times."""
     lines = []
     for line in SEGMENT.splitlines():
@@ -90,7 +90,7 @@ def test_a_clock_for_each_channel_is_kept(log, machine):
         )
 
 
-def test_info_takes_its_first_column_for_the_clock(log):
+def test_info_uses_the_first_column_as_the_clock(log):
     info = cdtool.info(log(MEASUREMENT, "gate.lvm"))
     assert info.format == "csv"
     assert [channel.rate_hz for channel in info.channels] == pytest.approx([1000.0] * 3)

@@ -50,7 +50,7 @@ def said(source) -> list[Finding]:
 
 
 @pytest.mark.parametrize("header", HEADERS)
-def test_each_channel_gets_the_clock_before_it(log, machine, header):
+def test_each_channel_has_the_clock_before_it(log, machine, header):
     recording = read_recording(log(table(header, CELL, DRIVE)), machine(OWN))
     assert recording["force"].time.tolist() == CELL.tolist()
     assert recording["force"].values[:, 0].tolist() == list(range(50))
@@ -60,7 +60,7 @@ def test_each_channel_gets_the_clock_before_it(log, machine, header):
     assert [type(found.fact) for found in recording.findings if found.channel == "time"] == [OwnClocks]
 
 
-def test_clocks_in_ms_that_do_not_say_so_are_refused_rather_than_read_in_s(log, machine):
+def test_clocks_in_ms_without_a_unit_are_refused_rather_than_read_in_s(log, machine):
     path = log(table("time,force,time2,torque,speed", 1e3 * CELL, 1e3 * DRIVE))
     with pytest.raises(RecordingError, match="is beside the clock 'time2'") as fault:
         read_recording(path, machine(OWN.replace('unit = "s"', 'unit = "ms"')))
@@ -81,7 +81,7 @@ def test_clocks_in_ms_that_do_not_say_so_are_refused_rather_than_read_in_s(log, 
     ids=["other rate", "2 % slower", "drifting", "later"],
 )
 @pytest.mark.parametrize("clock", ["time1", "time2"])
-def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start, step, why, clock):
+def test_one_clock_for_all_channels_is_refused_if_the_times_differ(log, machine, start, step, why, clock):
     count = np.arange(4000)
     path = log(table(HEADERS[0], 0.0005 * count, start + step * count))
     wrong, other = ("torque", "time2") if clock == "time1" else ("force", "time1")
@@ -111,27 +111,27 @@ def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start
     ],
     ids=["same", "in ms", "since 1970", "in us", "a temperature"],
 )
-def test_a_second_clock_of_the_same_rows_is_no_other_clock(log, machine, header, second):
+def test_a_second_clock_with_the_same_times_is_not_reported(log, machine, header, second):
     path = log(table(header, CELL, second))
     recording = read_recording(path, machine(named("time1")))
     assert recording["torque"].time.tolist() == CELL.tolist()
     assert not said(Csv().columns(path))
 
 
-def test_clocks_side_by_side_are_of_the_same_rows(log, machine):
+def test_adjacent_clocks_belong_to_the_same_rows(log, machine):
     rows = "".join(f"{i / 100},{i / 100 + (i % 7) * 0.002},{i},{10 * i},{100 * i}\n" for i in range(60))
     path = log("time,stamp_s,force,torque,speed\n".replace("stamp_s", "timestamp") + rows)
     assert read_recording(path, machine(named("time")))["torque"].time[-1] == 0.59
     assert not said(Csv().columns(path))
 
 
-def test_clocks_behind_their_channels_are_known_by_the_last_column(log, machine):
+def test_clocks_after_their_channels_are_recognised_by_the_last_column(log, machine):
     rows = "".join(f"{i},{i / 2000},{10 * i},{100 * i},{i / 1000}\n" for i in range(50))
     recording = read_recording(log("force,time1,torque,speed,time2\n" + rows), machine(OWN))
     assert recording["force"].time[-1] == 49 / 2000 and recording["torque"].time[-1] == 49 / 1000
 
 
-def test_units_and_an_epoch_are_taken_from_each_clocks_header(log, machine):
+def test_units_and_epoch_are_read_from_each_clocks_header(log, machine):
     header = "time1 [ms],force,time2 [s],torque,speed"
     path = log(table(header, 1.7e12 + 1e3 * CELL, 1.7e9 + 0.125 + DRIVE))
     recording = read_recording(path, machine(OWN))
@@ -140,7 +140,7 @@ def test_units_and_an_epoch_are_taken_from_each_clocks_header(log, machine):
     assert recording["torque"].time == pytest.approx(0.125 + DRIVE, abs=1e-6)
 
 
-def test_a_channel_that_no_clock_is_beside_is_refused(log, machine):
+def test_a_channel_without_a_clock_is_refused(log, machine):
     rows = "".join(f"{i},{i / 2000},{10 * i},{i / 1000},{100 * i}\n" for i in range(50))
     with pytest.raises(RecordingError, match="no clock is beside column 'force'"):
         read_recording(log("force,time1,torque,time2,speed\n" + rows), machine(OWN))
@@ -160,7 +160,7 @@ def test_values_without_a_time_are_a_loss(log, machine):
     counts=st.lists(st.integers(8, 60), min_size=2, max_size=2),
     mark=st.sampled_from([",", "\t", ";"]),
 )
-def test_no_channel_is_ever_on_another_ones_clock(log, machine, rates, counts, mark):
+def test_no_channel_is_read_with_the_clock_of_another(log, machine, rates, counts, mark):
     first, second = (np.arange(count) / rate for count, rate in zip(counts, rates, strict=True))
     path = log(table(HEADERS[0], first, second, mark))
     recording = read_recording(path, machine(OWN))

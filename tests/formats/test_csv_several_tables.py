@@ -87,25 +87,25 @@ def test_a_text_preamble_above_two_tables_does_not_hide_the_rows_of_the_first(tm
         Csv().columns(path)
 
 
-def test_rows_below_with_another_separator_are_no_footer_of_words(tmp_path):
+def test_rows_below_with_another_separator_are_not_a_footer(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(60, 3) + "t;a\n" + rows(20, 2).replace(",", ";"))
     with pytest.raises(RecordingError, match="line 62"):
         Csv().columns(path)
 
 
-def test_a_single_line_of_numbers_above_the_names_is_a_loss_and_no_note(tmp_path):
+def test_a_single_line_of_numbers_above_the_names_is_a_loss(tmp_path):
     source = Csv().columns(log(tmp_path, "12,500\nt,a,b\n" + rows(20, 3)))
     lost = [finding.fact for finding in source.findings if finding.severity == "loss"]
     assert lost == [NumbersAboveRows((1,))]
 
 
-def test_lines_that_csv_says_to_skip_are_no_loss(tmp_path):
+def test_lines_skipped_by_a_pin_are_not_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(skip_lines=401))
     assert dialect.first_line == 403 and not [item for item in dialect.findings if item.severity == "loss"]
 
 
-def test_above_a_pinned_header_rows_are_a_loss(tmp_path):
+def test_rows_above_a_pinned_header_are_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(header=402))
     lost = [item.fact for item in dialect.findings if item.severity == "loss"]
@@ -113,7 +113,7 @@ def test_above_a_pinned_header_rows_are_a_loss(tmp_path):
 
 
 @pytest.mark.parametrize("tail", ["# end", "# x", "# end of the log, 12", "#"])
-def test_a_comment_without_line_end_below_the_rows_costs_no_row_and_no_warning(tmp_path, tail):
+def test_a_last_comment_without_line_end_causes_no_loss_and_no_warning(tmp_path, tail):
     path = log(tmp_path, "# log of gate 7\nt,a,b\n" + rows(50, 3) + tail)
     source = Csv().columns(path)
     assert len(source.columns["t"].values) == 50
@@ -124,7 +124,7 @@ def test_a_comment_without_line_end_below_the_rows_costs_no_row_and_no_warning(t
 
 @pytest.mark.parametrize("below", ["s,Nm,m/s\nREAL,REAL,REAL\n", "REAL,REAL,REAL\ns,Nm,m/s\n"])
 @pytest.mark.parametrize("header", [None, 1])
-def test_a_row_of_types_above_or_below_that_of_units_is_no_row_of_names(tmp_path, below, header):
+def test_a_row_of_types_above_or_below_the_units_is_not_the_names(tmp_path, below, header):
     path = log(tmp_path, "t,a,b\n" + below + rows(50, 3))
     dialect = find_dialect(path, read_sample(path), TablePins(header=header))
     assert dialect.names == ("t", "a", "b")

@@ -14,7 +14,7 @@ from cdtool.workflows.convert.converting import convert
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_waits_until_it_is_delivered_or_the_end(number):
+def test_a_signal_is_deferred_to_its_delivery_or_the_end_of_the_context(number):
     def end(*_: object) -> None:
         raise KeyboardInterrupt
 
@@ -34,7 +34,7 @@ def test_a_signal_waits_until_it_is_delivered_or_the_end(number):
         signal.signal(number, before)
 
 
-def test_a_signal_that_is_ignored_stays_so_and_another_thread_holds_none():
+def test_an_ignored_signal_stays_ignored_and_another_thread_defers_none():
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
         with deferred_signals() as deliver:
@@ -56,7 +56,7 @@ def test_a_signal_that_is_ignored_stays_so_and_another_thread_holds_none():
 
 
 @pytest.mark.parametrize("call", [1, 5, 8])
-def test_an_interruption_while_hdf5_writes_is_one_and_leaves_nothing(tmp_path, monkeypatch, call):
+def test_an_interruption_while_hdf5_writes_leaves_no_file(tmp_path, monkeypatch, call):
     pytest.importorskip("h5py")
     rows = "\n".join(f"{k * 0.001:.3f},{value}" for k, value in enumerate(np.sin(np.arange(500) / 50.0)))
     (tmp_path / "log.csv").write_text(f"time [s],torque [N m]\n{rows}\n", encoding="utf-8")

@@ -79,7 +79,7 @@ def test_stamps_before_the_first_one_keep_their_sign(saved):
         ("minutes since 2024-01-01 22:00:00 -0200", 0.0, 0.5),
     ],
 )
-def test_a_time_since_a_date_is_a_clock_from_1970_on(saved, tmp_path, unit, first, step):
+def test_a_time_since_a_date_is_a_clock_since_1970(saved, tmp_path, unit, first, step):
     factor = {"s": 1, "m": 1e-3, "u": 1e-6, "n": 1e-9, "d": 86_400, "h": 3600}[unit[0]] if unit[:3] != "min" else 60
     counts = first + step * np.arange(50)
     path = saved(time=(counts, {"units": unit}), q=(np.arange(50.0), {"units": "rad"}))
@@ -95,7 +95,7 @@ def test_a_time_since_a_date_is_a_clock_from_1970_on(saved, tmp_path, unit, firs
     st.integers(-14 * 60, 14 * 60),
     st.sampled_from(["T", " "]),
 )
-def test_any_date_is_the_one_of_the_calendar(date, minutes, gap):
+def test_any_date_is_converted_like_in_the_calendar(date, minutes, gap):
     zone = timezone(timedelta(minutes=minutes))
     text = date.replace(tzinfo=zone).isoformat(gap)
     _, base = times_since(f"seconds since {text}", "gregorian")
@@ -111,14 +111,14 @@ def test_any_date_is_the_one_of_the_calendar(date, minutes, gap):
     ],
     ids=["date", "calendar"],
 )
-def test_a_time_since_what_is_not_understood_is_no_clock_and_told(saved, attributes, why):
+def test_a_time_since_an_unreadable_date_is_reported_and_not_used_as_a_clock(saved, attributes, why):
     source = survey(saved(time=(np.arange(9.0), attributes), q=(np.arange(9.0), {})))
     (reason,) = [item.fact.reason for item in source.findings if isinstance(item.fact, UnusableClock)]
     assert source.columns["q"].time is None and why in reason
 
 
 @pytest.mark.parametrize("unit", ["N m", "seconds", "since 2024-01-01", "rad since 2024-01-01", "s"])
-def test_other_units_are_no_time_since_a_date(unit):
+def test_other_units_are_not_a_time_since_a_date(unit):
     assert times_since(unit, "") is None
 
 
@@ -144,7 +144,7 @@ def test_a_packed_number_is_raw_times_scale_plus_offset(raw, scale, offset, miss
     assert np.array_equal(numbers, truth, equal_nan=True)
 
 
-def test_a_fill_value_of_32_bits_is_found_among_32_bits(saved):
+def test_a_fill_value_of_32_bits_is_compared_in_32_bits(saved):
     values = np.array([0.5, 0.1, 2.0], dtype=np.float32)
     source = survey(saved(x=(values, {"_FillValue": np.float32(0.1)})))
     assert np.isnan(source.columns["x"].values).tolist() == [False, True, False]
@@ -155,21 +155,21 @@ def test_a_fill_value_of_32_bits_is_found_among_32_bits(saved):
     [{"scale_factor": "0.01"}, {"add_offset": np.nan}, {"_FillValue": "none"}],
     ids=["text", "nan", "fill"],
 )
-def test_a_dataset_that_is_packed_in_no_known_way_is_left_out(saved, attributes):
+def test_a_dataset_with_an_unknown_packing_is_left_out(saved, attributes):
     source = survey(saved(x=(np.arange(5), attributes), y=(np.arange(5.0), {})))
     assert list(source.columns) == ["y"]
     why = f"packed, but its attribute {next(iter(attributes))} is no number"
     assert facts(source) == [("", ColumnLeftOut("x", why))]
 
 
-def test_a_packed_clock_with_missing_stamps_is_one_too(saved):
+def test_a_packed_clock_may_have_missing_stamps(saved):
     counts = np.array([10, 20, -1, 40], dtype=np.int32)
     attributes = {"units": "s", "scale_factor": 0.001, "add_offset": 2.0, "_FillValue": np.int32(-1)}
     times = survey(saved(time=(counts, attributes), q=(np.arange(4.0), {}))).columns["q"].time
     assert np.allclose(times, [2.01, 2.02, np.nan, 2.04], rtol=1e-15, equal_nan=True)
 
 
-def test_an_epoch_is_taken_off_before_a_clock_is_scaled(saved):
+def test_the_epoch_is_subtracted_before_a_clock_is_scaled(saved):
     """Ticks of 100 ns since 1970: scaled first, float64 would hold them to 240 ns."""
     ticks = 17_000_000_001_234_567 + np.cumsum(np.random.default_rng(7).integers(9_001, 11_000, 200))
     source = survey(saved(time=(ticks, {"units": "s", "scale_factor": 1e-7}), q=(np.arange(200.0), {})))
@@ -190,14 +190,14 @@ def test_info_shows_every_column_on_the_clock_of_its_group(saved):
     assert not [found for found in info.findings if isinstance(found.fact, AssumedClock)]
 
 
-def test_clocks_of_groups_without_a_unit_are_warned_of(saved):
+def test_clocks_of_groups_without_a_unit_are_a_warning(saved):
     clocks = {"drive__t": (np.arange(9.0), {}), "cell__time": (np.arange(9.0), {})}
     assert ("", ClocksWithoutUnit(("cell/time", "drive/t"))) in facts(survey(saved(**clocks)))
     alone = facts(survey(saved(t=clocks["drive__t"], q=clocks["drive__t"])))
     assert not [fact for _, fact in alone if isinstance(fact, ClocksWithoutUnit)]
 
 
-def test_an_epoch_is_taken_off_where_every_clock_has_one():
+def test_the_epoch_is_subtracted_if_every_clock_has_one():
     clocks = [
         EpochClock(lambda a, b, x=x: np.array([x, x + 1])[a:b], 1e-3) for x in (1_700_000_000_250, 1_700_000_000_000)
     ]

@@ -76,7 +76,7 @@ def same(found, expected) -> None:
     packed=st.booleans(),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_any_matrix_gives_the_columns_that_version_7_gives(tmp_path_factory, shapes, kinds, packed, seed):
+def test_any_matrix_has_the_same_columns_as_in_version_7(tmp_path_factory, shapes, kinds, packed, seed):
     folder = tmp_path_factory.mktemp("mat")
     random = np.random.default_rng(seed)
     variables = {"time": np.arange(9.0)}
@@ -88,7 +88,7 @@ def test_any_matrix_gives_the_columns_that_version_7_gives(tmp_path_factory, sha
     same(Mat().columns(new), Mat().columns(folder / "old.mat"))
 
 
-def test_what_is_no_vector_or_matrix_of_numbers_is_named_and_left_out(tmp_path):
+def test_variables_other_than_vectors_and_matrices_of_numbers_are_named_and_left_out(tmp_path):
     path = save_v73(
         tmp_path / "a.mat",
         {"t": np.arange(3.0), "s": {"a": 1.0}, "c": [1], "w": "words", "z": np.ones(3) * 1j, "e": np.empty((0, 3))}
@@ -121,7 +121,7 @@ def test_what_is_no_vector_or_matrix_of_numbers_is_named_and_left_out(tmp_path):
     }
 
 
-def test_a_recording_is_read_by_the_names_of_version_7(tmp_path):
+def test_a_recording_is_read_with_the_names_of_version_7(tmp_path):
     time = np.arange(50) * 0.01
     q = np.column_stack((time, 2.0 * time))
     path = save_v73(tmp_path / "run.mat", {"t": time, "q": q, "tau": 0.5 * q}, compression="gzip", shuffle=True)
@@ -136,7 +136,7 @@ def test_a_recording_is_read_by_the_names_of_version_7(tmp_path):
     np.testing.assert_array_equal(recording["torque"].values, 0.5 * q)
 
 
-def test_a_complex_column_that_is_asked_for_is_an_error(tmp_path):
+def test_a_requested_complex_column_is_an_error(tmp_path):
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(3.0), "z": np.ones(3) * 1j})
     (tmp_path / "machine.toml").write_text(
         '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\n'
@@ -146,7 +146,7 @@ def test_a_complex_column_that_is_asked_for_is_an_error(tmp_path):
         read_recording(path, read_machine_file(tmp_path / "machine.toml"))
 
 
-def test_a_file_without_a_vector_says_so(tmp_path):
+def test_a_file_without_a_vector_is_refused(tmp_path):
     with pytest.raises(RecordingError, match="has no vector or matrix of numbers"):
         Mat().columns(save_v73(tmp_path / "a.mat", {"s": {"a": 1.0}}))
 
@@ -160,7 +160,7 @@ def test_a_file_that_matlab_wrote_is_read():
     np.testing.assert_allclose(source.columns["testdouble"].values, np.arange(9) * np.pi / 4, rtol=0.0, atol=1e-12)
 
 
-def test_without_h5py_the_error_says_what_to_install_or_how_to_save(tmp_path, monkeypatch):
+def test_without_h5py_the_error_states_what_to_install_or_how_to_save(tmp_path, monkeypatch):
     def absent(module: str) -> None:
         raise ImportError(module)
 
@@ -194,7 +194,7 @@ def test_a_cut_file_is_one_clear_error(tmp_path, kept):
     assert "\n" not in str(fault.value)
 
 
-def test_damaged_bytes_are_one_line_or_the_values_that_are_there(tmp_path):
+def test_damaged_bytes_are_one_line_or_the_remaining_values(tmp_path):
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(50.0), "q": np.ones((50, 3))}, compression="gzip")
     whole, random = path.read_bytes(), np.random.default_rng(8)
     for _ in range(150):

@@ -21,7 +21,7 @@ __all__ = ["by_hand", "written"]
 
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_what_is_written_reads_back_to_the_bit(written, encoding, compression):
+def test_written_values_are_read_back_exactly(written, encoding, compression):
     source = Mcap().columns(written(encoding=encoding, compression=compression))
     for name, expected in {
         "/joint_states position[:]": JOINTS,
@@ -58,7 +58,7 @@ def test_a_field_is_a_number_an_element_an_array_or_a_joint(written, encoding):
 
 
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
-def test_a_whole_array_comes_in_the_machines_order_by_the_messages_names(written, encoding):
+def test_a_whole_array_is_ordered_by_the_machines_joints_with_the_messages_names(written, encoding):
     path = written(encoding=encoding)
     order = ("elbow.joint", "base", "shoulder_joint")
     column = Mcap().columns(path, wanted(("/joint_states", "position[:]"), joints=order)).columns
@@ -67,7 +67,7 @@ def test_a_whole_array_comes_in_the_machines_order_by_the_messages_names(written
     assert np.array_equal(two["/joint_states position[:]"].values, JOINTS[:, [2, 0]])
 
 
-def test_names_that_the_messages_do_not_have_are_an_error_and_never_a_silent_permutation(written):
+def test_joint_names_missing_from_the_messages_are_an_error_and_never_a_silent_permutation(written):
     asked = wanted(("/joint_states", "position[:]"), joints=("base", "shoulder", "elbow.joint"))
     with pytest.raises(RecordingError, match=r"name base, shoulder_joint, elbow.joint, not 'shoulder'.*joint_map"):
         Mcap().columns(written(), asked)
@@ -109,7 +109,7 @@ def test_a_header_clock_without_a_header_is_a_clear_error(by_hand):
         Mcap().columns(by_hand([(1, 1, {"x": 1})]), wanted(("/a", "x"), clock="header"))
 
 
-def test_a_survey_tells_how_late_messages_were_logged(by_hand):
+def test_a_survey_reports_the_delay_of_logged_messages(by_hand):
     messages = [
         (10**9 + i * 10**6 + 3 * 10**6, 0, {"header": {"stamp": {"sec": 1, "nanosec": i * 10**6}}}) for i in range(5)
     ]
@@ -139,7 +139,7 @@ def test_a_missing_topic_is_named_with_its_channel_and_the_nearest(written):
         ("/force", "data.x", "there is no 'x'"),
     ],
 )
-def test_a_wrong_field_is_an_error_that_names_what_there_is(written, topic, field, message):
+def test_a_wrong_field_is_an_error_that_names_the_existing_fields(written, topic, field, message):
     with pytest.raises(RecordingError, match=message) as fault:
         Mcap().columns(written(), wanted((topic, field)))
     assert topic in str(fault.value)
@@ -160,7 +160,7 @@ def test_an_array_of_varying_length_is_a_clear_error(by_hand):
     assert Mcap().columns(path).findings[0].fact == ArrayLengthsDiffer((2, 3))
 
 
-def test_messages_about_other_joints_are_left_out(by_hand):
+def test_messages_of_other_joints_are_left_out(by_hand):
     messages = [(i, i, {"name": ["a" if i % 2 else "b"], "position": [i]}) for i in range(6)]
     source = Mcap().columns(by_hand(messages), wanted(("/a", "position[a]")))
     assert source.columns["/a position[a]"].values.tolist() == [1, 3, 5]
@@ -174,7 +174,7 @@ def test_json_null_is_nan_and_a_text_is_refused(by_hand):
         Mcap().columns(path, wanted(("/a", "s")))
 
 
-def test_writing_refuses_what_a_message_cannot_hold(written):
+def test_writing_refuses_fields_that_the_message_type_does_not_have(written):
     def stream(schema="sensor_msgs/msg/Imu", **fields):
         return Stream("/a", schema, TIME, fields)
 
@@ -191,7 +191,7 @@ def test_writing_refuses_what_a_message_cannot_hold(written):
 
 
 @pytest.mark.parametrize("text", ["a b.c", "x[0].y", "a[b.c].d"])
-def test_a_field_may_step_through_arrays_of_objects(text):
+def test_a_field_may_select_elements_of_arrays_of_objects(text):
     assert parse_field(text, "here").text == text
     message = {"a b": {"c": 1}, "x": [{"y": 2}], "a": [{"d": 3}], "name": ["b.c"]}
     assert parse_field(text, "here").of(message) in (1.0, 2.0, 3.0)
@@ -219,7 +219,7 @@ def test_real_joint_states_are_read(name, rows, joints):
 
 
 @needs_data("mcap_conformance")
-def test_every_conformance_file_gives_the_messages_of_its_json():
+def test_every_conformance_file_has_the_messages_of_its_json():
     files = sorted((data("mcap_conformance")).glob("*/*.mcap"))
     assert len(files) == 416
     for path in files:

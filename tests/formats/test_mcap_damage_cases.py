@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("first", range(0, COUNT, STEP))
-def test_of_a_damaged_file_all_is_given_that_can_be_had_and_nothing_else_and_every_loss_is_said(tmp_path, first):
+def test_a_damaged_file_yields_all_readable_messages_and_nothing_else_and_reports_every_loss(tmp_path, first):
     warm_up(tmp_path / "case.mcap")
     found = {
         f"{number} {case.name}": wrong
@@ -43,7 +43,7 @@ def test_of_a_damaged_file_all_is_given_that_can_be_had_and_nothing_else_and_eve
 
 
 @pytest.mark.parametrize("number", [1126, 1133], ids=["a data end before the data's end", "an index beyond any file"])
-def test_cases_of_another_seed_that_once_went_wrong(tmp_path, number):
+def test_cases_of_another_seed_that_have_failed_before(tmp_path, number):
     warm_up(tmp_path / "case.mcap")
     (case,) = cases(22, 1, number)
     assert not faults(case, tmp_path / "case.mcap")
@@ -54,14 +54,14 @@ def test_every_kind_of_damage_is_among_the_cases():
     assert set(drawn) == set(KINDS)
 
 
-def test_a_case_depends_on_its_seed_and_number_alone():
+def test_a_case_depends_only_on_its_seed_and_number():
     (alone,) = cases(3, 1, 7)
     assert alone == list(cases(3, 8))[7]
     assert alone != next(cases(4, 1, 7))
 
 
 @pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
-def test_undamaged_the_generators_files_read_through_the_mcap_package(compression):
+def test_the_mcap_package_reads_the_undamaged_files_of_the_generator(compression):
     rng = np.random.default_rng(0)
     written = messages.ordinary(rng, 64)
     log = logs.write(rng, logs.Style(compression))
@@ -72,7 +72,7 @@ def test_undamaged_the_generators_files_read_through_the_mcap_package(compressio
         assert given == [(message.topic, message.time, message.payload) for message in known]
 
 
-def test_the_judge_sees_what_it_is_there_for():
+def test_the_assessment_detects_each_kind_of_fault():
     one, two = Message("/force", 10**9, b"a", 1.0), Message("/force", 2 * 10**9, b"b", 2.0)
     both = tuple((value_key(message), message.time / 1e9) for message in (one, two))
     truth = Truth((one, two), (one,), loss=True)
@@ -88,7 +88,7 @@ def test_the_judge_sees_what_it_is_there_for():
 
 
 @pytest.mark.skipif(not measurable(), reason="memory is measured as Linux has it")
-def test_bombs_are_refused_in_300_mb_and_the_messages_beside_them_are_given(tmp_path):
+def test_bombs_are_refused_within_300_mb_and_the_other_messages_are_read(tmp_path):
     command = [sys.executable, "-m", "tests.formats.mcap_damage.bomb_probe", str(tmp_path)]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600)
     assert ran.returncode == 0, ran.stderr

@@ -81,7 +81,7 @@ def recordings(draw):
 
 @RARELY
 @given(recordings(), st.sampled_from(list(CompressionType)), st.sampled_from([100, 5000]))
-def test_what_mcap_ros2_support_writes_reads_back_to_the_bit(recording, compression, chunk_size):
+def test_files_of_mcap_ros2_support_are_read_exactly(recording, compression, chunk_size):
     text, messages, times = recording
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.mcap"
@@ -96,7 +96,7 @@ def test_what_mcap_ros2_support_writes_reads_back_to_the_bit(recording, compress
 
 @RARELY
 @given(recordings(), st.booleans())
-def test_what_rosbags_writes_reads_back_to_the_bit(recording, compressed):
+def test_files_of_rosbags_are_read_exactly(recording, compressed):
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     text, messages, times = recording
     store = typestore(text)

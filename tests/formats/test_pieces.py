@@ -48,7 +48,7 @@ def same(one: Source, other: Source) -> bool:
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
-def test_a_container_in_many_pieces_holds_what_it_holds_in_one(suffix, tmp_path, monkeypatch):
+def test_a_container_read_in_many_pieces_has_the_same_columns(suffix, tmp_path, monkeypatch):
     needs(suffix)
     path = Path(convert(two_clocks(tmp_path / "run.mcap"), tmp_path / f"run{suffix}").files[0])
     found = choose_format(path)
@@ -64,7 +64,7 @@ def test_a_container_in_many_pieces_holds_what_it_holds_in_one(suffix, tmp_path,
 
 
 @pytest.mark.parametrize("end", ["\n", "", "\n# the end\n"])
-def test_a_table_in_many_blocks_holds_what_it_holds_at_once(end, tmp_path, monkeypatch):
+def test_a_table_read_in_many_blocks_has_the_same_columns(end, tmp_path, monkeypatch):
     lines = [f"2025-03-01,23:59:{k // 100:02d}.{k % 100:02d},{k},{k / 7!r}" for k in range(5000)]
     lines[1200] = "# a comment"
     lines[2300] = ""
@@ -79,7 +79,7 @@ def test_a_table_in_many_blocks_holds_what_it_holds_at_once(end, tmp_path, monke
     assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
 
-def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
+def test_midnight_between_two_blocks_is_detected(tmp_path, monkeypatch):
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
     seconds = np.arange(0, 200_000, 20) + 80_000
     path = tmp_path / "a.csv"
@@ -90,7 +90,7 @@ def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cell")])
-def test_words_are_a_footer_only_where_no_row_follows_in_any_block(row, fault, tmp_path, monkeypatch):
+def test_words_are_a_footer_only_if_no_row_follows_in_any_block(row, fault, tmp_path, monkeypatch):
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
     lines = [f"{k},{k}" for k in range(4000)]
     lines.insert(row, "end of the measurement")
@@ -104,7 +104,7 @@ def test_words_are_a_footer_only_where_no_row_follows_in_any_block(row, fault, t
 
 
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=60), st.integers(1, 7), st.integers(0, 2**32))
-def test_rows_come_in_the_order_of_their_times_however_late_the_file_has_them(times, length, seed):
+def test_rows_are_in_the_order_of_their_times_however_late_the_file_stores_them(times, length, seed):
     late = np.sort(times) / 8.0
     order = np.argsort(np.arange(len(late)) + np.random.default_rng(seed).uniform(0, 9, len(late)))
     pieces = [
@@ -127,7 +127,7 @@ def test_rows_come_in_the_order_of_their_times_however_late_the_file_has_them(ti
     assert all(one[-1] < other[0] for one, other in pairwise(ends))
 
 
-def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
+def test_the_memory_for_the_statistics_of_a_log_does_not_grow_with_its_length():
     def read(count: int) -> Pieces:
         def pieces() -> Iterator[Piece]:
             for k in range(count):
@@ -148,7 +148,7 @@ def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
     assert peaks[200] < 1.2 * peaks[20]
 
 
-def test_columns_in_memory_are_one_piece_a_clock():
+def test_columns_in_memory_are_one_piece_per_clock():
     time = np.arange(3.0)
     columns = [Column("a", time, time), Column("b", time, time), Column("c", np.arange(4.0))]
     source = Source(Path("a"), "mat", {column.name: column for column in columns})

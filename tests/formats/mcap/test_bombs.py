@@ -76,7 +76,7 @@ def packed(compression, content):
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 @pytest.mark.parametrize("stated", [0, 1, 30, 10**6, 10**9, 2**40, 2**64 - 1])
-def test_a_chunk_that_is_not_as_large_as_it_claims_is_lost_and_the_next_is_read(tmp_path, compression, stated):
+def test_a_chunk_with_a_false_size_is_lost_and_the_next_is_read(tmp_path, compression, stated):
     content = one_message()
     path = file_of(
         tmp_path / "lie.mcap",
@@ -117,7 +117,7 @@ def test_a_bomb_is_refused_in_less_than_300_megabytes(tmp_path, compression, sta
     assert kilobytes < 300_000
 
 
-def test_many_chunks_of_nearly_nothing_are_a_bomb_too(tmp_path):
+def test_many_small_chunks_with_high_ratios_are_a_bomb(tmp_path):
     """Each is small enough, together they would be a hundred times the file and more."""
     content = one_message() + record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"{}") * 400_000
     bomb = file_of(tmp_path / "bomb.mcap", *[chunk(packed("zstd", content), len(content), "zstd")] * 60)
@@ -133,7 +133,7 @@ def test_many_chunks_of_nearly_nothing_are_a_bomb_too(tmp_path):
 
 @pytest.mark.parametrize("opcode", [4, 5, 9, 12, 0x90])
 @pytest.mark.parametrize("length", [2**20, 2**40, 2**63, 2**64 - 1])
-def test_a_record_that_claims_more_than_the_file_holds_is_not_read(tmp_path, opcode, length):
+def test_a_record_that_declares_more_than_the_file_contains_is_not_read(tmp_path, opcode, length):
     content = one_message()
     good = chunk(content, len(content), "", zlib.crc32(content))
     path = file_of(tmp_path / "lie.mcap", good, struct.pack("<BQ", opcode, length) + bytes(40), good)
@@ -145,7 +145,7 @@ def test_a_record_that_claims_more_than_the_file_holds_is_not_read(tmp_path, opc
 @pytest.mark.parametrize(
     ("given", "taken"), [(1, 1), (7, 1 << 20), (1 << 10, 1 << 7), (1 << 16, 1 << 17), (1 << 18, 1)]
 )
-def test_lz4_gives_the_same_in_pieces_of_whatever_size(monkeypatch, given, taken):
+def test_lz4_gives_the_same_result_in_pieces_of_any_size(monkeypatch, given, taken):
     rng = np.random.default_rng(0)
     content = np.frombuffer(bytes(9_000) + rng.bytes(3_000) + bytes(70_000 if taken > 1 else 9), np.uint8)
     frames = b"".join(lz4.frame.compress(part.tobytes()) for part in (content[:10_000], content[10_000:]))
@@ -173,7 +173,7 @@ def camera_in_the_dark(path, compression):
     return path
 
 
-def test_an_honest_log_of_dark_images_is_told_how_to_be_read_whole(tmp_path):
+def test_the_findings_of_a_log_of_dark_images_state_how_to_read_it_completely(tmp_path):
     packed_log = camera_in_the_dark(tmp_path / "packed.mcap", CompressionType.ZSTD)
     for wanted in (
         None,
@@ -190,7 +190,7 @@ def test_an_honest_log_of_dark_images_is_told_how_to_be_read_whole(tmp_path):
     assert not [found for found in others if found.severity == "loss" or isinstance(found.fact, ChunksRefused)]
 
 
-def test_numbers_that_never_change_are_read_however_long(tmp_path, monkeypatch):
+def test_numbers_that_never_change_are_read_in_logs_of_any_length(tmp_path, monkeypatch):
     """A frozen joint shrinks to a tenth: its times do not."""
     monkeypatch.setattr(chunks, "_LONG", 1 << 20)
     monkeypatch.setattr(chunks, "LARGEST", 1 << 20)

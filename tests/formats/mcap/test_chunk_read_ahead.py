@@ -48,7 +48,7 @@ def read_in_turn(monkeypatch):
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("joined", [1, 2000, 10**6])
-def test_every_chunk_is_read_once_and_ahead(tmp_path, monkeypatch, cores, read_in_turn, compression, joined):
+def test_every_chunk_is_read_once_and_read_ahead(tmp_path, monkeypatch, cores, read_in_turn, compression, joined):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     monkeypatch.setattr(chunks_ahead, "JOINED", joined)
@@ -60,7 +60,7 @@ def test_every_chunk_is_read_once_and_ahead(tmp_path, monkeypatch, cores, read_i
     assert not read_in_turn[False]
 
 
-def test_on_one_core_and_without_a_checked_summary_nothing_is_read_ahead(tmp_path, cores, read_in_turn):
+def test_on_one_core_or_without_a_verified_summary_nothing_is_read_ahead(tmp_path, cores, read_in_turn):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     cores(ONE_CORE)
@@ -76,7 +76,7 @@ def test_on_one_core_and_without_a_checked_summary_nothing_is_read_ahead(tmp_pat
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("damage", ["content", "crc", "no crc", "size", "opcode", "time"])
 @pytest.mark.parametrize("joined", [1, 2000, 10**6])
-def test_a_damaged_chunk_is_lost_as_it_is_without(tmp_path, monkeypatch, cores, compression, damage, joined):
+def test_a_damaged_chunk_is_lost_with_and_without_reading_ahead(tmp_path, monkeypatch, cores, compression, damage, joined):
     path = tmp_path / "log.mcap"
     small_file(path, compression)
     places = sorted(Log(path).summary.chunks)
@@ -101,7 +101,7 @@ def test_a_damaged_chunk_is_lost_as_it_is_without(tmp_path, monkeypatch, cores, 
         assert findings
 
 
-def test_memory_is_used_again_only_when_nothing_refers_to_it():
+def test_memory_is_reused_only_if_nothing_refers_to_it():
     buffers = Buffers(1 << 22)
     first = buffers.take(100)
     assert len(first) == 1 << 22 and first.ctypes.data % (2 << 20) == 0
@@ -122,6 +122,6 @@ def test_memory_is_used_again_only_when_nothing_refers_to_it():
     assert address in {each.ctypes.data for each in kept}
 
 
-def test_more_than_a_buffer_holds_is_given_as_it_is_asked_for():
+def test_memory_larger_than_a_buffer_is_allocated_in_the_requested_size():
     large = Buffers(1 << 22).take(5 << 20)
     assert large.shape == (5 << 20,) and large.dtype == np.uint8

@@ -55,7 +55,7 @@ def every_record(path):
         at += length
 
 
-def test_the_suite_is_whole():
+def test_the_suite_is_complete():
     assert sum(len(files(group)) for group in GROUPS) == 416
     assert {path.parent.name for path in data("mcap_conformance").glob("*/*.mcap")} == set(GROUPS)
 
@@ -95,7 +95,7 @@ def test_the_messages_of_every_file_are_those_of_its_json(group, way):
         assert log.count == len(expected), path.name
 
 
-def test_a_summary_gives_the_records_that_stand_in_it():
+def test_the_records_of_a_summary_are_read():
     for path in (path for group in GROUPS for path in files(group)):
         records = stated(path)
         names = [record["type"] for record in records]
@@ -106,7 +106,7 @@ def test_a_summary_gives_the_records_that_stand_in_it():
 
 
 @needs_data("mcap_samples")
-def test_samples_of_other_writers_read_without_loss():
+def test_samples_of_other_writers_are_read_without_loss():
     for path in sorted(data("mcap_samples").glob("*.mcap")):
         found, findings, log = read(path)
         assert len(found) == log.count > 0, path.name

@@ -14,7 +14,7 @@ from tests.formats.mcap.small_files import COMPRESSIONS, read, read_or_refused, 
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_a_file_cut_at_any_byte_gives_true_messages_and_says_that_it_is_cut(tmp_path, compression):
+def test_a_file_cut_at_any_byte_yields_true_messages_and_reports_the_cut(tmp_path, compression):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression, messages=14)
     whole = path.read_bytes()
@@ -29,7 +29,7 @@ def test_a_file_cut_at_any_byte_gives_true_messages_and_says_that_it_is_cut(tmp_
     assert before == len(sent)
 
 
-def test_of_an_uncompressed_file_every_whole_message_before_the_cut_is_given(tmp_path):
+def test_an_uncompressed_file_yields_every_complete_message_before_the_cut(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     whole = path.read_bytes()
@@ -41,7 +41,7 @@ def test_of_an_uncompressed_file_every_whole_message_before_the_cut_is_given(tmp
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("flip", [0x01, 0xFF])
-def test_any_flipped_byte_gives_true_messages_only_and_what_is_missing_is_said(tmp_path, compression, flip):
+def test_any_flipped_byte_yields_only_true_messages_and_missing_ones_are_reported(tmp_path, compression, flip):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression, messages=14)
     whole = path.read_bytes()
@@ -53,7 +53,7 @@ def test_any_flipped_byte_gives_true_messages_only_and_what_is_missing_is_said(t
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_after_a_damaged_chunk_reading_goes_on_with_the_next(tmp_path, compression):
+def test_after_a_damaged_chunk_reading_continues_with_the_next(tmp_path, compression):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     whole = bytearray(path.read_bytes())
@@ -72,7 +72,7 @@ def test_after_a_damaged_chunk_reading_goes_on_with_the_next(tmp_path, compressi
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_the_next_chunk_is_found_without_a_summary_too(tmp_path, compression):
+def test_the_next_chunk_is_also_found_without_a_summary(tmp_path, compression):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     chunks = sorted(Log(path).summary.chunks)
@@ -97,7 +97,7 @@ def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_pat
     assert findings[-1].fact == Unverified(log.unverified, len(found))
 
 
-def test_a_lost_definition_is_taken_from_the_summary(tmp_path):
+def test_a_lost_definition_is_read_from_the_summary(tmp_path):
     """The package's writer defines channels in the first chunk only."""
     path = tmp_path / "log.mcap"
     sent = small_file(path, "zstd")
@@ -131,7 +131,7 @@ def test_messages_that_no_checksum_covers_are_counted(tmp_path):
     assert findings == [Finding(Unverified(len(sent), len(sent)), severity="note")]
 
 
-def test_a_message_shorter_than_its_header_ends_what_can_be_trusted(tmp_path):
+def test_nothing_is_read_after_a_message_shorter_than_its_header(tmp_path):
     path = tmp_path / "log.mcap"
     small_file(path, use_chunking=False)
     whole = path.read_bytes()

@@ -38,7 +38,7 @@ DEFINED = (schema(1, b"float64 data"), channel(1, b"/a"), channel(2, b"/b", 0))
 
 @pytest.mark.parametrize("change", [schema(1, b"float32 data"), channel(1, b"/c"), channel(1, b"/a", 0)])
 @pytest.mark.parametrize("apart", [False, True], ids=["in one chunk", "in two chunks"])
-def test_after_a_redefinition_messages_are_lost_and_counted_and_other_channels_go_on(tmp_path, change, apart):
+def test_after_a_redefinition_messages_are_lost_and_counted_and_other_channels_are_read(tmp_path, change, apart):
     before = (*DEFINED, message(1, 1), message(2, 2), message(1, 3))
     behind = (change, message(1, 4), message(2, 5), message(1, 6))
     chunks = (verified(*before), verified(*behind)) if apart else (verified(*before, *behind),)
@@ -48,21 +48,21 @@ def test_after_a_redefinition_messages_are_lost_and_counted_and_other_channels_g
     assert "is defined twice, differently: 2 messages lost" in findings[0]
 
 
-def test_the_same_definition_again_is_none(tmp_path):
+def test_a_repeated_definition_is_not_a_redefinition(tmp_path):
     again = (*DEFINED, message(1, 1))
     found, findings = read_or_refused(file_of(tmp_path / "again.mcap", verified(*again), verified(*again)))
     assert len(found) == 2
     assert not findings
 
 
-def test_a_channel_that_is_not_there_loses_its_messages_only(tmp_path):
+def test_only_the_messages_of_an_undefined_channel_are_lost(tmp_path):
     path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, message(1, 1), message(7, 2), message(7, 3)))
     found, findings = read_or_refused(path)
     assert [time for _, time, _ in found] == [1]
     assert findings == ["a message names channel 7, which is not defined: 2 messages lost"]
 
 
-def test_a_schema_that_is_not_there_loses_its_messages_only(tmp_path):
+def test_only_the_messages_of_an_undefined_schema_are_lost(tmp_path):
     path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, channel(3, b"/c", 9), message(1, 1), message(3, 2)))
     found, findings = read_or_refused(path)
     assert [time for _, time, _ in found] == [1]

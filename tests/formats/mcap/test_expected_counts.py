@@ -18,7 +18,7 @@ def indexes(path):
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("chunk_size", [100, 500, 10**6])
-def test_messages_are_numbered_channel_by_channel_through_all_chunks(tmp_path, compression, chunk_size):
+def test_expected_rows_are_numbered_per_channel_through_all_chunks(tmp_path, compression, chunk_size):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression, messages=50, chunk_size=chunk_size)
     chunks = indexes(path)
@@ -33,7 +33,7 @@ def test_messages_are_numbered_channel_by_channel_through_all_chunks(tmp_path, c
     assert {topics[channel]: count for channel, count in passed.items()} == Counter(topic for topic, _, _ in sent)
 
 
-def test_it_ends_where_message_indexes_cannot_be_as_long_as_they_claim(tmp_path):
+def test_expected_rows_end_at_message_indexes_of_impossible_length(tmp_path):
     path = tmp_path / "log.mcap"
     small_file(path, chunk_size=200)
     chunks = indexes(path)
@@ -44,7 +44,7 @@ def test_it_ends_where_message_indexes_cannot_be_as_long_as_they_claim(tmp_path)
     assert list(expected_rows(chunks)) == [chunks[0].chunk_start_offset]
 
 
-def test_without_message_indexes_nothing_is_foretold(tmp_path):
+def test_without_message_indexes_no_rows_are_expected(tmp_path):
     path = tmp_path / "log.mcap"
     small_file(path)
     bare = [replace(index, message_index_offsets={}, message_index_length=0) for index in indexes(path)]

@@ -28,7 +28,7 @@ def by_the_package(path):
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_a_whole_file_comes_out_whole(tmp_path, compression):
+def test_an_undamaged_file_is_recovered_completely(tmp_path, compression):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source, compression)
     done = recover(source, output)
@@ -43,7 +43,7 @@ def test_a_whole_file_comes_out_whole(tmp_path, compression):
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_what_a_damaged_chunk_held_is_not_in_the_output_and_is_said(tmp_path, compression):
+def test_the_messages_of_a_damaged_chunk_are_left_out_and_reported(tmp_path, compression):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source, compression)
     whole = bytearray(source.read_bytes())
@@ -61,7 +61,7 @@ def test_what_a_damaged_chunk_held_is_not_in_the_output_and_is_said(tmp_path, co
 
 
 @pytest.mark.parametrize("keep", [False, True], ids=["left out", "kept"])
-def test_messages_of_a_cut_chunk_are_left_out_or_kept_without_a_checksum(tmp_path, keep):
+def test_messages_of_a_cut_chunk_are_left_out_or_written_without_a_checksum(tmp_path, keep):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source)
     whole = source.read_bytes()
@@ -76,7 +76,7 @@ def test_messages_of_a_cut_chunk_are_left_out_or_kept_without_a_checksum(tmp_pat
     assert said(output)["unverified"].startswith(f"{done.unverified} messages in chunks")
 
 
-def test_without_any_checksum_nothing_is_kept_unless_it_is_asked_for(tmp_path):
+def test_without_any_checksum_nothing_is_recovered_unless_requested(tmp_path):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source, use_chunking=False)
     with pytest.raises(RecordingError, match=r"none of its 24 messages has a checksum \(--unverified keeps them"):
@@ -104,7 +104,7 @@ def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path
     assert read(output)[2].unverified == len(sent)
 
 
-def test_what_a_checksum_covered_is_still_covered_behind_what_none_did(tmp_path):
+def test_verified_messages_keep_a_checksum_after_unverified_ones(tmp_path):
     """Channels are then defined in a chunk without a checksum first, and again in one with it."""
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source)
@@ -120,7 +120,7 @@ def test_what_a_checksum_covered_is_still_covered_behind_what_none_did(tmp_path)
     assert log.unverified == unverified
 
 
-def test_attachments_and_metadata_are_kept(tmp_path):
+def test_attachments_and_metadata_are_recovered(tmp_path):
     from mcap.writer import Writer
 
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"

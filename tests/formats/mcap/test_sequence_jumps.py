@@ -53,11 +53,11 @@ def test_jumps_are_counted_with_the_time_of_the_first(tmp_path):
     ],
     ids=["no numbers", "all there", "every tenth", "started anew", "32 bits pass over", "no count"],
 )
-def test_what_is_no_count_with_jumps_is_not_told(tmp_path, numbers):
+def test_numbers_other_than_a_count_with_jumps_are_not_reported(tmp_path, numbers):
     assert not told(write(tmp_path / "log.mcap", [("/a", i, number) for i, number in enumerate(numbers)]))
 
 
-def test_each_topic_is_counted_by_itself(tmp_path):
+def test_each_topic_is_counted_separately(tmp_path):
     messages = [("/a", i, i + 1) for i in range(300) if i != 200]
     messages += [("/b", 10 * i, i + 1) for i in range(30)]
     messages.sort(key=lambda item: item[1])
@@ -65,7 +65,7 @@ def test_each_topic_is_counted_by_itself(tmp_path):
     assert only == Finding(MissingMessages(1, 1, 0.199, of_topic=True), "/a")
 
 
-def test_a_log_whose_topics_are_counted_together_has_no_jumps_but_its_own(tmp_path):
+def test_a_log_whose_topics_are_counted_together_has_only_common_jumps(tmp_path):
     small_file(tmp_path / "whole.mcap", messages=200)  # two topics, one count
     assert not told(tmp_path / "whole.mcap")
     messages = [("/b" if i % 3 == 2 else "/a", i, i + 1) for i in range(300) if not 100 <= i < 110]
@@ -83,7 +83,7 @@ def test_any_loss_between_the_first_and_the_last_message_is_counted(tmp_path_fac
         assert found[0].fact.missing == len(lost)
 
 
-def test_of_two_channels_of_a_topic_one_of_which_cannot_be_decoded_the_other_is_read(tmp_path):
+def test_a_channel_is_read_if_another_one_of_its_topic_cannot_be_decoded(tmp_path):
     path = tmp_path / "log.mcap"
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=300)

@@ -67,7 +67,7 @@ def test_chunks_without_a_wanted_topic_are_not_read(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "what", ["a chunk is left out", "a count", "a channel of a chunk", "message indexes are longer", "no CRC"]
 )
-def test_a_summary_that_tells_otherwise_loses_nothing_and_is_found(tmp_path, what):
+def test_a_false_summary_loses_nothing_and_is_reported(tmp_path, what):
     path = tmp_path / "log.mcap"
     by_turns(path)
     log = Log(path)
@@ -104,7 +104,7 @@ def test_a_summary_that_tells_otherwise_loses_nothing_and_is_found(tmp_path, wha
             assert any(isinstance(item.fact, IndexDisagrees | ChannelCountsDiffer) for item in findings)
 
 
-def test_a_file_with_more_messages_than_its_summary_says_gives_them_all(tmp_path):
+def test_a_file_with_more_messages_than_in_its_summary_is_read_completely(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     statistics = Log(path).summary.statistics
@@ -121,7 +121,7 @@ def test_a_file_with_more_messages_than_its_summary_says_gives_them_all(tmp_path
 
 
 @pytest.mark.parametrize("field", ["start", "end"])
-def test_a_chunk_whose_times_are_not_those_of_its_messages_is_found(tmp_path, field):
+def test_a_chunk_whose_times_differ_from_its_messages_is_reported(tmp_path, field):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     whole = bytearray(path.read_bytes())
@@ -133,7 +133,7 @@ def test_a_chunk_whose_times_are_not_those_of_its_messages_is_found(tmp_path, fi
     assert {IndexDisagrees(1, "other values"), ChunkTimesDiffer(1)} <= {finding.fact for finding in findings}
 
 
-def test_a_damaged_summary_is_said_and_the_data_read_without_it(tmp_path):
+def test_a_damaged_summary_is_reported_and_the_data_are_read_without_it(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     whole = bytearray(path.read_bytes())

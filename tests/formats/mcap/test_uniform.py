@@ -100,7 +100,7 @@ def recordings(draw):
     st.sampled_from(["log", "publish"]),
     st.data(),
 )
-def test_any_messages_are_the_same_taken_and_one_by_one(recording, compression, chunk_size, clock, data):
+def test_the_fast_path_reads_any_messages_like_one_by_one(recording, compression, chunk_size, clock, data):
     text, messages, times = recording
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.mcap"
@@ -146,7 +146,7 @@ FIELDS = [("/joint_states", field) for field in ("position[:]", "velocity[b]", "
 
 
 @pytest.mark.parametrize("clock", ["log", "publish", "header"])
-def test_all_but_the_first_chunk_of_a_usual_log_are_taken(tmp_path, taken, clock):
+def test_the_fast_path_reads_all_but_the_first_chunk_of_a_usual_log(tmp_path, taken, clock):
     path = tmp_path / "log.mcap"
     joint_states(path)
     before = dict(taken)
@@ -172,7 +172,7 @@ def test_all_but_the_first_chunk_of_a_usual_log_are_taken(tmp_path, taken, clock
     ],
     ids=["order", "names", "no efforts", "two positions", "empty", "frame"],
 )
-def test_messages_that_differ_now_and_then_are_the_same_taken_and_one_by_one(tmp_path, every, change):
+def test_the_fast_path_reads_messages_that_differ_sometimes_like_one_by_one(tmp_path, every, change):
     path = tmp_path / "log.mcap"
     joint_states(path, change=lambda i, message: change(message) if i % every == every - 1 else message)
     for clock in ("log", "header"):
@@ -191,13 +191,13 @@ def test_messages_that_differ_now_and_then_are_the_same_taken_and_one_by_one(tmp
     ],
     ids=["backwards", "again", "set", "before 1970", "standing"],
 )
-def test_stamps_in_any_order_are_told_the_same(tmp_path, stamp):
+def test_stamps_in_any_order_have_the_same_findings(tmp_path, stamp):
     path = tmp_path / "log.mcap"
     joint_states(path, stamp=stamp)
     same(path, FIELDS, "header")
 
 
-def test_two_topics_of_one_type_and_one_that_is_not_asked_for(tmp_path):
+def test_two_topics_of_one_type_and_one_that_is_not_requested(tmp_path):
     path = tmp_path / "log.mcap"
     joint_states(path, repeated=2)
     same(path, [*FIELDS, ("/joint_states_2", "effort[a]")], "header")
@@ -225,7 +225,7 @@ def written(path, parts, ending=None):
     return path
 
 
-def test_definitions_that_are_repeated_in_every_chunk_are_passed_over(tmp_path, taken):
+def test_definitions_that_are_repeated_in_every_chunk_are_skipped(tmp_path, taken):
     path = written(tmp_path / "log.mcap", blocks(everywhere=True))
     before = taken[True]
     columns, _, findings = same(path, WANTED)
@@ -236,7 +236,7 @@ def test_definitions_that_are_repeated_in_every_chunk_are_passed_over(tmp_path, 
 
 @pytest.mark.parametrize("at", [0, 1, 7, 28])
 @pytest.mark.parametrize("kind", ["another type", "another topic"])
-def test_a_channel_that_is_defined_anew_is_lost_the_same(tmp_path, at, kind):
+def test_a_redefined_channel_is_lost_on_the_fast_path_too(tmp_path, at, kind):
     force = TOPICS["/force"]
     other = replace(force, topic="/elsewhere") if kind == "another topic" else replace(force, encoding="json")
     parts = blocks()
@@ -263,7 +263,7 @@ def shorter(index):
     ids=["shifted", "longer", "shorter", "none", "one", "exchanged"],
 )
 @pytest.mark.parametrize("which", [range(30), range(5, 6), range(20, 30)], ids=["all", "one", "last"])
-def test_lies_about_how_many_messages_a_chunk_holds_change_nothing(tmp_path, lie, which):
+def test_false_message_counts_of_a_chunk_change_nothing(tmp_path, lie, which):
     ending = Ending(indexes=lambda found: [lie(index) if i in which else index for i, index in enumerate(found)])
     path = written(tmp_path / "log.mcap", blocks(), ending)
     columns = same(path, WANTED)[0]
@@ -273,13 +273,13 @@ def test_lies_about_how_many_messages_a_chunk_holds_change_nothing(tmp_path, lie
 
 
 @pytest.mark.parametrize("off", [lambda n: n - 20, lambda n: n + 10**6, lambda _: 0, lambda _: 1])
-def test_lies_about_how_many_messages_there_are_change_nothing(tmp_path, off):
+def test_false_message_counts_of_the_file_change_nothing(tmp_path, off):
     ending = Ending(counts=lambda counts: {channel: off(count) for channel, count in counts.items()})
     same(written(tmp_path / "log.mcap", blocks(), ending), WANTED)
 
 
 @pytest.mark.parametrize("lost", [(0,), (1,), (11, 12, 20), tuple(range(2, 30, 2))])
-def test_behind_chunks_that_are_lost_rows_move_up(tmp_path, lost):
+def test_rows_after_lost_chunks_are_consecutive(tmp_path, lost):
     parts = [lying(part, crc=1) if i in lost else part for i, part in enumerate(blocks())]
     columns, _, findings = same(written(tmp_path / "log.mcap", parts), WANTED)
     assert any("checksum" in finding for finding in findings)
@@ -289,7 +289,7 @@ def test_behind_chunks_that_are_lost_rows_move_up(tmp_path, lost):
         assert columns[f"{topic} {field}"][1] == expected.tobytes()
 
 
-def test_messages_cut_short_are_lost_the_same(tmp_path):
+def test_truncated_messages_are_lost_on_the_fast_path_too(tmp_path):
     def cut(i, message):
         return replace(message, payload=message.payload[:-3]) if i % 50 == 49 else message
 
@@ -298,7 +298,7 @@ def test_messages_cut_short_are_lost_the_same(tmp_path):
 
 
 @pytest.mark.parametrize("time", [2**63, 2**64 - 1, 0])
-def test_times_of_no_clock_are_the_same(tmp_path, time):
+def test_invalid_times_are_the_same_on_the_fast_path(tmp_path, time):
     def without(i, message):
         return replace(message, time=time) if i % 100 == 70 or i < 3 else message
 

@@ -56,7 +56,7 @@ def told_of(source):
 
 @pytest.mark.parametrize(("late", "told"), [(2, "note"), (300, "warning")])
 @pytest.mark.parametrize("survey", [True, False])
-def test_stamps_that_run_back_are_told_with_the_message(tmp_path, late, told, survey):
+def test_backward_stamps_are_reported_with_the_message(tmp_path, late, told, survey):
     times = [1000 + i for i in range(400)]
     times[350] -= late
     path = write(tmp_path / "log.mcap", [(0, time * MS, cdr(float(i), 0.0)) for i, time in enumerate(times)])
@@ -67,12 +67,12 @@ def test_stamps_that_run_back_are_told_with_the_message(tmp_path, late, told, su
     assert finding.fact == OutOfOrder(1, 400, back, set_back=told == "warning", worst=350)
 
 
-def test_stamps_in_order_are_not_told(tmp_path):
+def test_stamps_in_order_are_not_reported(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, (5 + i // 2) * MS, cdr(float(i), 0.0)) for i in range(50)])
     assert not told_of(Mcap().columns(path))
 
 
-def test_two_channels_of_a_topic_are_told(tmp_path):
+def test_two_channels_of_a_topic_are_reported(tmp_path):
     messages = [(i % 2, i * MS, cdr(float(i), 0.0)) for i in range(20)]
     path = write(tmp_path / "log.mcap", messages, channels=2)
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "force")))):
@@ -82,7 +82,7 @@ def test_two_channels_of_a_topic_are_told(tmp_path):
 
 
 @pytest.mark.parametrize("every", [1, 3])
-def test_a_message_longer_than_its_definition_is_not_read_as_if_it_fitted(tmp_path, every):
+def test_a_message_longer_than_its_definition_is_not_read(tmp_path, every):
     payloads = [cdr(float(i), 1.0) if i % every else cdr(1e9, float(i), 1.0) for i in range(30)]
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i, payload in enumerate(payloads)])
     if every == 1:
@@ -95,7 +95,7 @@ def test_a_message_longer_than_its_definition_is_not_read_as_if_it_fitted(tmp_pa
     assert isinstance(fact, UndecodableMessages) and (fact.count, fact.messages) == (10, 30)
 
 
-def test_up_to_three_bytes_of_padding_are_none_of_the_message(tmp_path):
+def test_up_to_three_bytes_of_padding_are_ignored(tmp_path):
     payloads = [cdr(float(i), 1.0) + bytes(i % 4) for i in range(30)]
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i, payload in enumerate(payloads)])
     assert Mcap().columns(path, wanted(("/a", "force"))).columns["/a force"].values.tolist() == list(range(30))
@@ -109,7 +109,7 @@ def test_other_encapsulations_are_refused(tmp_path, head):
         Mcap().columns(path, wanted(("/a", "force")))
 
 
-def test_names_decide_for_a_single_joint_too(tmp_path):
+def test_names_also_select_a_single_joint(tmp_path):
     payloads = [json_state(["grip"], [-99.0]) if i % 2 else json_state(["arm"], [float(i)]) for i in range(10)]
     path = write(tmp_path / "log.mcap", [(0, i * MS, each) for i, each in enumerate(payloads)], encoding="json")
     with pytest.raises(RecordingError, match="its messages name grip, not 'arm'"):
@@ -118,26 +118,26 @@ def test_names_decide_for_a_single_joint_too(tmp_path):
     assert found.columns["/a position[arm]"].values.tolist() == [0.0, 2.0, 4.0, 6.0, 8.0]
 
 
-def test_a_joint_that_nobody_named_may_be_called_anything(tmp_path):
+def test_a_joint_without_a_name_may_have_any_name_in_messages(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["motor"], [1.0])) for i in range(3)], encoding="json")
     found = Mcap().columns(path, wanted(("/a", "position[:]"), named=False))
     assert found.columns["/a position[:]"].values.tolist() == [[1.0]] * 3
 
 
-def test_other_numbers_of_names_than_elements_are_refused(tmp_path):
+def test_different_numbers_of_names_and_elements_are_refused(tmp_path):
     payload = json_state(["a", "b", "c"], [1.0, 2.0])
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i in range(3)], encoding="json")
     with pytest.raises(RecordingError, match="3 names for 2 elements: which is whose cannot be told"):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("b", "a")))
 
 
-def test_an_index_of_other_digits_than_ascii_is_a_name(tmp_path):
+def test_an_index_with_non_ascii_digits_is_a_name(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["a"], [1.0])) for i in range(3)], encoding="json")
     with pytest.raises(RecordingError, match="no message names this joint"):
         Mcap().columns(path, wanted(("/a", "position[\u00b2]")))
 
 
-def test_a_file_joined_behind_the_end_is_told_and_not_blamed_on_the_summary(tmp_path):
+def test_a_file_appended_to_a_log_is_reported_and_not_as_a_false_summary(tmp_path):
     first, second = tmp_path / "a.mcap", tmp_path / "b.mcap"
     small_file(first)
     small_file(second, messages=30)
@@ -147,7 +147,7 @@ def test_a_file_joined_behind_the_end_is_told_and_not_blamed_on_the_summary(tmp_
     assert fact == DamagedAt(size, "the log ends here: was another file appended?", LostBytes(behind))
 
 
-def test_what_is_recovered_keeps_the_profile(tmp_path):
+def test_a_recovered_file_has_the_profile_of_its_source(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, cdr(float(i), 0.0)) for i in range(50)])
     path.write_bytes(path.read_bytes()[:-100])
     recover(path, tmp_path / "clean.mcap")
