@@ -1,4 +1,4 @@
-"""What may be read in two ways is refused with both readings, and each reading can be pinned."""
+"""Tables that can be read in two ways are refused with both readings, and each reading can be pinned."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
 from tests.noted_times import noted
 
-BEYOND = 19_000  # rows that fill more than the sample
+BEYOND = 19_000  # rows, more than the sample has
 
 
 def rows(values, separator=";", first=0) -> str:
@@ -20,7 +20,7 @@ def rows(values, separator=";", first=0) -> str:
 
 
 def pinned(path, **pins) -> np.ndarray:
-    """The last of the columns, read with these pins and a rate."""
+    """Return the last column, read with these pins and a rate."""
     wanted = ChannelMap(TimeSource(rate=1.0), (ChannelSource("torque", (pins.pop("column", 1),)),), ("a",))
     source = Csv().columns(path, replace(wanted, pins=TablePins(**pins)))
     return next(iter(source.columns.values())).values
@@ -133,16 +133,16 @@ def test_two_pairs_of_digits_are_refused_unless_a_cell_shows_whether_they_are_mi
     for pattern, step in (("%H:%M", 60), ("%M:%S", 1)):
         wanted = machine(channels + f'time_format = "{pattern}"\n').columns
         assert Csv().columns(path, wanted).columns["t"].values.tolist() == [step * i for i in range(5)]
-    proven = Csv().columns(log("t;x\n" + "".join(f"23:5{i};1\n24:0{i};1\n" for i in range(3))))
-    assert proven.columns["t"].values.tolist()[:2] == [23 * 60 + 50, 24 * 60]
-    beside = Csv().columns(log("d;t;x\n" + "".join(f"2025-04-03;12:0{i};1\n" for i in range(3))))
-    assert beside.columns["t"].values.tolist() == [60 * i for i in range(3)]
+    minutes = Csv().columns(log("t;x\n" + "".join(f"23:5{i};1\n24:0{i};1\n" for i in range(3))))
+    assert minutes.columns["t"].values.tolist()[:2] == [23 * 60 + 50, 24 * 60]
+    with_days = Csv().columns(log("d;t;x\n" + "".join(f"2025-04-03;12:0{i};1\n" for i in range(3))))
+    assert with_days.columns["t"].values.tolist() == [60 * i for i in range(3)]
 
 
 @pytest.mark.parametrize(
     "line",
     ["-" * 200_000 + "x", "[" + " " * 20_000 + "x", "=" * 99_999 + "|x", "-" * 50_000 + "x" + "-" * 50_000],
-    ids=["dashes", "bracket", "double dashes", "dashes about a letter"],
+    ids=["dashes", "bracket", "double dashes", "dashes around a letter"],
 )
 def test_a_long_line_of_one_letter_is_read_or_refused_with_its_number(log, line):
     path = log(f"t;x\n0;1.5\n{line}\n1;2.5\n" if line[0] != "[" else f"t;{line};x\n{line};;[N]\n0;0;1\n1;0;2\n")

@@ -1,4 +1,4 @@
-"""Cells and lines that cannot be read: the first bad one is named, with what to do; `info` keeps the column."""
+"""Cells and lines that cannot be read: the first one is named with a hint; `info` still reads the column."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ SECONDS = '[channels]\ntime = { column = 0, unit = "s" }\nspeed = { column = 1, 
 STAMPS = ["23:59:58.5", "23:59:59.0", "23:59:59.5"]
 
 
-def told(source, severity: str) -> list[Finding]:
-    return [found for found in source.findings if found.severity == severity]
+def findings_of(source, severity: str) -> list[Finding]:
+    return [finding for finding in source.findings if finding.severity == severity]
 
 
 @pytest.mark.parametrize("cell", ["n/a", "-", "#N/A", "OVL", "#WERT!"])
@@ -24,7 +24,7 @@ def test_a_word_in_a_column_of_numbers_is_a_loss_to_a_survey_and_an_error_with_a
     path = log("t;x\n" + "".join(f"{i};{cell if i == 4 else i}\n" for i in range(20)))
     source = Csv().columns(path)
     assert np.flatnonzero(np.isnan(source.columns["x"].values)).tolist() == [4]
-    (loss,) = told(source, "loss")
+    (loss,) = findings_of(source, "loss")
     assert loss == Finding(UnreadCells((6,), cell, CellAdvice("word", f'"{cell}"')), "x", "loss")
     with pytest.raises(RecordingError, match=r"line 6, column 'x': .* is not a number") as fault:
         read_recording(path, machine(SECONDS))
@@ -37,7 +37,7 @@ def test_a_column_with_many_words_is_left_out_with_a_warning(log):
     path = log("t;x\n" + "".join(f"{i};{'idle' if i % 5 == 0 else i}\n" for i in range(100)))
     source = Csv().columns(path)
     assert list(source.columns) == ["t"]
-    (warning,) = told(source, "warning")
+    (warning,) = findings_of(source, "warning")
     assert warning.fact == NotNumeric("x", 2, "idle", CellAdvice("word", '"idle"'))
 
 
@@ -48,7 +48,7 @@ def test_a_row_that_starts_with_an_error_value_of_excel_is_a_row(log, cell, sepa
     lines[4] = f"{cell}{separator}4.5"
     source = Csv().columns(log(f"t{separator}x\n" + "\n".join(lines) + "\n"))
     assert source.columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
-    assert len(told(source, "loss")) == 1 and not told(source, "note")
+    assert len(findings_of(source, "loss")) == 1 and not findings_of(source, "note")
 
 
 @pytest.mark.parametrize("comment", ["# paused, by hand", "#4,4.5", "# 4,4.5", "#paused"])
@@ -57,7 +57,7 @@ def test_a_commented_line_of_words_or_row_is_a_comment(log, comment):
     lines[4] = comment
     source = Csv().columns(log("t,x\n" + "\n".join(lines) + "\n"))
     assert len(source.columns["x"].values) == 8
-    assert told(source, "note") == [Finding(CommentLines((6,)), severity="note")]
+    assert findings_of(source, "note") == [Finding(CommentLines((6,)), severity="note")]
 
 
 @pytest.mark.parametrize("bad", ["24:00:00.0", "23:59:60", "12:61:00", "24:00"])
@@ -72,7 +72,7 @@ def test_the_first_time_that_matches_no_layout_is_named(log, machine, bad, at):
     assert "time_format" in e.value.hint and "decimal mark" not in str(e.value)
     source = Csv().columns(path)
     assert np.flatnonzero(np.isnan(source.columns["t"].values)).tolist() == [at]
-    assert told(source, "loss") == [Finding(UnreadCells((at + 2,), bad, CellAdvice("time")), "t", "loss")]
+    assert findings_of(source, "loss") == [Finding(UnreadCells((at + 2,), bad, CellAdvice("time")), "t", "loss")]
 
 
 def test_dates_with_an_unknown_layout_are_named_with_time_format(log, machine):
@@ -89,7 +89,7 @@ def test_a_first_row_of_empty_cells_is_not_a_header(log, head):
     source = Csv().columns(log(head + ";;\n0;1;2\n1;2;3\n"))
     assert list(source.columns) == (["t", "x", "y"] if head else ["0", "1", "2"])
     assert source.columns[list(source.columns)[1]].values.tolist() == [1, 2]
-    assert len(told(source, "note")) == 1
+    assert len(findings_of(source, "note")) == 1
 
 
 def test_a_line_longer_than_the_sample_is_named(log):

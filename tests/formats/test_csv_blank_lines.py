@@ -1,4 +1,4 @@
-"""Blank lines of tables: in one column a missing sample, which must not shorten the time."""
+"""Blank lines in tables: with one column each is a missing sample, so that the time is not shortened."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cdtool.ingest.reading import read_recording
 RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
 
 
-def told(source, severity: str) -> list[Fact]:
+def facts_of(source, severity: str) -> list[Fact]:
     return [finding.fact for finding in source.findings if finding.severity == severity]
 
 
@@ -24,19 +24,19 @@ def test_a_blank_line_in_one_column_is_a_missing_sample_with_its_time(log, machi
     recording = read_recording(log("x\n1.5\n2.5\n\n3.5\n4.5\n"), machine(RATE))
     assert recording["speed"].time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04]
     assert np.isnan(recording["speed"].values[:, 0]).tolist() == [False, False, True, False, False]
-    assert BlankRows((4,)) in told(recording, "warning")
-    assert told(recording, "loss") == []
+    assert BlankRows((4,)) in facts_of(recording, "warning")
+    assert facts_of(recording, "loss") == []
 
 
 def test_if_every_other_line_is_blank_it_only_separates_the_rows(log):
     source = Csv().columns(log("x\n" + "".join(f"{i}.5\n\n" for i in range(9))))
     assert source.columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
-    assert told(source, "note") == [BlankLines(tuple(range(3, 18, 2)))]
+    assert facts_of(source, "note") == [BlankLines(tuple(range(3, 18, 2)))]
 
 
 def test_a_blank_line_in_several_columns_is_not_a_row(log):
     source = Csv().columns(log("t;x\n0;1.5\n\n1;2.5\n"))
-    assert source.columns["x"].values.tolist() == [1.5, 2.5] and told(source, "note") == [BlankLines((3,))]
+    assert source.columns["x"].values.tolist() == [1.5, 2.5] and facts_of(source, "note") == [BlankLines((3,))]
 
 
 def test_a_blank_line_in_a_column_of_times_is_a_missing_stamp(log):

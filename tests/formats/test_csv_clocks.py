@@ -1,4 +1,4 @@
-"""Clocks of tables that may be read in two ways, or that begin anew: never a time that is silently wrong."""
+"""Clocks of tables that can be read in two ways, or that start again: no time is silently wrong."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def minutes(seconds: float) -> str:
     return f"{int(seconds // 60) % 60:02d}:{seconds % 60:06.3f}"
 
 
-@pytest.mark.parametrize("pin", ["", '[csv]\ntime_format = "%M:%S.%f"\n'], ids=["found", "pinned"])
+@pytest.mark.parametrize("pin", ["", '[csv]\ntime_format = "%M:%S.%f"\n'], ids=["detected", "pinned"])
 def test_minutes_and_seconds_continue_after_the_full_hour(log, machine, pin):
-    times = 3590.0 + 0.5 * np.arange(15_000)  # two hours and five minutes: past three full hours
+    times = 3590.0 + 0.5 * np.arange(15_000)  # two hours and five minutes, with three full hours
     recording = read_recording(log(table(map(minutes, times))), machine(SECONDS + pin))
     assert recording["speed"].time.tolist() == times.tolist()
     assert WrittenTimes("%M:%S.%f", "the full hour", wraps="the full hour", wrapped=3) in facts(recording)
-    assert not [found for found in recording.findings if found.channel == "time"]
+    assert not [finding for finding in recording.findings if finding.channel == "time"]
 
 
 def test_a_full_hour_between_two_blocks_is_detected(log, monkeypatch):

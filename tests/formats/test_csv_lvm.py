@@ -1,4 +1,4 @@
-"""LabVIEW's measurement files: text with a head of keys, channels side by side."""
+"""LabVIEW's measurement files: text tables with a head of keys and values."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_comment_after_a_row_is_named_and_left_out(log):
     rows = [f"{row}\t{'gate closed' if i == 3 else ''}\n" for i, row in enumerate(ROWS.splitlines())]
     source = survey(log(MEASUREMENT.replace(ROWS, "".join(rows))))
     assert list(source.columns) == ["X_Value", "Force", "Torque"]
-    assert NotNumeric("Comment", 27, "gate closed") in [found.fact for found in source.findings]
+    assert NotNumeric("Comment", 27, "gate closed") in [finding.fact for finding in source.findings]
 
 
 def test_a_second_heading_is_refused_with_its_line(log):
@@ -72,7 +72,7 @@ def test_a_second_heading_is_refused_with_its_line(log):
 
 
 def test_each_channel_has_its_own_clock(log, machine):
-    """`X_Columns Multi`: the keys of a channel stand above its values, between them the times."""
+    """`X_Columns Multi`: the keys of a channel are above its values, and each channel has a column of times."""
     lines = []
     for line in SEGMENT.splitlines():
         key, *values = line.split("\t")

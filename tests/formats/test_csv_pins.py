@@ -1,4 +1,4 @@
-"""`[csv]` of the machine file: what it says replaces what is found, and is held against the file."""
+"""`[csv]` of the machine file: its pins replace detected properties, and are checked against the file."""
 
 from __future__ import annotations
 
@@ -84,9 +84,7 @@ def test_the_printed_dialect_of_any_table_reads_the_same_numbers(log, case):
         ChannelSource(f"c{i}", (i,)) for i in {*numbers, len(found.names) - 1} if found.names[i] in found.columns
     )
     wanted = ChannelMap(TimeSource(rate=1.0), sources, ("axis",), pins=pins)
-    if any(
-        isinstance(finding.fact, UnreadCells) for finding in found.findings
-    ):  # a survey forgives it, nothing else does
+    if any(isinstance(finding.fact, UnreadCells) for finding in found.findings):  # only accepted in a survey
         with pytest.raises(RecordingError, match=r"is not a number"):
             Csv().columns(path, wanted)
         return

@@ -1,4 +1,4 @@
-"""Tables with a clock beside each channel: no channel is read on another one's clock."""
+"""Tables with a clock for each channel: no channel is read with the clock of another."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ def named(clock: str) -> str:
 
 
 def table(header: str, first, second, mark: str = ",") -> str:
-    """Two clocks, the shorter one ending in empty cells; force is its row, torque 10 times, speed 100 times its row."""
+    """Return a table with two clocks, the shorter one padded with empty cells.
+
+    Force is the number of the row, torque 10 times and speed 100 times the number.
+    """
     lines = [header.replace(",", mark)]
     for i in range(max(len(first), len(second))):
         a = f"{first[i]:.9f},{i}" if i < len(first) else ","
@@ -45,8 +48,8 @@ def table(header: str, first, second, mark: str = ",") -> str:
 CELL, DRIVE = np.arange(50) / 2000.0, np.arange(40) / 1000.0
 
 
-def said(source) -> list[Finding]:
-    return [found for found in source.findings if isinstance(found.fact, OtherClock)]
+def clock_warnings(source) -> list[Finding]:
+    return [finding for finding in source.findings if isinstance(finding.fact, OtherClock)]
 
 
 @pytest.mark.parametrize("header", HEADERS)
@@ -56,8 +59,8 @@ def test_each_channel_has_the_clock_before_it(log, machine, header):
     assert recording["force"].values[:, 0].tolist() == list(range(50))
     for channel in ("torque", "speed"):
         assert recording[channel].time.tolist() == DRIVE.tolist()
-    assert not [found for found in recording.findings if found.severity != "note"]
-    assert [type(found.fact) for found in recording.findings if found.channel == "time"] == [OwnClocks]
+    assert not [finding for finding in recording.findings if finding.severity != "note"]
+    assert [type(finding.fact) for finding in recording.findings if finding.channel == "time"] == [OwnClocks]
 
 
 def test_clocks_in_ms_without_a_unit_are_refused_rather_than_read_in_s(log, machine):
@@ -92,12 +95,12 @@ def test_one_clock_for_all_channels_is_refused_if_the_times_differ(log, machine,
         read_recording(path, machine(named(clock)))
     assert 'time = { column = "time", unit = "s" }' in fault.value.hint
     only = "\n".join(line for line in named(clock).splitlines() if wrong not in line and "speed" not in line)
-    kept = "force" if clock == "time1" else "torque"
-    assert len(read_recording(path, machine(only))[kept]) == 4000
+    remaining = "force" if clock == "time1" else "torque"
+    assert len(read_recording(path, machine(only))[remaining]) == 4000
     for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
-        (told,) = said(source)
-        assert told.channel == "time2" and isinstance(told.fact, OtherClock)
-        assert (told.fact.first, told.fact.columns) == ("time1", ("torque", "speed"))
+        (warning,) = clock_warnings(source)
+        assert warning.channel == "time2" and isinstance(warning.fact, OtherClock)
+        assert (warning.fact.first, warning.fact.columns) == ("time1", ("torque", "speed"))
 
 
 @pytest.mark.parametrize(
@@ -115,14 +118,14 @@ def test_a_second_clock_with_the_same_times_is_not_reported(log, machine, header
     path = log(table(header, CELL, second))
     recording = read_recording(path, machine(named("time1")))
     assert recording["torque"].time.tolist() == CELL.tolist()
-    assert not said(Csv().columns(path))
+    assert not clock_warnings(Csv().columns(path))
 
 
 def test_adjacent_clocks_belong_to_the_same_rows(log, machine):
     rows = "".join(f"{i / 100},{i / 100 + (i % 7) * 0.002},{i},{10 * i},{100 * i}\n" for i in range(60))
     path = log("time,stamp_s,force,torque,speed\n".replace("stamp_s", "timestamp") + rows)
     assert read_recording(path, machine(named("time")))["torque"].time[-1] == 0.59
-    assert not said(Csv().columns(path))
+    assert not clock_warnings(Csv().columns(path))
 
 
 def test_clocks_after_their_channels_are_recognised_by_the_last_column(log, machine):
@@ -150,7 +153,7 @@ def test_values_without_a_time_are_a_loss(log, machine):
     rows = "".join(f"{i / 2000},{i},{'' if i == 7 else i / 1000},{10 * i},{100 * i}\n" for i in range(50))
     recording = read_recording(log(HEADERS[0] + "\n" + rows), machine(OWN))
     assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
-    lost = [found for found in recording.findings if found.severity == "loss"]
+    lost = [finding for finding in recording.findings if finding.severity == "loss"]
     assert lost == [Finding(ValuesWithoutTime(1), channel, "loss") for channel in ("torque", "speed")]
 
 

@@ -1,4 +1,4 @@
-"""Several tables in one file: every line of numbers is a sample, a loss that is counted, or the file is refused."""
+"""Several tables in one file: every line of numbers is a sample or a counted loss, or the file is refused."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def table(rng: np.random.Generator, separator: str, width: int, rows: int, heade
 
 
 def several(seed: int) -> tuple[str, int]:
-    """A file of two or three tables, and how many rows of numbers it holds."""
+    """Return a file of two or three tables, and its number of rows of numbers."""
     rng = np.random.default_rng(seed)
     text = "".join(f"{line}\n" for line in rng.choice(PREAMBLE, rng.integers(0, 4)))
     total, same = 0, bool(rng.integers(2))
@@ -102,13 +102,13 @@ def test_a_single_line_of_numbers_above_the_names_is_a_loss(tmp_path):
 def test_lines_skipped_by_a_pin_are_not_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(skip_lines=401))
-    assert dialect.first_line == 403 and not [item for item in dialect.findings if item.severity == "loss"]
+    assert dialect.first_line == 403 and not [finding for finding in dialect.findings if finding.severity == "loss"]
 
 
 def test_rows_above_a_pinned_header_are_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(header=402))
-    lost = [item.fact for item in dialect.findings if item.severity == "loss"]
+    lost = [finding.fact for finding in dialect.findings if finding.severity == "loss"]
     assert lost == [NumbersAboveRows(tuple(range(2, 402)))]
 
 

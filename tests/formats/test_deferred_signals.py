@@ -1,4 +1,4 @@
-"""Signals that end a program do so between two calls of a library, never inside what it calls."""
+"""Termination signals are handled between two calls of a library, and never in its callbacks."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def test_a_signal_is_deferred_to_its_delivery_or_the_end_of_the_context(number):
         reached = []
         with pytest.raises(KeyboardInterrupt), deferred_signals():
             signal.raise_signal(number)
-            reached.append("behind the signal")
+            reached.append("after the signal")
         with pytest.raises(KeyboardInterrupt), deferred_signals() as deliver:
             signal.raise_signal(number)
             deliver()
-            reached.append("behind its delivery")
-        assert reached == ["behind the signal"]
+            reached.append("after its delivery")
+        assert reached == ["after the signal"]
         assert signal.getsignal(number) is end
     finally:
         signal.signal(number, before)
@@ -43,11 +43,11 @@ def test_an_ignored_signal_stays_ignored_and_another_thread_defers_none():
         assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
         seen = []
 
-        def elsewhere() -> None:
+        def other_thread() -> None:
             with deferred_signals():
                 seen.append(signal.getsignal(signal.SIGTERM))
 
-        thread = threading.Thread(target=elsewhere)
+        thread = threading.Thread(target=other_thread)
         thread.start()
         thread.join()
         assert seen == [signal.SIG_IGN]
@@ -60,15 +60,15 @@ def test_an_interruption_while_hdf5_writes_leaves_no_file(tmp_path, monkeypatch,
     pytest.importorskip("h5py")
     rows = "\n".join(f"{k * 0.001:.3f},{value}" for k, value in enumerate(np.sin(np.arange(500) / 50.0)))
     (tmp_path / "log.csv").write_text(f"time [s],torque [N m]\n{rows}\n", encoding="utf-8")
-    write, calls = hdf5_writing._Disk.write, []
+    write, calls = hdf5_writing._CheckedFile.write, []
 
-    def struck(self: hdf5_writing._Disk, data: object) -> int:
+    def interrupted(self: hdf5_writing._CheckedFile, data: object) -> int:
         calls.append(data)
         if len(calls) == call:
             signal.raise_signal(signal.SIGINT)
         return write(self, data)
 
-    monkeypatch.setattr(hdf5_writing._Disk, "write", struck)
+    monkeypatch.setattr(hdf5_writing._CheckedFile, "write", interrupted)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""HDF5's clocks and packed numbers: what an attribute says is done, or the dataset is left out."""
+"""HDF5's clocks and packed numbers: attributes are applied, or the dataset is left out."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ position = { column = "q", unit = "rad" }
 
 @pytest.fixture
 def saved(tmp_path):
-    """Write datasets with their attributes; the path."""
+    """Return a function that writes datasets with their attributes and returns the path."""
 
     def save(**datasets):
         path = tmp_path / "log.h5"
@@ -113,7 +113,7 @@ def test_any_date_is_converted_like_in_the_calendar(date, minutes, gap):
 )
 def test_a_time_since_an_unreadable_date_is_reported_and_not_used_as_a_clock(saved, attributes, why):
     source = survey(saved(time=(np.arange(9.0), attributes), q=(np.arange(9.0), {})))
-    (reason,) = [item.fact.reason for item in source.findings if isinstance(item.fact, UnusableClock)]
+    (reason,) = [finding.fact.reason for finding in source.findings if isinstance(finding.fact, UnusableClock)]
     assert source.columns["q"].time is None and why in reason
 
 
@@ -158,7 +158,7 @@ def test_a_fill_value_of_32_bits_is_compared_in_32_bits(saved):
 def test_a_dataset_with_an_unknown_packing_is_left_out(saved, attributes):
     source = survey(saved(x=(np.arange(5), attributes), y=(np.arange(5.0), {})))
     assert list(source.columns) == ["y"]
-    why = f"packed, but its attribute {next(iter(attributes))} is no number"
+    why = f"packed, but its attribute {next(iter(attributes))} is not a number"
     assert facts(source) == [("", ColumnLeftOut("x", why))]
 
 
@@ -170,7 +170,7 @@ def test_a_packed_clock_may_have_missing_stamps(saved):
 
 
 def test_the_epoch_is_subtracted_before_a_clock_is_scaled(saved):
-    """Ticks of 100 ns since 1970: scaled first, float64 would hold them to 240 ns."""
+    """If ticks of 100 ns since 1970 were scaled first, float64 would have a resolution of 240 ns."""
     ticks = 17_000_000_001_234_567 + np.cumsum(np.random.default_rng(7).integers(9_001, 11_000, 200))
     source = survey(saved(time=(ticks, {"units": "s", "scale_factor": 1e-7}), q=(np.arange(200.0), {})))
     assert np.allclose(source.columns["q"].time, (ticks - ticks[0]) / 1e7, rtol=4e-16, atol=0.0)
@@ -187,7 +187,7 @@ def test_info_shows_every_column_on_the_clock_of_its_group(saved):
     info = cdtool.info(path)
     rates = {channel.name: round(channel.rate_hz) for channel in info.channels}
     assert rates == {"drive/t": 100, "drive/q": 100, "cell/time": 1000, "cell/force": 1000}
-    assert not [found for found in info.findings if isinstance(found.fact, AssumedClock)]
+    assert not [finding for finding in info.findings if isinstance(finding.fact, AssumedClock)]
 
 
 def test_clocks_of_groups_without_a_unit_are_a_warning(saved):

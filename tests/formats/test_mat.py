@@ -48,13 +48,13 @@ def test_scalars_are_details_and_integers_become_float64(saved):
 def test_structs_cells_and_texts_are_named_and_left_out(saved):
     cells = np.array([["a"], [2.0]], dtype=object)
     source = Mat().columns(saved({"t": np.arange(3.0), "s": {"a": 1}, "c": cells, "w": "words", "z": np.ones(3) * 1j}))
-    left_out = {(found.fact.variable, found.fact.what) for found in source.findings}
+    left_out = {(finding.fact.variable, finding.fact.what) for finding in source.findings}
     assert left_out == {("s", "a struct"), ("c", "a cell"), ("w", "a char"), ("z", "complex")}
     assert list(source.columns) == ["t"]
 
 
 def test_a_damaged_number_type_is_an_error_and_does_not_crash_the_process(saved):
-    """scipy's reader crashes the interpreter here."""
+    """scipy's reader would crash the interpreter."""
     path = saved({"q": np.arange(50.0)})
     whole = path.read_bytes()
     at = whole.index(b"\x09\0\0\0\x90\x01\0\0")  # miDOUBLE, 400 bytes

@@ -1,4 +1,4 @@
-"""MATLAB 7.3 files, which are HDF5 inside, give what a file of version 7 gives."""
+"""MATLAB 7.3 files, which are HDF5 files, have the same columns as files of version 7."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _COMPLEX = np.dtype([("real", "f8"), ("imag", "f8")])
 
 
 def save_v73(path: Path, variables: dict[str, object], **options) -> Path:
-    """As MATLAB writes them: dimensions in reverse, the class as an attribute, texts as numbers, cells by reference."""
+    """Write variables like MATLAB: reverse dimensions, class as an attribute, texts as numbers, cells as references."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, value in variables.items():
             _put(file, name, value, options)
@@ -105,7 +105,7 @@ def test_variables_other_than_vectors_and_matrices_of_numbers_are_named_and_left
         file["f"].attrs["MATLAB_class"] = np.bytes_("function_handle")
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
-    left_out = {found.fact.variable: found.fact.what for found in source.findings}
+    left_out = {finding.fact.variable: finding.fact.what for finding in source.findings}
     assert left_out == {
         "c": "a cell",
         "cube": "a 2 x 3 x 4 array",
@@ -182,7 +182,7 @@ def test_a_dataset_in_other_files_is_not_followed(tmp_path):
         file.create_virtual_dataset("v", layout)
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
-    assert [found.fact.what for found in source.findings] == ["an array stored in other files"] * 2
+    assert [finding.fact.what for finding in source.findings] == ["an array stored in other files"] * 2
 
 
 @pytest.mark.parametrize("kept", [400, 520, 700, 1500, -1])

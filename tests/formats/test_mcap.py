@@ -205,7 +205,7 @@ def test_real_files_of_other_writers_survey_without_an_error(name):
     source = Mcap().columns(data("mcap_samples") / name)
     assert source.topics
     if "wrong_rmw" in name:
-        reasons = {item.fact.reason for item in source.findings if isinstance(item.fact, UndecodableMessages)}
+        reasons = {finding.fact.reason for finding in source.findings if isinstance(finding.fact, UndecodableMessages)}
         assert any("'wrong_format'" in reason for reason in reasons)
         with pytest.raises(RecordingError, match="wrong_format"):
             Mcap().columns(data("mcap_samples") / name, wanted(("/test_topic", "int32_value")))

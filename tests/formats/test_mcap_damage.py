@@ -85,7 +85,7 @@ def test_an_unchunked_file_yields_every_complete_message_before_the_cut(by_hand)
 
 
 def test_no_flipped_byte_leads_to_a_wrong_value(written):
-    """Chunks carry a CRC: whatever byte is flipped, the values that come back are the true ones, or an error."""
+    """Chunks have a CRC: for any flipped byte, the values are correct, or there is an error."""
     path = written([STREAMS[3]], compression="none")
     whole = path.read_bytes()
     true = dict(zip(TIME.tolist(), JOINTS[:, 2].tolist(), strict=True))
@@ -121,7 +121,7 @@ def test_an_unknown_compression_is_not_treated_as_uncompressed(written):
 
 
 def test_a_record_that_declares_more_than_the_file_contains_is_refused_without_reading_it(tmp_path):
-    path = tmp_path / "lie.mcap"
+    path = tmp_path / "oversized.mcap"
     path.write_bytes(b"\x89MCAP0\r\n\x01" + struct.pack("<Q", 2**40) + b"abc")
     with pytest.raises(
         RecordingError, match="damaged at byte 8, before its first message: a record declares 1099511627776"

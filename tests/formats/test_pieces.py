@@ -1,4 +1,4 @@
-"""Files that are read piece by piece: the same numbers as at once, in the order of the times, in bounded memory."""
+"""Files that are read piece by piece have the same numbers as read at once, in time order and bounded memory."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def pieces_of(path: Path) -> list[Piece]:
 
 
 def same(one: Source, other: Source) -> bool:
-    """All that a source tells, the numbers to the bit."""
+    """Return whether two sources are equal, including the bits of their numbers."""
     columns = [(one.columns[name], other.columns[name]) for name in one.columns]
-    told = [
+    details = [
         [s.findings, dict(s.details), dict(s.topics), s.names, s.origin, s.first_row, list(s.columns)]
         for s in (one, other)
     ]
-    return told[0] == told[1] and all(
+    return details[0] == details[1] and all(
         a.values.tobytes() == b.values.tobytes()
         and (a.time is None) == (b.time is None)
         and (a.time is None or b.time is None or a.time.tobytes() == b.time.tobytes())
@@ -57,9 +57,9 @@ def test_a_container_read_in_many_pieces_has_the_same_columns(suffix, tmp_path, 
     monkeypatch.setattr(slices, "VALUES_PER_PIECE", 100)
     pieces = pieces_of(path)
     assert len(pieces) > 20
-    # Clocks that run side by side come side by side.
+    # Clocks that run in parallel are yielded in parallel.
     starts = np.array([float(piece.time[0]) for piece in pieces if piece.time is not None and piece.rows])
-    assert np.max(np.maximum.accumulate(starts) - starts) < 0.06  # the accelerometer ends that much before the drive
+    assert np.max(np.maximum.accumulate(starts) - starts) < 0.06  # the accelerometer ends 0.06 s before the drive
     assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
 
@@ -86,7 +86,7 @@ def test_midnight_between_two_blocks_is_detected(tmp_path, monkeypatch):
     path.write_text("clock,v\n" + "".join(f"{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d},1\n" for s in seconds))
     source = join_pieces(read_pieces(choose_format(path), path), sort=False)
     assert np.array_equal(source.columns["clock"].values, seconds)
-    assert any(isinstance(item.fact, WrittenTimes) and item.fact.wrapped == 3 for item in source.findings)
+    assert any(isinstance(finding.fact, WrittenTimes) and finding.fact.wrapped == 3 for finding in source.findings)
 
 
 @pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cell")])
@@ -121,7 +121,7 @@ def test_rows_are_in_the_order_of_their_times_however_late_the_file_stores_them(
     for name, shift in (("a", 0.5), ("b", 0.25)):
         found = np.concatenate([part[name].values[name] for part in ready if name in part])
         assert np.array_equal(found, late + shift)
-    # Both have the same times: they come together.
+    # Both clocks have the same times and are yielded together.
     assert all(set(part) == {"a", "b"} for part in ready)
     ends = [part["a"].time for part in ready]
     assert all(one[-1] < other[0] for one, other in pairwise(ends))

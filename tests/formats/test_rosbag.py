@@ -46,7 +46,7 @@ def messages(ros1: bool):
 
 @pytest.fixture(params=["bag", "db3"])
 def bag(request, tmp_path):
-    """A ROS 1 bag, or the folder of a ROS 2 bag."""
+    """Write a ROS 1 bag or a ROS 2 bag; return the file or the folder."""
     ros1 = request.param == "bag"
     path = tmp_path / ("log.bag" if ros1 else "log")
     with Writer1(path) if ros1 else Writer2(path, version=8) as writer:

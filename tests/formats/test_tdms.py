@@ -60,8 +60,8 @@ def test_texts_and_time_stamps_are_named_and_left_out(saved):
         saved([channel("m", "word", ["a", "b"]), channel("m", "when", stamps), channel("m", "v", np.ones(3))])
     )
     assert list(source.columns) == ["v"]
-    told = {finding.fact for finding in source.findings}
-    assert {ColumnLeftOut("word", "not numeric"), ColumnLeftOut("when", "of time stamps")} <= told
+    facts = {finding.fact for finding in source.findings}
+    assert {ColumnLeftOut("word", "not numeric"), ColumnLeftOut("when", "of time stamps")} <= facts
 
 
 def test_the_complete_part_of_a_cut_file_is_read_and_the_loss_is_reported(saved):
@@ -109,8 +109,8 @@ def test_waveforms_without_a_start_keep_their_offset_from_the_common_origin(save
     starts = {key: float(column.time[0]) for key, column in source.columns.items()}
     assert starts == {"i": 0.0, "F": 3600.25, "n": 0.5}
     assert source.origin == (START - np.datetime64(0, "us")) / np.timedelta64(1, "s")
-    (told,) = [finding for finding in source.findings if finding.severity == "warning"]
-    assert told.fact == NoStartTime(("n",))
+    (warning,) = [finding for finding in source.findings if finding.severity == "warning"]
+    assert warning.fact == NoStartTime(("n",))
 
 
 def test_a_start_in_1904_is_an_empty_stamp(saved):

@@ -1,4 +1,4 @@
-"""Sizes that lie and bombs: refused soon, in little memory."""
+"""False sizes and decompression bombs are refused quickly and with little memory."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ found = run(sys.argv[2])
 print(json.dumps([found, time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - base]))
 """
 
-# What a bomb may take [s]: held by benchmarks/time_bounds.py.
+# The time allowed for a bomb [s]; checked by benchmarks/time_bounds.py.
 SECONDS = 5.0
 
 
@@ -90,7 +90,7 @@ def test_a_chunk_with_a_false_size_is_lost_and_the_next_is_read(tmp_path, compre
 
 @functools.cache
 def zeros(compression):
-    """300 MiB of zeros in some kilobytes (zstd) or a megabyte (lz4)."""
+    """Return 300 MiB of zeros in some kilobytes (zstd) or a megabyte (lz4)."""
     if compression == "zstd":
         maker = zstandard.ZstdCompressor().compressobj()
         parts = [maker.compress(bytes(MEBIBYTE)) for _ in range(300)]
@@ -118,7 +118,7 @@ def test_a_bomb_is_refused_in_less_than_300_megabytes(tmp_path, compression, sta
 
 
 def test_many_small_chunks_with_high_ratios_are_a_bomb(tmp_path):
-    """Each is small enough, together they would be a hundred times the file and more."""
+    """Each chunk is small enough, but together they are more than a hundred times the file."""
     content = one_message() + record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"{}") * 400_000
     bomb = file_of(tmp_path / "bomb.mcap", *[chunk(packed("zstd", content), len(content), "zstd")] * 60)
     small = file_of(tmp_path / "small.mcap", chunk(packed("zstd", one_message()), len(one_message()), "zstd"))
@@ -159,7 +159,7 @@ def test_lz4_gives_the_same_result_in_pieces_of_any_size(monkeypatch, given, tak
 
 
 def camera_in_the_dark(path, compression):
-    """A cell at 100 Hz beside black images of 300 kB: together 200 MB of nearly nothing."""
+    """Write a load cell at 100 Hz and black images of 300 kB: 200 MB of almost only zeros."""
     image = b"\0\1\0\0" + bytes(300_000)
     with path.open("wb") as file:
         writer = Writer(file, compression=compression, chunk_size=1 << 20)
@@ -180,18 +180,18 @@ def test_the_findings_of_a_log_of_dark_images_state_how_to_read_it_completely(tm
         ChannelMap(TimeSource(), (ChannelSource("force", topic="/cell", field="data"),), ("a",), True),
     ):
         source = Mcap().columns(packed_log, wanted)
-        assert [found.kind for found in source.findings].count("chunks_refused") == 1
-        assert any(found.severity == "loss" for found in source.findings)
+        assert [finding.kind for finding in source.findings].count("chunks_refused") == 1
+        assert any(finding.severity == "loss" for finding in source.findings)
     plain = camera_in_the_dark(tmp_path / "plain.mcap", CompressionType.NONE)
     source = Mcap().columns(plain)
     assert source.columns["/cell data"].values.tolist() == list(range(700))
-    # The images are in an encoding that is not read; nothing else of the log is lost.
-    others = [found for found in source.findings if not isinstance(found.fact, UndecodableMessages)]
-    assert not [found for found in others if found.severity == "loss" or isinstance(found.fact, ChunksRefused)]
+    # The images have an unknown encoding; nothing else of the log is lost.
+    others = [finding for finding in source.findings if not isinstance(finding.fact, UndecodableMessages)]
+    assert not [finding for finding in others if finding.severity == "loss" or isinstance(finding.fact, ChunksRefused)]
 
 
 def test_numbers_that_never_change_are_read_in_logs_of_any_length(tmp_path, monkeypatch):
-    """A frozen joint shrinks to a tenth: its times do not."""
+    """The values of a stuck joint are compressed to a tenth, but its times are not."""
     monkeypatch.setattr(chunks, "_LONG", 1 << 20)
     monkeypatch.setattr(chunks, "LARGEST", 1 << 20)
     path = tmp_path / "frozen.mcap"
@@ -204,4 +204,4 @@ def test_numbers_that_never_change_are_read_in_logs_of_any_length(tmp_path, monk
         writer.finish()
     source = Mcap().columns(path)
     assert len(source.columns["/q position[:]"].values) == 60_000
-    assert not [found for found in source.findings if found.severity == "loss"]
+    assert not [finding for finding in source.findings if finding.severity == "loss"]

@@ -1,4 +1,4 @@
-"""The format's own conformance suite: every record with all its fields, and the messages read both ways."""
+"""The conformance suite of MCAP: every record with all its fields, and the messages by both readers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def as_json(value):
 
 
 def every_record(path):
-    """The file's records from the front, those of chunks in their place, without message indexes: the suite's order."""
+    """Yield the records in the suite's order: those of a chunk in its place, without message indexes."""
     content = memoryview(path.read_bytes())
     assert bytes(content[: len(MAGIC)]) == bytes(content[-len(MAGIC) :]) == MAGIC
     at = len(MAGIC)

@@ -1,4 +1,4 @@
-"""Cut and flipped files: true values or none, never a traceback, and every loss said."""
+"""Cut files and flipped bytes: only true values, never a traceback, and every loss is reported."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def test_a_file_cut_at_any_byte_yields_true_messages_and_reports_the_cut(tmp_pat
     before = 0
     for cut in range(len(whole)):
         path.write_bytes(whole[:cut])
-        found, findings = read_or_refused(path)
-        assert found == sent[: len(found)], cut
+        messages, findings = read_or_refused(path)
+        assert messages == sent[: len(messages)], cut
         assert any("damaged" in text for text in findings), cut
-        assert len(found) >= before, cut  # a longer piece never gives fewer messages
-        before = len(found)
+        assert len(messages) >= before, cut  # a longer part never has fewer messages
+        before = len(messages)
     assert before == len(sent)
 
 
@@ -47,9 +47,9 @@ def test_any_flipped_byte_yields_only_true_messages_and_missing_ones_are_reporte
     whole = path.read_bytes()
     for at in range(len(whole)):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ flip]) + whole[at + 1 :])
-        found, findings = read_or_refused(path)
-        assert set(found) <= set(sent), at
-        assert found == sent or findings, at
+        messages, findings = read_or_refused(path)
+        assert set(messages) <= set(sent), at
+        assert messages == sent or findings, at
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
@@ -61,14 +61,14 @@ def test_after_a_damaged_chunk_reading_continues_with_the_next(tmp_path, compres
     hit = chunks[2]
     whole[hit.chunk_start_offset + hit.chunk_length - 12] ^= 0x5A
     path.write_bytes(whole)
-    found, findings, log = read(path)
-    lost = len(sent) - len(found)
+    messages, findings, log = read(path)
+    lost = len(sent) - len(messages)
     assert 0 < lost < 12
-    assert set(found) < set(sent)
+    assert set(messages) < set(sent)
     assert [loss.chunks for loss in log.section.losses.places] == [1]
     span = tuple((stamp - 10**9) / 1e9 for stamp in (hit.message_start_time, hit.message_end_time))
     assert findings[0].fact.lost == LostBytes(hit.chunk_length, True, lost, span)
-    assert Finding(MessageCountDiffers(len(sent), len(found)), severity="loss") in findings
+    assert Finding(MessageCountDiffers(len(sent), len(messages)), severity="loss") in findings
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
@@ -77,12 +77,12 @@ def test_the_next_chunk_is_also_found_without_a_summary(tmp_path, compression):
     sent = small_file(path, compression)
     chunks = sorted(Log(path).summary.chunks)
     whole = bytearray(path.read_bytes()[:-60])
-    whole[chunks[1] + 5] ^= 0x10  # its length: now beyond the end of the file
+    whole[chunks[1] + 5] ^= 0x10  # its length, which is now beyond the end of the file
     path.write_bytes(whole)
-    found, _, log = read(path)
+    messages, _, log = read(path)
     assert log.summary.problem
-    assert set(found) < set(sent)
-    assert found[-1] == sent[-1]
+    assert set(messages) < set(sent)
+    assert messages[-1] == sent[-1]
 
 
 def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_path):
@@ -91,10 +91,10 @@ def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_pat
     last = max(Log(path).summary.chunks)
     whole = path.read_bytes()
     path.write_bytes(whole[: whole.index(sent[-1][2], last) + 3])
-    found, findings, log = read(path)
-    assert found == sent[:-1]
-    assert 0 < log.unverified < len(found)
-    assert findings[-1].fact == Unverified(log.unverified, len(found))
+    messages, findings, log = read(path)
+    assert messages == sent[:-1]
+    assert 0 < log.unverified < len(messages)
+    assert findings[-1].fact == Unverified(log.unverified, len(messages))
 
 
 def test_a_lost_definition_is_read_from_the_summary(tmp_path):
@@ -104,9 +104,9 @@ def test_a_lost_definition_is_read_from_the_summary(tmp_path):
     whole = bytearray(path.read_bytes())
     whole[min(Log(path).summary.chunks) + 70] ^= 0xFF
     path.write_bytes(whole)
-    found, _, log = read(path)
-    assert len(found) > len(sent) / 2
-    assert found == sent[-len(found) :]
+    messages, _, log = read(path)
+    assert len(messages) > len(sent) / 2
+    assert messages == sent[-len(messages) :]
     assert log.unverified == 0
 
 
@@ -125,8 +125,8 @@ def test_without_a_definition_messages_are_lost_and_counted(tmp_path):
 def test_messages_that_no_checksum_covers_are_counted(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path, enable_crcs=False)
-    found, findings, log = read(path)
-    assert found == sent
+    messages, findings, log = read(path)
+    assert messages == sent
     assert log.unverified == len(sent)
     assert findings == [Finding(Unverified(len(sent), len(sent)), severity="note")]
 
@@ -138,8 +138,8 @@ def test_nothing_is_read_after_a_message_shorter_than_its_header(tmp_path):
     record = struct.pack("<BQ", 5, 34)
     at = whole.index(record, whole.index(record) + 1)
     path.write_bytes(whole[: at + 1] + struct.pack("<Q", 3) + whole[at + 9 :])
-    found, findings = read_or_refused(path)
-    assert len(found) == 1
+    messages, findings = read_or_refused(path)
+    assert len(messages) == 1
     assert "a message shorter than its header" in findings[0]
 
 
@@ -156,7 +156,7 @@ def test_a_wrong_checksum_of_an_attachment_is_a_loss(tmp_path):
         writer.finish()
     assert not read(path)[1]
     path.write_bytes(path.read_bytes().replace(b"Monday", b"Friday"))
-    found, findings, _ = read(path)
-    assert len(found) == 1
+    messages, findings, _ = read(path)
+    assert len(messages) == 1
     assert findings[0].severity == "loss"
     assert findings[0].fact.reason == "the checksum of an attachment does not match"

@@ -1,4 +1,4 @@
-"""What the messages of a topic name the elements of their arrays."""
+"""The names of array elements in the messages of a topic."""
 
 from __future__ import annotations
 

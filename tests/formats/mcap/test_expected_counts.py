@@ -1,4 +1,4 @@
-"""What chunk indexes foretell is what the chunks hold."""
+"""The expected message counts from chunk indexes are those of the chunks."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ def test_expected_rows_are_numbered_per_channel_through_all_chunks(tmp_path, com
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression, messages=50, chunk_size=chunk_size)
     chunks = indexes(path)
-    foretold = expected_rows(chunks)
-    assert list(foretold) == [index.chunk_start_offset for index in chunks]
-    passed = Counter()
+    expected = expected_rows(chunks)
+    assert list(expected) == [index.chunk_start_offset for index in chunks]
+    counts = Counter()
     for index in chunks:
-        for channel, numbers in foretold[index.chunk_start_offset].items():
-            assert numbers.start == passed[channel]
-            passed[channel] = numbers.stop
+        for channel, numbers in expected[index.chunk_start_offset].items():
+            assert numbers.start == counts[channel]
+            counts[channel] = numbers.stop
     topics = {channel.id: channel.topic for channel in Log(path).summary.channels.values()}
-    assert {topics[channel]: count for channel, count in passed.items()} == Counter(topic for topic, _, _ in sent)
+    assert {topics[channel]: count for channel, count in counts.items()} == Counter(topic for topic, _, _ in sent)
 
 
 def test_expected_rows_end_at_message_indexes_of_impossible_length(tmp_path):

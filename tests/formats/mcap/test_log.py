@@ -1,4 +1,4 @@
-"""Reading in pieces: bounded memory, one piece ahead, many messages, files that vanish."""
+"""Reading in pieces: bounded memory, reading one piece ahead, many messages, files that shrink."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from cdtool.errors import RecordingError
-from cdtool.formats.mcap.container import chunks_ahead
+from cdtool.formats.mcap.container import chunk_read_ahead
 from cdtool.formats.mcap.container import messages as table
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.log import Log
@@ -22,7 +22,7 @@ def test_pieces_of_any_size_have_the_same_messages(tmp_path, monkeypatch, compre
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     monkeypatch.setattr(table, "MOST_MESSAGES", most)
-    monkeypatch.setattr(chunks_ahead, "JOINED", joined)
+    monkeypatch.setattr(chunk_read_ahead, "JOINED", joined)
     found, findings, _ = read(path)
     assert found == sent
     assert not findings

@@ -1,4 +1,4 @@
-"""The exit statuses of `cdtool recover`."""
+"""The exit statuses and messages of `cdtool recover`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Times that no clock shows: they spoil neither the others nor their order."""
+"""Invalid times change neither the other times nor their order."""
 
 from __future__ import annotations
 

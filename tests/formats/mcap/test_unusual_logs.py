@@ -1,4 +1,4 @@
-"""Logs that are whole and yet odd: clocks that run back, several writers of a topic, joined files, misfits."""
+"""Undamaged but unusual logs: backward clocks, several writers of a topic, appended files, wrong definitions."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def wanted(*fields, joints=("axis",), clock="log", named=True):
 
 
 def write(path, messages, schema=FORCE, encoding="cdr", channels=1):
-    """Messages (channel number, log time [ns], payload) of topic /a; `channels` write to it."""
+    """Write messages (channel number, log time [ns], payload) of topic /a with this number of `channels`."""
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=200)
         writer.start("ros2")
         number = writer.register_schema("a/msg/A", "ros2msg", schema.encode()) if encoding == "cdr" else 0
-        made = [writer.register_channel("/a", encoding, number, {"publisher": str(i)}) for i in range(channels)]
+        writers = [writer.register_channel("/a", encoding, number, {"publisher": str(i)}) for i in range(channels)]
         for channel, time, payload in messages:
-            writer.add_message(made[channel], time, payload, time)
+            writer.add_message(writers[channel], time, payload, time)
         writer.finish()
     return path
 
@@ -50,35 +50,35 @@ def json_state(names, position):
     return json.dumps({"name": names, "position": position}).encode()
 
 
-def told_of(source):
+def facts_above_notes(source):
     return [finding.fact for finding in source.findings if finding.severity != "note"]
 
 
-@pytest.mark.parametrize(("late", "told"), [(2, "note"), (300, "warning")])
+@pytest.mark.parametrize(("late", "severity"), [(2, "note"), (300, "warning")])
 @pytest.mark.parametrize("survey", [True, False])
-def test_backward_stamps_are_reported_with_the_message(tmp_path, late, told, survey):
+def test_backward_stamps_are_reported_with_the_message(tmp_path, late, severity, survey):
     times = [1000 + i for i in range(400)]
     times[350] -= late
     path = write(tmp_path / "log.mcap", [(0, time * MS, cdr(float(i), 0.0)) for i, time in enumerate(times)])
     source = Mcap().columns(path, None if survey else wanted(("/a", "force")))
-    (finding,) = [item for item in source.findings if isinstance(item.fact, OutOfOrder)]
-    assert finding.severity == told
+    (finding,) = [finding for finding in source.findings if isinstance(finding.fact, OutOfOrder)]
+    assert finding.severity == severity
     back = pytest.approx((late - 1) / 1e3)
-    assert finding.fact == OutOfOrder(1, 400, back, set_back=told == "warning", worst=350)
+    assert finding.fact == OutOfOrder(1, 400, back, set_back=severity == "warning", worst=350)
 
 
 def test_stamps_in_order_are_not_reported(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, (5 + i // 2) * MS, cdr(float(i), 0.0)) for i in range(50)])
-    assert not told_of(Mcap().columns(path))
+    assert not facts_above_notes(Mcap().columns(path))
 
 
 def test_two_channels_of_a_topic_are_reported(tmp_path):
     messages = [(i % 2, i * MS, cdr(float(i), 0.0)) for i in range(20)]
     path = write(tmp_path / "log.mcap", messages, channels=2)
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "force")))):
-        assert told_of(source) == [SeveralWriters(2)]
+        assert facts_above_notes(source) == [SeveralWriters(2)]
     path = write(tmp_path / "log.mcap", [(0, time, payload) for _, time, payload in messages], channels=2)
-    assert not told_of(Mcap().columns(path))
+    assert not facts_above_notes(Mcap().columns(path))
 
 
 @pytest.mark.parametrize("every", [1, 3])
@@ -91,7 +91,7 @@ def test_a_message_longer_than_its_definition_is_not_read(tmp_path, every):
         return
     source = Mcap().columns(path, wanted(("/a", "force")))
     assert source.columns["/a force"].values.tolist() == [float(i) for i in range(30) if i % every]
-    fact = told_of(source)[0]
+    fact = facts_above_notes(source)[0]
     assert isinstance(fact, UndecodableMessages) and (fact.count, fact.messages) == (10, 30)
 
 
@@ -114,20 +114,20 @@ def test_names_also_select_a_single_joint(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, each) for i, each in enumerate(payloads)], encoding="json")
     with pytest.raises(RecordingError, match="its messages name grip, not 'arm'"):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("arm",)))
-    found = Mcap().columns(path, wanted(("/a", "position[arm]"), joints=("arm",)))
-    assert found.columns["/a position[arm]"].values.tolist() == [0.0, 2.0, 4.0, 6.0, 8.0]
+    source = Mcap().columns(path, wanted(("/a", "position[arm]"), joints=("arm",)))
+    assert source.columns["/a position[arm]"].values.tolist() == [0.0, 2.0, 4.0, 6.0, 8.0]
 
 
 def test_a_joint_without_a_name_may_have_any_name_in_messages(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["motor"], [1.0])) for i in range(3)], encoding="json")
-    found = Mcap().columns(path, wanted(("/a", "position[:]"), named=False))
-    assert found.columns["/a position[:]"].values.tolist() == [[1.0]] * 3
+    source = Mcap().columns(path, wanted(("/a", "position[:]"), named=False))
+    assert source.columns["/a position[:]"].values.tolist() == [[1.0]] * 3
 
 
 def test_different_numbers_of_names_and_elements_are_refused(tmp_path):
     payload = json_state(["a", "b", "c"], [1.0, 2.0])
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i in range(3)], encoding="json")
-    with pytest.raises(RecordingError, match="3 names for 2 elements: which is whose cannot be told"):
+    with pytest.raises(RecordingError, match="3 names for 2 elements: which is whose cannot be severity"):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("b", "a")))
 
 
@@ -143,7 +143,7 @@ def test_a_file_appended_to_a_log_is_reported_and_not_as_a_false_summary(tmp_pat
     small_file(second, messages=30)
     size, behind = first.stat().st_size, second.stat().st_size
     first.write_bytes(first.read_bytes() + second.read_bytes())
-    (fact,) = told_of(Mcap().columns(first))
+    (fact,) = facts_above_notes(Mcap().columns(first))
     assert fact == DamagedAt(size, "the log ends here: was another file appended?", LostBytes(behind))
 
 

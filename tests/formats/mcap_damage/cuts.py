@@ -1,4 +1,4 @@
-"""Files that end too early: at every record's boundary, inside every kind of record, inside chunks at each place."""
+"""Files that are cut off: at boundaries of records, in all kinds of records, and anywhere in chunks."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from tests.formats.mcap_damage.truth import Case, Message, Truth, without
 
 
 def cut_at_a_boundary(rng: np.random.Generator) -> Case:
-    """Between two records of the top level."""
+    """Cut a file between two records of the top level."""
     log = write(rng, style(rng))
     return cut(log, log.spans[int(rng.integers(len(log.spans)))].start, "cut_at_a_boundary")
 
 
 def cut_in_a_record(rng: np.random.Generator) -> Case:
-    """Inside a record of a kind that is drawn, so that every kind is."""
+    """Cut a file in a record of a randomly chosen kind, so that all kinds occur."""
     log = write(rng, style(rng))
     kinds = sorted({span.opcode for span in log.spans})
     kind = kinds[int(rng.integers(len(kinds)))]
@@ -26,27 +26,27 @@ def cut_in_a_record(rng: np.random.Generator) -> Case:
 
 
 def cut_in_a_chunk(rng: np.random.Generator) -> Case:
-    """Inside a chunk's data, at each place alike."""
+    """Cut a file in a chunk's data, with equal probability for all bytes."""
     log = write(rng, _chunked(rng))
     span = log.chunks[int(rng.integers(len(log.chunks)))]
     return cut(log, int(rng.integers(span.data_at, span.end)), "cut_in_a_chunk")
 
 
 def cut_in_a_large_chunk(rng: np.random.Generator) -> Case:
-    """A chunk of many compressed blocks: those before the cut can be had."""
+    """Cut a file in a chunk of many compressed blocks: the blocks before the cut can be read."""
     log = write(rng, _chunked(rng), count=1200, chunk_size=1 << 20, filler=1500)
     span = log.chunks[0]
     return cut(log, int(rng.integers(span.data_at, span.end)), "cut_in_a_large_chunk")
 
 
 def cut_in_the_ending(rng: np.random.Generator) -> Case:
-    """Behind the last message: in the data end, summary, footer or the last magic bytes."""
+    """Cut a file after the last message: in the data end, summary, footer or the last magic bytes."""
     log = write(rng, style(rng))
     return cut(log, int(rng.integers(log.data_end, len(log.data))), "cut_in_the_ending")
 
 
 def cut(log: Log, at: int, kind: str) -> Case:
-    """The first `at` bytes. What lies whole before the cut must be given; of a cut chunk, what can be decompressed."""
+    """Return the first `at` bytes: complete messages before the cut must be read, and the readable part of a chunk."""
     must: list[Message] = []
     mostly: list[Message] = []
     for span in log.spans:
@@ -59,7 +59,7 @@ def cut(log: Log, at: int, kind: str) -> Case:
                 mostly += span.messages[:whole]
             else:
                 must += span.messages[:whole]
-    # A chunk that is cut off has lost its CRC's meaning; a file without CRCs has none, unless the data's own is there.
+    # The CRC of a cut chunk cannot be checked; a file without chunk CRCs is only covered by the CRC of the data.
     covered = log.style.crcs and log.style.chunked
     covered = covered or (log.style.data_crc and at >= log.data_end + 13)
     unverified = bool(without(must, () if not covered else [m for s in log.chunks if s.end <= at for m in s.messages]))
