@@ -134,9 +134,9 @@ def test_damaged_files_are_one_line(two_groups):
         with pytest.raises(RecordingError) as caught:
             Hdf5().columns(two_groups)
         assert "\n" not in str(caught.value)
-    for place in random.integers(8, len(data), 150).tolist():
+    for at in random.integers(8, len(data), 150).tolist():
         wrong = bytearray(data)
-        wrong[place] ^= 1 << int(random.integers(8))
+        wrong[at] ^= 1 << int(random.integers(8))
         two_groups.write_bytes(wrong)
         try:
             Hdf5().columns(two_groups)

@@ -64,10 +64,10 @@ def test_a_damaged_number_type_is_an_error_and_does_not_crash_the_process(saved)
 
 
 @pytest.mark.parametrize("compressed", [True, False])
-@pytest.mark.parametrize("kept", [60, 130, 200, 900, -1])
-def test_a_cut_file_is_one_clear_error(saved, kept, compressed):
+@pytest.mark.parametrize("size", [60, 130, 200, 900, -1])
+def test_a_cut_file_is_one_clear_error(saved, size, compressed):
     path = saved({"t": np.arange(500.0), "q": np.random.default_rng(0).random(500)}, do_compression=compressed)
-    path.write_bytes(path.read_bytes()[:kept])
+    path.write_bytes(path.read_bytes()[:size])
     with pytest.raises(RecordingError, match=r"log\.mat: (damaged at byte|is not a MATLAB file)"):
         Mat().columns(path)
 

@@ -38,8 +38,8 @@ def _put(file, name: str, value: object, options: dict) -> None:
         for key, part in value.items():
             _put(group, key, part, options)
     elif isinstance(value, list):
-        kept = file.require_group("#refs#").create_dataset(f"{name}_0", data=np.zeros((1, 3)))
-        cells = file.create_dataset(name, data=np.array([[kept.ref]], dtype=h5py.ref_dtype))
+        target = file.require_group("#refs#").create_dataset(f"{name}_0", data=np.zeros((1, 3)))
+        cells = file.create_dataset(name, data=np.array([[target.ref]], dtype=h5py.ref_dtype))
         cells.attrs["MATLAB_class"] = np.bytes_("cell")
     elif isinstance(value, str):
         codes = np.array([[ord(letter)] for letter in value], dtype=np.uint16)
@@ -185,10 +185,10 @@ def test_a_dataset_in_other_files_is_not_followed(tmp_path):
     assert [finding.fact.what for finding in source.findings] == ["an array stored in other files"] * 2
 
 
-@pytest.mark.parametrize("kept", [400, 520, 700, 1500, -1])
-def test_a_cut_file_is_one_clear_error(tmp_path, kept):
+@pytest.mark.parametrize("size", [400, 520, 700, 1500, -1])
+def test_a_cut_file_is_one_clear_error(tmp_path, size):
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(500.0), "q": np.arange(500.0)})
-    path.write_bytes(path.read_bytes()[:kept])
+    path.write_bytes(path.read_bytes()[:size])
     with pytest.raises(RecordingError, match=r"a\.mat: (damaged or not a MATLAB 7\.3 file|is not a )") as fault:
         survey(path)
     assert "\n" not in str(fault.value)

@@ -49,8 +49,10 @@ def test_the_same_streams_give_the_same_bytes(written, encoding):
 def test_a_field_is_a_number_an_element_an_array_or_a_joint(written, encoding):
     fields = ["position[1]", "position[:]", "position[shoulder_joint]", "position[elbow.joint]", "effort[0]"]
     path = written(encoding=encoding)
-    asked = wanted(*(("/joint_states", field) for field in fields), joints=("base", "shoulder_joint", "elbow.joint"))
-    columns = Mcap().columns(path, asked).columns
+    requested = wanted(
+        *(("/joint_states", field) for field in fields), joints=("base", "shoulder_joint", "elbow.joint")
+    )
+    columns = Mcap().columns(path, requested).columns
     found = [columns[f"/joint_states {field}"].values for field in fields]
     for values, expected in zip(found, [JOINTS[:, 1], JOINTS, JOINTS[:, 1], JOINTS[:, 2], JOINTS[:, 2]], strict=True):
         assert np.array_equal(values, expected)
@@ -68,9 +70,9 @@ def test_a_whole_array_is_ordered_by_the_machines_joints_with_the_messages_names
 
 
 def test_joint_names_missing_from_the_messages_are_an_error_and_never_a_silent_permutation(written):
-    asked = wanted(("/joint_states", "position[:]"), joints=("base", "shoulder", "elbow.joint"))
+    requested = wanted(("/joint_states", "position[:]"), joints=("base", "shoulder", "elbow.joint"))
     with pytest.raises(RecordingError, match=r"name base, shoulder_joint, elbow.joint, not 'shoulder'.*joint_map"):
-        Mcap().columns(written(), asked)
+        Mcap().columns(written(), requested)
 
 
 def test_a_name_array_whose_order_changes_between_messages_is_followed(by_hand):

@@ -57,8 +57,8 @@ def check(path, messages, times):
     assert set(survey.columns) == {f"{TOPIC} {name}" for name in expected}
     assert not [finding for finding in survey.findings if finding.severity == "loss"]
     sources = tuple(ChannelSource("speed", topic=TOPIC, field=name) for name in expected)
-    asked = Mcap().columns(path, ChannelMap(TimeSource(), sources, (), topics=True)) if expected else survey
-    for source in (survey, asked):
+    requested = Mcap().columns(path, ChannelMap(TimeSource(), sources, (), topics=True)) if expected else survey
+    for source in (survey, requested):
         for name, values in expected.items():
             column = source.columns[f"{TOPIC} {name}"]
             assert np.array_equal(bits(column.values), bits(values)), name

@@ -90,9 +90,9 @@ def test_flipped_bytes_are_one_line_or_a_table(saved):
     path = saved({"t": np.arange(500.0), "v": np.random.default_rng(1).normal(size=500)}, compression="zstd")
     data = bytearray(path.read_bytes())
     random = np.random.default_rng(5)
-    for place in random.integers(8, len(data), 150).tolist():
+    for at in random.integers(8, len(data), 150).tolist():
         wrong = bytearray(data)
-        wrong[place] ^= 1 << int(random.integers(8))
+        wrong[at] ^= 1 << int(random.integers(8))
         path.write_bytes(wrong)
         try:
             Parquet().columns(path)

@@ -172,9 +172,9 @@ def test_warnings_of_the_library_are_reported_and_not_printed(saved, capfd, capl
 def test_only_the_warnings_of_the_library_are_collected(caplog):
     ours, other = logging.getLogger("nptdms.reader"), logging.getLogger("another")
     with collect_warnings("nptdms") as lines:
-        ours.warning("odd %d", 3)
-        ours.debug("not worth a word")
+        ours.warning("number %d", 3)
+        ours.debug("not collected")
         other.warning("of another one")
     ours.warning("later")
-    assert lines == ["odd 3"]
+    assert lines == ["number 3"]
     assert [record.getMessage() for record in caplog.records] == ["of another one", "later"]

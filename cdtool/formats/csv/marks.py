@@ -113,8 +113,8 @@ def find_marks(
             "pin decimal and thousands in [csv] of the machine file",
         )
     if len(groups) > 1:
-        cells = " and ".join(str(cell) for cell in groups.values())
-        raise RecordingError(f"{path}: two thousands separators: {cells}", "pin thousands in [csv]")
+        shown = " and ".join(str(cell) for cell in groups.values())
+        raise RecordingError(f"{path}: two thousands separators: {shown}", "pin thousands in [csv]")
     group_mark = next(iter(groups), "")
     certain = bool(decimal or evidence.decimal or groups)
     is_ambiguous = separator != "," and mark == "." and not certain

@@ -79,7 +79,7 @@ def packed(compression, content):
 def test_a_chunk_with_a_false_size_is_lost_and_the_next_is_read(tmp_path, compression, stated):
     content = one_message()
     path = file_of(
-        tmp_path / "lie.mcap",
+        tmp_path / "false.mcap",
         chunk(packed(compression, content), stated, compression),
         chunk(packed(compression, content), len(content), compression, zlib.crc32(content)),
     )
@@ -136,23 +136,23 @@ def test_many_small_chunks_with_high_ratios_are_a_bomb(tmp_path):
 def test_a_record_that_declares_more_than_the_file_contains_is_not_read(tmp_path, opcode, length):
     content = one_message()
     good = chunk(content, len(content), "", zlib.crc32(content))
-    path = file_of(tmp_path / "lie.mcap", good, struct.pack("<BQ", opcode, length) + bytes(40), good)
+    path = file_of(tmp_path / "false.mcap", good, struct.pack("<BQ", opcode, length) + bytes(40), good)
     found, findings = read_or_refused(path)
     assert found == [("/a", 0, b"{}")] * 2
     assert f"declares {length} bytes" in findings[0]
 
 
 @pytest.mark.parametrize(
-    ("given", "taken"), [(1, 1), (7, 1 << 20), (1 << 10, 1 << 7), (1 << 16, 1 << 17), (1 << 18, 1)]
+    ("input_size", "output_size"), [(1, 1), (7, 1 << 20), (1 << 10, 1 << 7), (1 << 16, 1 << 17), (1 << 18, 1)]
 )
-def test_lz4_gives_the_same_result_in_pieces_of_any_size(monkeypatch, given, taken):
+def test_lz4_gives_the_same_result_in_pieces_of_any_size(monkeypatch, input_size, output_size):
     rng = np.random.default_rng(0)
-    content = np.frombuffer(bytes(9_000) + rng.bytes(3_000) + bytes(70_000 if taken > 1 else 9), np.uint8)
+    content = np.frombuffer(bytes(9_000) + rng.bytes(3_000) + bytes(70_000 if output_size > 1 else 9), np.uint8)
     frames = b"".join(lz4.frame.compress(part.tobytes()) for part in (content[:10_000], content[10_000:]))
     packed = np.frombuffer(frames, np.uint8).copy()
     room = np.empty(len(content), np.uint8)
-    monkeypatch.setattr(chunks, "_LZ4_IN", given)
-    monkeypatch.setattr(chunks, "_LZ4_OUT", taken)
+    monkeypatch.setattr(chunks, "_LZ4_IN", input_size)
+    monkeypatch.setattr(chunks, "_LZ4_OUT", output_size)
     header = chunks.ChunkHeader(0, 0, 0, 0, len(content), 0, "lz4", 0, len(packed))
     chunks.Decompressor().fill(header, packed, room)
     assert room.tobytes() == content.tobytes()

@@ -76,13 +76,13 @@ def as_json_of(value):
 
 
 @pytest.mark.parametrize("group", GROUPS)
-@pytest.mark.parametrize("way", ["from the front", "by the index"])
-def test_the_messages_of_every_file_are_those_of_its_json(group, way):
+@pytest.mark.parametrize("reader", ["from the start", "by the index"])
+def test_the_messages_of_every_file_are_those_of_its_json(group, reader):
     for path in files(group):
         records = stated(path)
         fields = [dict(record["fields"]) for record in records if record["type"] == "Message"]
         expected = [(int(item["log_time"]), bytes(map(int, item["data"]))) for item in fields]
-        if way == "from the front":
+        if reader == "from the start":
             found, findings, log = read(path, use_index=False)
         else:
             topics = {dict(item["fields"])["topic"] for item in records if item["type"] == "Channel"} or {"none"}
@@ -99,10 +99,10 @@ def test_the_records_of_a_summary_are_read():
     for path in (path for group in GROUPS for path in files(group)):
         records = stated(path)
         names = [record["type"] for record in records]
-        behind = names[names.index("DataEnd") + 1 : -1]
+        after_data_end = names[names.index("DataEnd") + 1 : -1]
         log = Log(path)
         assert not log.summary.problem, path.name
-        assert [type(record).__name__ for record in log.summary.records] == behind, path.name
+        assert [type(record).__name__ for record in log.summary.records] == after_data_end, path.name
 
 
 @needs_data("mcap_samples")

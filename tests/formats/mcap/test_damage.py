@@ -65,7 +65,7 @@ def test_after_a_damaged_chunk_reading_continues_with_the_next(tmp_path, compres
     lost = len(sent) - len(messages)
     assert 0 < lost < 12
     assert set(messages) < set(sent)
-    assert [loss.chunks for loss in log.section.losses.places] == [1]
+    assert [loss.chunks for loss in log.section.losses.entries] == [1]
     span = tuple((stamp - 10**9) / 1e9 for stamp in (hit.message_start_time, hit.message_end_time))
     assert findings[0].fact.lost == LostBytes(hit.chunk_length, True, lost, span)
     assert Finding(MessageCountDiffers(len(sent), len(messages)), severity="loss") in findings

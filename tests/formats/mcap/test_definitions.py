@@ -40,8 +40,8 @@ DEFINED = (schema(1, b"float64 data"), channel(1, b"/a"), channel(2, b"/b", 0))
 @pytest.mark.parametrize("apart", [False, True], ids=["in one chunk", "in two chunks"])
 def test_after_a_redefinition_messages_are_lost_and_counted_and_other_channels_are_read(tmp_path, change, apart):
     before = (*DEFINED, message(1, 1), message(2, 2), message(1, 3))
-    behind = (change, message(1, 4), message(2, 5), message(1, 6))
-    chunks = (verified(*before), verified(*behind)) if apart else (verified(*before, *behind),)
+    after = (change, message(1, 4), message(2, 5), message(1, 6))
+    chunks = (verified(*before), verified(*after)) if apart else (verified(*before, *after),)
     messages, findings = read_or_refused(file_of(tmp_path / "redefined.mcap", *chunks))
     assert [time for _, time, _ in messages] == [1, 2, 3, 5]
     assert [topic for topic, _, _ in messages] == ["/a", "/b", "/a", "/b"]

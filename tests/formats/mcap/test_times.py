@@ -26,10 +26,10 @@ def test_times_of_headers_may_be_before_1970(stamps):
     assert time.tolist() == sorted((stamp - stamps[0]) / 1e9 for stamp in stamps)
 
 
-@pytest.mark.parametrize("asked", [None, wanted(("/a", "v"))])
-def test_the_log_starts_with_its_first_message_with_a_valid_time(by_hand, asked):  # noqa: F811
+@pytest.mark.parametrize("channels", [None, wanted(("/a", "v"))])
+def test_the_log_starts_with_its_first_message_with_a_valid_time(by_hand, channels):  # noqa: F811
     path = by_hand([(at, at, {"v": float(i)}) for i, at in enumerate([_LATEST, 10**9 + 1, 10**9 + 3])])
-    source = Mcap().columns(path, asked)
+    source = Mcap().columns(path, channels)
     column = source.columns["/a v"]
     assert source.origin == 1.000000001
     assert column.time[:2].tolist() == [0.0, 2e-9]

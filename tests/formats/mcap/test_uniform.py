@@ -76,9 +76,9 @@ def same(path, fields, clock="log", joints=JOINTS):
         joints,
         topics=True,
     )
-    alone = read(path, wanted, cores=1)
-    assert read(path, wanted, cores=3) == alone
-    return alone
+    one_core = read(path, wanted, cores=1)
+    assert read(path, wanted, cores=3) == one_core
+    return one_core
 
 
 @st.composite
@@ -240,7 +240,7 @@ def test_a_redefined_channel_is_lost_on_the_fast_path_too(tmp_path, at, kind):
     force = TOPICS["/force"]
     other = replace(force, topic="/elsewhere") if kind == "another topic" else replace(force, encoding="json")
     parts = blocks()
-    parts[at] = replace(parts[at], behind=other.records)
+    parts[at] = replace(parts[at], after=other.records)
     _, _, findings = same(written(tmp_path / "log.mcap", parts), WANTED)
     assert any("defined twice" in finding for finding in findings)
 

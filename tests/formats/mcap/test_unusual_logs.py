@@ -141,10 +141,10 @@ def test_a_file_appended_to_a_log_is_reported_and_not_as_a_false_summary(tmp_pat
     first, second = tmp_path / "a.mcap", tmp_path / "b.mcap"
     small_file(first)
     small_file(second, messages=30)
-    size, behind = first.stat().st_size, second.stat().st_size
+    size, after = first.stat().st_size, second.stat().st_size
     first.write_bytes(first.read_bytes() + second.read_bytes())
     (fact,) = facts_above_notes(Mcap().columns(first))
-    assert fact == DamagedAt(size, "the log ends here: was another file appended?", LostBytes(behind))
+    assert fact == DamagedAt(size, "the log ends here: was another file appended?", LostBytes(after))
 
 
 def test_a_recovered_file_has_the_profile_of_its_source(tmp_path):

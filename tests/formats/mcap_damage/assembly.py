@@ -22,14 +22,14 @@ class Block:
 
     messages: tuple[Message, ...] = ()
     before: bytes = b""
-    behind: bytes = b""
+    after: bytes = b""
     compression: str = ""
     false_fields: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def content(self) -> bytes:
         """Return the uncompressed records."""
-        return self.before + b"".join(record_of(message) for message in self.messages) + self.behind
+        return self.before + b"".join(record_of(message) for message in self.messages) + self.after
 
     @property
     def times(self) -> tuple[int, int]:
@@ -91,18 +91,18 @@ def blocks_of(messages: Sequence[Message], size: int, compression: str, everywhe
 def assemble(parts: Sequence[Block | bytes], ending: Ending | None = None) -> bytes:
     """Return the file of these parts; single records are inserted unchanged, and the summary does not include them."""
     ending = ending or Ending()
-    made = bytearray(records.MAGIC + records.header())
+    data = bytearray(records.MAGIC + records.header())
     indexes: list[Index] = []
     counts: Counter[int] = Counter()
     for part in parts:
         if isinstance(part, bytes):
-            made += part
+            data += part
             continue
         counts.update({channel: len(entries) for channel, entries in part.entries().items()})
-        indexes.append(_add(made, part))
-    made += records.data_end(zlib.crc32(made) if ending.data_crc else 0)
+        indexes.append(_add(data, part))
+    data += records.data_end(zlib.crc32(data) if ending.data_crc else 0)
     if not ending.summary:
-        return bytes(made) + records.ending(b"", 0, ending.crc)
+        return bytes(data) + records.ending(b"", 0, ending.crc)
     times = [time for index in indexes for time in index.times]
     stated_counts = ending.counts(dict(counts))
     summary = ending.definitions
@@ -115,22 +115,22 @@ def assemble(parts: Sequence[Block | bytes], ending: Ending | None = None) -> by
         stated_counts,
     )
     summary += b"".join(index.record for index in ending.indexes(indexes))
-    return bytes(made) + records.ending(summary, len(made), ending.crc)
+    return bytes(data) + records.ending(summary, len(data), ending.crc)
 
 
-def _add(made: bytearray, block: Block) -> Index:
-    content, start = block.content, len(made)
+def _add(data: bytearray, block: Block) -> Index:
+    content, start = block.content, len(data)
     options = {"compression": block.compression, **block.false_fields}
     chunk = records.chunk(content, options.pop("times", block.times), **options)
-    made += chunk
+    data += chunk
     offsets = {}
-    chunk_end = len(made)
+    chunk_end = len(data)
     for number, entries in block.entries().items():
-        offsets[number] = len(made)
-        made += records.message_index(number, entries)
+        offsets[number] = len(data)
+        data += records.message_index(number, entries)
     size = len(records.packed(block.compression, content))
     return Index(
-        block.times, start, len(chunk), offsets, len(made) - chunk_end, block.compression, (size, len(content))
+        block.times, start, len(chunk), offsets, len(data) - chunk_end, block.compression, (size, len(content))
     )
 
 

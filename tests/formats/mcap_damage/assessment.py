@@ -65,7 +65,9 @@ def faults_in(truth: Truth, reading: Reading, key: Callable[[Message], Key]) -> 
         return
     left = _by_key(written + requested(truth.optional), key)
     # Times are exact to float64's resolution.
-    near = 1e-9 + 1e-15 * max((abs(seconds) for _, seconds in reading.given), default=0.0) + 1e-15 * abs(reading.origin)
+    near = (
+        1e-9 + 1e-15 * max((abs(seconds) for _, seconds in reading.messages), default=0.0) + 1e-15 * abs(reading.origin)
+    )
     wrong = [message for message in reading.messages if not _remove(left, *message, near)]
     if wrong and (truth.checked or not reading.mentions("unverified")):
         yield f"{len(wrong)} values that the file does not contain, the first {wrong[0]}"

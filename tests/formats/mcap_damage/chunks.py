@@ -158,9 +158,9 @@ def chunk_without_crc(rng: np.random.Generator) -> Case:
 def other_frames(rng: np.random.Generator) -> Case:
     """Compress chunks like other writers: several frames, with checksums, without sizes; chunks with more fields."""
     messages, blocks = draw_blocks(rng)
-    made = [_framed(block, rng) for block in blocks]
+    frames = [_framed(block, rng) for block in blocks]
     truth = Truth(tuple(messages), tuple(messages), loss=False)
-    return Case(f"other_frames {blocks[0].compression or 'none'}", assemble(made, draw_ending(rng)), truth)
+    return Case(f"other_frames {blocks[0].compression or 'none'}", assemble(frames, draw_ending(rng)), truth)
 
 
 def empty_chunk(rng: np.random.Generator) -> Case:
@@ -178,8 +178,8 @@ def nested_chunk(rng: np.random.Generator) -> Case:
     messages, blocks = draw_blocks(rng, everywhere=True)
     i, k = 3, 4
     inside = records.chunk(blocks[k].content, blocks[k].times, blocks[k].compression)
-    held, hidden = blocks[i], blocks[k].messages
-    blocks[i] = replace(held, behind=inside)
+    block, hidden = blocks[i], blocks[k].messages
+    blocks[i] = replace(block, after=inside)
     del blocks[k]
     truth = Truth(without(messages, hidden), without(messages, hidden), optional=hidden)
     return Case("nested_chunk", assemble(blocks, draw_ending(rng)), truth)
@@ -227,7 +227,7 @@ def false_record_in_chunk(rng: np.random.Generator) -> Case:
     }
     name = list(false_fields)[int(rng.integers(len(false_fields)))]
     rest = b"".join(record_of(message) for message in block.messages[kept + 1 :])
-    blocks[i] = replace(block, messages=block.messages[:kept], behind=false_fields[name] + rest)
+    blocks[i] = replace(block, messages=block.messages[:kept], after=false_fields[name] + rest)
     truth = Truth(tuple(messages), without(messages, block.messages[kept:]), loss=True, skippable=True)
     return Case(f"false_record_in_chunk {name}", assemble(blocks, draw_ending(rng)), truth)
 

@@ -47,37 +47,39 @@ def cut_in_the_ending(rng: np.random.Generator) -> Case:
 
 def cut(log: Log, at: int, kind: str) -> Case:
     """Return the first `at` bytes: complete messages before the cut must be read, and the readable part of a chunk."""
-    must: list[Message] = []
-    mostly: list[Message] = []
+    required: list[Message] = []
+    mostly_required: list[Message] = []
     for span in log.spans:
         if span.end <= at:
-            must += span.messages
+            required += span.messages
         elif span.opcode == records.CHUNK and span.data_at < at:
             content = unpacked(log.style.compression, log.data[span.data_at : at])
             whole = sum(opcode == records.MESSAGE for opcode, _, _ in inner(content))
             if log.style.compression:
-                mostly += span.messages[:whole]
+                mostly_required += span.messages[:whole]
             else:
-                must += span.messages[:whole]
+                required += span.messages[:whole]
     # The CRC of a cut chunk cannot be checked; a file without chunk CRCs is only covered by the CRC of the data.
     covered = log.style.crcs and log.style.chunked
     covered = covered or (log.style.data_crc and at >= log.data_end + 13)
-    unverified = bool(without(must, () if not covered else [m for s in log.chunks if s.end <= at for m in s.messages]))
+    unverified = bool(
+        without(required, () if not covered else [m for s in log.chunks if s.end <= at for m in s.messages])
+    )
     truth = Truth(
         log.messages,
-        tuple(must),
-        tuple(mostly),
+        tuple(required),
+        tuple(mostly_required),
         loss=True,
         unverified=unverified and not (log.style.data_crc and at >= log.data_end + 13),
-        refusable=not must,
+        refusable=not required,
     )
     return Case(f"{kind} at byte {at} of {len(log.data)} ({log.style})", log.data[:at], truth)
 
 
 def _chunked(rng: np.random.Generator) -> Style:
-    drawn = style(rng)
+    options = style(rng)
     compression = ("", "lz4", "zstd")[int(rng.integers(3))]
-    return Style(compression, True, drawn.crcs, drawn.data_crc, drawn.summary, drawn.indexed)
+    return Style(compression, True, options.crcs, options.data_crc, options.summary, options.indexed)
 
 
 KINDS = {

@@ -49,9 +49,9 @@ def _redefined(
     else:
         parts[i] = replace(blocks[i], before=other)
     # All messages of this channel may be refused; the messages of other channels must be read.
-    held = tuple(changed.get(id(message), message) for message in messages)
-    must = tuple(message for message in messages if message.topic != "/force")
-    return Case(f"{kind} in chunk {i}", assemble(parts, draw_ending(rng)), Truth(held, must, unverified=False))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    required = tuple(message for message in messages if message.topic != "/force")
+    return Case(f"{kind} in chunk {i}", assemble(parts, draw_ending(rng)), Truth(written, required, unverified=False))
 
 
 def _two_numbers(message: Message) -> Message:
@@ -77,9 +77,9 @@ def channel_without_its_schema(rng: np.random.Generator) -> Case:
     schema = records.schema(_FORCE.schema, _FORCE.schema_name, _FORCE.schema_encoding, _FORCE.schema_data)
     rest = ALL_DEFINITIONS.replace(schema, b"")
     blocks[0] = replace(blocks[0], before=rest)
-    must = tuple(message for message in messages if message.topic != "/force")
+    required = tuple(message for message in messages if message.topic != "/force")
     how = replace(draw_ending(rng), definitions=rest)
-    return Case("channel_without_its_schema", assemble(blocks, how), Truth(tuple(messages), must, loss=True))
+    return Case("channel_without_its_schema", assemble(blocks, how), Truth(tuple(messages), required, loss=True))
 
 
 def message_of_an_unknown_channel(rng: np.random.Generator) -> Case:
@@ -88,9 +88,9 @@ def message_of_an_unknown_channel(rng: np.random.Generator) -> Case:
     channel = records.channel(DEFINITIONS["/raw"].channel, DEFINITIONS["/raw"].schema, "/raw", "ros1")
     rest = ALL_DEFINITIONS.replace(channel, b"")
     blocks[0] = replace(blocks[0], before=rest)
-    must = tuple(message for message in messages if message.topic != "/raw")
+    required = tuple(message for message in messages if message.topic != "/raw")
     how = replace(draw_ending(rng), definitions=rest)
-    truth = Truth(tuple(messages), must, loss=True, skippable=True)
+    truth = Truth(tuple(messages), required, loss=True, skippable=True)
     return Case("message_of_an_unknown_channel", assemble(blocks, how), truth)
 
 
@@ -98,11 +98,11 @@ def definitions_in_the_last_chunk(rng: np.random.Generator) -> Case:
     """Write the definitions after the messages: only a summary has them before."""
     messages, blocks = draw_blocks(rng, everywhere=False)
     blocks[0] = replace(blocks[0], before=b"")
-    blocks[-1] = replace(blocks[-1], behind=ALL_DEFINITIONS)
+    blocks[-1] = replace(blocks[-1], after=ALL_DEFINITIONS)
     how = draw_ending(rng)
-    must = tuple(messages) if how.summary and how.crc else ()
+    required = tuple(messages) if how.summary and how.crc else ()
     return Case(
-        "definitions_in_the_last_chunk", assemble(blocks, how), Truth(tuple(messages), must, refusable=not must)
+        "definitions_in_the_last_chunk", assemble(blocks, how), Truth(tuple(messages), required, refusable=not required)
     )
 
 
@@ -128,9 +128,9 @@ def two_channels_of_a_topic(rng: np.random.Generator) -> Case:
         own.append(message)
         records_of_own += records.message(9, message.time, message.payload)
     blocks.append(Block((), extra, records_of_own, blocks[0].compression))
-    held = (*messages, *own)
+    written = (*messages, *own)
     how = replace(draw_ending(rng), summary=False)
-    return Case("two_channels_of_a_topic", assemble(blocks, how), Truth(held, held, loss=False))
+    return Case("two_channels_of_a_topic", assemble(blocks, how), Truth(written, written, loss=False))
 
 
 def many_schemas(rng: np.random.Generator) -> Case:
@@ -145,7 +145,7 @@ def many_channels(rng: np.random.Generator) -> Case:
     """Define twenty thousand channels without a message."""
     messages, blocks = draw_blocks(rng, "lz4", everywhere=False)
     extra = b"".join(records.channel(i, 0, f"/t{i}", "json") for i in range(10, 20_000))
-    blocks[0] = replace(blocks[0], behind=extra)
+    blocks[0] = replace(blocks[0], after=extra)
     return Case(
         "many_channels", assemble(blocks, draw_ending(rng)), Truth(tuple(messages), tuple(messages), loss=False)
     )
@@ -157,10 +157,10 @@ def unusual_topic(rng: np.random.Generator) -> Case:
     messages, blocks = draw_blocks(rng)
     topic = topics[int(rng.integers(len(topics)))]
     extra = records.channel(9, 0, topic, "json") + records.message(9, START, b'{"x": 1}')
-    blocks[2] = replace(blocks[2], behind=extra)
+    blocks[2] = replace(blocks[2], after=extra)
     how = replace(draw_ending(rng), summary=False)
-    also = Message(topic.decode("utf-8", "replace"), START, b'{"x": 1}', 1.0)
-    truth = Truth(tuple(messages), tuple(messages), optional=(also,))
+    optional = Message(topic.decode("utf-8", "replace"), START, b'{"x": 1}', 1.0)
+    truth = Truth(tuple(messages), tuple(messages), optional=(optional,))
     return Case(f"unusual_topic {topic[:12]!r}", assemble(blocks, how), truth)
 
 
@@ -205,8 +205,8 @@ def different_definition_in_the_summary(rng: np.random.Generator) -> Case:
     messages, blocks = draw_blocks(rng, everywhere=bool(rng.integers(2)))
     swapped = ALL_DEFINITIONS.replace(b"float64 data", b"float32 data", 1)
     how = Ending(definitions=swapped, crc=bool(rng.random() < 0.7))
-    must = tuple(message for message in messages if message.topic != "/force")
-    return Case("different_definition_in_the_summary", assemble(blocks, how), Truth(tuple(messages), must))
+    required = tuple(message for message in messages if message.topic != "/force")
+    return Case("different_definition_in_the_summary", assemble(blocks, how), Truth(tuple(messages), required))
 
 
 KINDS = {

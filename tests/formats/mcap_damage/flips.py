@@ -85,39 +85,39 @@ def _truth(log: Log, data: bytes, hit: list[int]) -> Truth:
     begins = any(at < len(records.MAGIC) for at in hit)
     in_data_end = any(log.data_end <= at < log.data_end + 13 for at in hit)
     whole = [span for span in log.spans if span.messages and span not in spans]
-    must = [message for span in whole for message in span.messages]
+    required = [message for span in whole for message in span.messages]
     if not style.chunked:
-        must = _unchunked_must(log, hit)
+        required = _required_without_chunks(log, hit)
     covered = style.chunked and style.crcs
     checked = covered and not any(log.opens(at) and data[at] in _READ_BARE for at in hit)
     if not checked and style.data_crc and any(at < log.data_end + 13 for at in hit):
         # The CRC of the data does not match, so that all values are doubtful, or the CRC itself is damaged.
         return Truth(log.messages, loss=None, refusable=True, checked=not any(_hides_crc(log, at) for at in hit))
     if not _definitions_known(log, hit):
-        must = []
+        required = []
     return Truth(
         log.messages,
-        tuple(must),
+        tuple(required),
         checked=checked or not in_data,
         undetectable=_silent(log, spans, hit),
         # Bytes without a checksum may form a message without the requested field, which is an error.
         # A damaged data end may contain a CRC although the file has none.
-        refusable=begins or not must or not (checked or not (in_data or in_data_end)),
+        refusable=begins or not required or not (checked or not (in_data or in_data_end)),
         loss=None if in_data or in_summary else False,
         unverified=not covered and not style.data_crc,
     )
 
 
-def _unchunked_must(log: Log, hit: list[int]) -> list[Message]:
+def _required_without_chunks(log: Log, hit: list[int]) -> list[Message]:
     """Return the messages before the first wrong length: without chunks, the start of the next record is unknown."""
-    must: list[Message] = []
+    required: list[Message] = []
     for span in log.spans:
         frame = range(span.start, span.start + 9)
         if any(at in frame for at in hit if at < log.data_end):
             break
         if span.messages and not any(at in span for at in hit):
-            must += span.messages
-    return must
+            required += span.messages
+    return required
 
 
 def _hides_crc(log: Log, at: int) -> bool:

@@ -48,8 +48,8 @@ def unknown_records(rng: np.random.Generator) -> Case:
     for block in blocks:
         if rng.random() < 0.5:
             parts.append(unknown() + (unknown() if rng.random() < 0.3 else b""))
-        behind = unknown() if rng.random() < 0.5 else b""
-        parts.append(Block(block.messages, block.before, behind, block.compression))
+        after = unknown() if rng.random() < 0.5 else b""
+        parts.append(Block(block.messages, block.before, after, block.compression))
     truth = Truth(tuple(messages), tuple(messages), loss=False)
     return Case("unknown_records", assemble(parts, draw_ending(rng)), truth)
 

@@ -89,8 +89,8 @@ def big_endian_cdr(rng: np.random.Generator) -> Case:
         if m.topic in ("/force", "/axis") and rng.random() < share
     }
     blocks = _with(blocks, changed)
-    held = tuple(changed.get(id(message), message) for message in messages)
-    return Case("big_endian_cdr", assemble(blocks, draw_ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    return Case("big_endian_cdr", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
 def long_payload(rng: np.random.Generator) -> Case:
@@ -103,8 +103,8 @@ def long_payload(rng: np.random.Generator) -> Case:
         elif message.topic != "/raw":
             changed[id(message)] = replace(message, payload=message.payload + bytes(int(rng.integers(0, 4))))
     blocks = _with(blocks, changed)
-    held = tuple(changed.get(id(message), message) for message in messages)
-    return Case("long_payload", assemble(blocks, draw_ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    return Case("long_payload", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
 def unknown_encoding(rng: np.random.Generator) -> Case:
@@ -141,19 +141,19 @@ def cut_protobuf(rng: np.random.Generator) -> Case:
     messages, blocks = draw_blocks(rng, everywhere=False)
     schema = records.schema(9, "m.Number", "protobuf", PROTOBUF_SCHEMA)
     definition = schema + records.channel(9, 9, "/count", "protobuf")
-    own, behind = [], b""
+    own, after = [], b""
     for k, value in enumerate(rng.integers(1, 2**40, 8).tolist()):
         whole = b"\x09" + struct.pack("<d", 0.5) + b"\x10" + _varint(value)
         cut = k % 3 == 1
         # Cut in the number or in the double: a cut between two fields cannot be detected.
         body = whole[: int(rng.choice([*range(1, 9), *range(10, len(whole))]))] if cut else whole
-        behind += records.message(9, START + k, body)
+        after += records.message(9, START + k, body)
         own.append(Message("/count", START + k, body, math.nan if cut else float(value)))
-    blocks.append(Block((), definition, behind, blocks[0].compression))
+    blocks.append(Block((), definition, after, blocks[0].compression))
     how = replace(draw_ending(rng), summary=False)
-    held = (*messages, *own)
-    must = tuple(message for message in held if not math.isnan(message.value))
-    return Case("cut_protobuf", assemble(blocks, how), Truth(held, must))
+    written = (*messages, *own)
+    required = tuple(message for message in written if not math.isnan(message.value))
+    return Case("cut_protobuf", assemble(blocks, how), Truth(written, required))
 
 
 def special_numbers(rng: np.random.Generator) -> Case:
@@ -176,8 +176,8 @@ def special_numbers(rng: np.random.Generator) -> Case:
             value = variants[int(rng.integers(len(variants)))]
             changed[id(message)] = replace(message, value=value, payload=payload(message.topic, message.time, value))
     blocks = _with(blocks, changed)
-    held = tuple(changed.get(id(message), message) for message in messages)
-    return Case("special_numbers", assemble(blocks, draw_ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    return Case("special_numbers", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
 def unusual_times(rng: np.random.Generator) -> Case:
@@ -195,8 +195,8 @@ def unusual_times(rng: np.random.Generator) -> Case:
     which = int(rng.integers(len(choices)))
     changed = {id(m): replace(m, time=choices[which](i)) for i, m in enumerate(messages)}
     blocks = _with(blocks, changed)
-    held = tuple(changed[id(message)] for message in messages)
-    return Case(f"unusual_times {which}", assemble(blocks, draw_ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed[id(message)] for message in messages)
+    return Case(f"unusual_times {which}", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
 def _changed(
@@ -204,9 +204,9 @@ def _changed(
 ) -> Case:
     """Return a case with payloads that cannot be decoded: they have no value, and are reported with their topic."""
     changed = {key: replace(message, value=math.nan) for key, message in changed.items()}
-    held = tuple(changed.get(id(message), message) for message in messages)
-    must = without(held, changed.values())
-    return Case(name, assemble(_with(blocks, changed), draw_ending(rng)), Truth(held, must))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    required = without(written, changed.values())
+    return Case(name, assemble(_with(blocks, changed), draw_ending(rng)), Truth(written, required))
 
 
 def _with(blocks: list[Block], changed: dict[int, Message]) -> list[Block]:
@@ -221,11 +221,11 @@ def _cut(message: Message, rng: np.random.Generator) -> bytes:
 
 
 def _varint(value: int) -> bytes:
-    made = b""
+    encoded = b""
     while value > 127:
-        made += bytes([value & 127 | 128])
+        encoded += bytes([value & 127 | 128])
         value >>= 7
-    return made + bytes([value])
+    return encoded + bytes([value])
 
 
 KINDS = {

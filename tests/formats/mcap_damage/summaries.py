@@ -96,9 +96,9 @@ def exchanged_topics_in_the_summary(rng: np.random.Generator) -> Case:
         replace(known, topic=two.topic if known is one else one.topic if known is two else known.topic).records
         for known in DEFINITIONS.values()
     )
-    must = tuple(message for message in messages if message.topic not in (one.topic, two.topic))
+    required = tuple(message for message in messages if message.topic not in (one.topic, two.topic))
     data = assemble(blocks, Ending(crc=bool(rng.random() < 0.7), definitions=definitions))
-    return Case(f"exchanged_topics_in_the_summary {one.topic} {two.topic}", data, Truth(tuple(messages), must))
+    return Case(f"exchanged_topics_in_the_summary {one.topic} {two.topic}", data, Truth(tuple(messages), required))
 
 
 def summary_of_another_file(rng: np.random.Generator) -> Case:
@@ -118,8 +118,8 @@ def false_footer(rng: np.random.Generator) -> Case:
     position = positions[int(rng.integers(len(positions)))]
     crc = int(rng.integers(2))
     footer = records.record(records.FOOTER, struct.pack("<QQI", position, position, crc))
-    made = data[: -len(records.MAGIC) - 29] + footer + records.MAGIC
-    return Case(f"false_footer {position} {crc}", made, Truth(tuple(messages), tuple(messages)))
+    content = data[: -len(records.MAGIC) - 29] + footer + records.MAGIC
+    return Case(f"false_footer {position} {crc}", content, Truth(tuple(messages), tuple(messages)))
 
 
 def _over_the_next(indexes: list[Index]) -> list[Index]:

@@ -109,7 +109,7 @@ class Arena:
         data = self._data.data
         for opcode, start, size in definitions:
             body = data[start : start + size]
-            if self._definitions.knows(opcode, bytes(body), self._covered):
+            if self._definitions.is_known(opcode, bytes(body), self._covered):
                 continue
             before = set(self._definitions.ambiguous)
             try:

@@ -221,7 +221,7 @@ class ChunkReadAhead:
             self._readers.put(reader)
 
     def _is_known(self, opcode: int, body: bytes) -> bool:
-        return self._definitions.knows(opcode, body, covered=True)
+        return self._definitions.is_known(opcode, body, covered=True)
 
     def _reader(self) -> _Reader:
         try:

@@ -196,7 +196,7 @@ class Log:
 
     def _raise_nothing_left(self) -> None:
         losses = self.section.losses
-        first = losses.places[0] if losses.places else Loss(8, 0, next(iter(losses.messages)))
+        first = losses.entries[0] if losses.entries else Loss(8, 0, next(iter(losses.messages)))
         reason = " ".join(first.reason.split())[:200]
         raise RecordingError(
             f"{self.path}: damaged at byte {first.at}, before its first message: {reason}",

@@ -48,23 +48,23 @@ class Loss:
 class Losses:
     """All losses of a file; `stopped`: nothing after the last one could be read."""
 
-    places: list[Loss] = field(default_factory=list)
+    entries: list[Loss] = field(default_factory=list)
     messages: Counter[str] = field(default_factory=Counter)
     stopped: bool = False
 
     def __bool__(self) -> bool:
-        return bool(self.places or self.messages)
+        return bool(self.entries or self.messages)
 
     def add(self, loss: Loss) -> Loss:
         """Add a loss and return it."""
-        self.places.append(loss)
+        self.entries.append(loss)
         return loss
 
     def findings(self, count: int, origin: int) -> list[Finding]:
         """Return one finding per loss (the first ones, then the number of others), and one per reason for messages."""
-        last = self.places[-1] if self.stopped and self.places else None
-        findings = [self._finding(loss, loss is last, count, origin) for loss in self.places[:_LISTED]]
-        rest = self.places[_LISTED:]
+        last = self.entries[-1] if self.stopped and self.entries else None
+        findings = [self._finding(loss, loss is last, count, origin) for loss in self.entries[:_LISTED]]
+        rest = self.entries[_LISTED:]
         if rest:
             more = MoreDamage(
                 len(rest),
@@ -81,7 +81,7 @@ class Losses:
 
     def _refused(self) -> list[Finding]:
         """Return the advice on refused chunks: images of a dark camera have higher ratios than any sensor data."""
-        count = sum(loss.refused for loss in self.places)
+        count = sum(loss.refused for loss in self.entries)
         return [Finding(ChunksRefused(count))] if count else []
 
     def _finding(self, loss: Loss, final: bool, count: int, origin: int) -> Finding:
