@@ -44,7 +44,7 @@ def pinned(text: str) -> str:
         ("header = false\nunits = 2", "csv.units: is 2, but header is false"),
         ("skip_lines = -1", "csv.skip_lines: is -1"),
         ('missing = "ok"\ncomment = 3', "csv.comment: is 3"),
-        ('time_format = "%Q"', "csv.time_format: is '%Q'.*not known"),
+        ('time_format = "%Q"', "csv.time_format: is '%Q'.*not supported"),
         ('time_format = "%Y-%m"', "csv.time_format: .*%d is missing"),
         ('time_format = "days"', "csv.time_format: is 'days'"),
     ],

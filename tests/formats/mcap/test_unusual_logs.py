@@ -127,7 +127,7 @@ def test_a_joint_without_a_name_may_have_any_name_in_messages(tmp_path):
 def test_different_numbers_of_names_and_elements_are_refused(tmp_path):
     payload = json_state(["a", "b", "c"], [1.0, 2.0])
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i in range(3)], encoding="json")
-    with pytest.raises(RecordingError, match="3 names for 2 elements: which is whose cannot be severity"):
+    with pytest.raises(RecordingError, match="3 names for 2 elements: which is whose cannot be told"):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("b", "a")))
 
 
