@@ -1,19 +1,19 @@
 """Formats of recordings, by name; `cdtool/ingest/reading.py` chooses one by suffix and content.
 
-A format is a class that follows `source.Format`: `name`, `suffixes`, `sniff(path)` and `columns(path, wanted)`. It may
-also have
+A format is a class that implements `source.Format`: `name`, `suffixes`, `sniff(path)` and `columns(path, wanted)`.
+Optional attributes:
 
-* `topics`: True where it holds messages of topics, which [channels.mcap] maps;
-* `pieces`: the columns of a file that need not fit into memory (`pieces.py`), `exact_pieces`: the same with the times
-  that cdtool convert wrote, `mapped`: those of a map (`pieces.mapped_log`);
-* `element_names`: how the messages of a topic name the elements of their arrays, as a JointState names its joints;
-* `sniffs_any_text`: True where almost any text passes for a file of it.
+* `topics`: True if the file contains messages of topics, which [channels.mcap] maps;
+* `pieces`: yields the columns of a file that need not fit into memory (`pieces.py`); `exact_pieces`: the same with the
+  times that `cdtool convert` wrote; `mapped`: the columns of a channel map (`pieces.open_mapped_log`);
+* `element_names`: returns the names of the elements of a topic's arrays, such as the joints of a JointState;
+* `sniffs_any_text`: True if `sniff` accepts almost any text file.
 
-What the user should know about a file goes into `Source.findings`: `Finding(Remark("..."), column, severity)`, or with
-a kind and numbers of its own, a frozen dataclass derived from `cdtool.findings.Fact` with its `sentence`.
+Anything that the user should know about a file is added to `Source.findings`, as `Finding(Remark("..."), column,
+severity)` or as a fact with its own numbers: a frozen dataclass derived from `cdtool.findings.Fact` with a `sentence`.
 
-What a column means (channel, unit, scale) is the same for all of them: see `cdtool/ingest/channel_assembly.py`. Writers
-are functions that follow `groups.Writer`.
+The meaning of a column (channel, unit, scale) is assigned in `cdtool/ingest/channel_assembly.py`, in the same way for
+all formats. Writers are functions that implement `groups.Writer`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which columns of a file the machine file names: by name, by name without its unit, or by number."""
+"""Find the columns that the machine file requests: by name, by name without its unit, or by number."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from cdtool.findings.channels import AbsentTruth
 from cdtool.formats.source import Source
 from cdtool.recording import GROUND_TRUTH
 
-# What [channels] calls the clock that a container itself knows: `time = { column = "time", unit = "s" }`.
+# In [channels], the name of the clock that the container itself provides: `time = { column = "time", unit = "s" }`.
 OWN_CLOCK = "time"
-# `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in the bracket is an index, not a unit.
+# `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in brackets is an index, not a unit.
 _BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """`torque [Nm]` -> ("torque", "Nm"); a name without a unit comes back whole, with None."""
+    """Return name and unit: `torque [Nm]` -> ("torque", "Nm"); the unit is None if the name has no unit."""
     match = _BRACKET.match(name)
     if match is None:
         return name, None
@@ -34,7 +34,10 @@ def split_unit(name: str) -> tuple[str, str | None]:
 
 
 def column_key(column: str | int, names: Sequence[str]) -> str | None:
-    """The name of a column given by number (from 0), by name, or by its name without the unit if that is unique."""
+    """Return the full name of a column given by number (from 0), name, or name without its unit if that is unique.
+
+    The result is None if there is no such column.
+    """
     if isinstance(column, int):
         return names[column] if column < len(names) else None
     if column in names:
@@ -44,17 +47,18 @@ def column_key(column: str | int, names: Sequence[str]) -> str | None:
 
 
 def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[str]:
-    """The names of the columns that a channel map asks for, each once, in the file's order; raises RecordingError.
+    """Return the names of the columns that a channel map requests, without repetition and in the file's order.
 
-    Ground truth may be absent: the load cell is fitted for impact tests only.
+    Ground truth may be absent, because the load cell is fitted for impact tests only. Raises RecordingError if any
+    other column is missing.
     """
     resolved, _ = _resolved(path, wanted, names)
-    keys = {resolved.time.key, *(key for item in resolved.sources for key in item.keys)} - {""}
+    keys = {resolved.time.key, *(key for source in resolved.sources for key in source.keys)} - {""}
     return [name for name in names if name in keys]
 
 
-def asked_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
-    """The columns that a map asks for (all without one); the container's own clock is none of them."""
+def requested_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
+    """Return the columns that a map requests (all if there is no map), except the container's own clock."""
     if wanted is None:
         return list(names)
     if wanted.time.column == OWN_CLOCK and OWN_CLOCK not in names:
@@ -63,7 +67,7 @@ def asked_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> l
 
 
 def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) -> str:
-    """The name of one column; raises RecordingError naming file, channel, column and the nearest known ones."""
+    """Return the name of one column; raises RecordingError naming file, channel, column and the nearest known names."""
     key = column_key(column, names)
     if key is not None:
         return key
@@ -73,26 +77,26 @@ def find_key(path: Path, channel: str, column: str | int, names: Sequence[str]) 
             f"the file has {len(names)} columns, numbered from 0 to {len(names) - 1}",
             channel=channel,
         )
-    same = _alike(column, names)
-    if len(same) > 1:
+    numbers = _numbers_of(column, names)
+    if len(numbers) > 1:
         raise RecordingError(
-            f"{path}: column '{column}' (channel '{channel}') is there {len(same)} times",
-            f"give its number instead: {' or '.join(same)}",
+            f"{path}: {len(numbers)} columns have the name '{column}' (channel '{channel}')",
+            f"give the column's number instead: {' or '.join(numbers)}",
             channel=channel,
         )
     raise RecordingError(f"{path}: no column '{column}' (channel '{channel}')", nearest(column, names), channel=channel)
 
 
 def is_absent(column: str | int, names: Sequence[str]) -> bool:
-    """True where no column has that name or number; one that is there several times is not absent."""
-    return column_key(column, names) is None and (isinstance(column, int) or not _alike(column, names))
+    """Return whether no column has that name or number; a name of several columns is not absent."""
+    return column_key(column, names) is None and (isinstance(column, int) or not _numbers_of(column, names))
 
 
 def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, ChannelMap]:
-    """Return the map with the file's own names of its columns (`keys`), without the ground truth that it does not hold.
+    """Return the source and the map with the file's own column names (`keys`), without ground truth that is missing.
 
-    Absent ground truth is noted in the source. The clock that a container itself knows is no column. Raises
-    RecordingError where a column is missing, or is there several times.
+    Each missing ground truth is a note in the source's findings. The clock that the container itself provides is not a
+    column. Raises RecordingError if any other column is missing, or if several columns have the same name.
     """
     names = tuple(source.columns) if channels.topics else source.names or tuple(source.columns)
     own = channels.time.column == OWN_CLOCK and any(column.time is not None for column in source.columns.values())
@@ -100,37 +104,40 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     resolved, absent = _resolved(source.path, plain, names)
     resolved = replace(resolved, time=channels.time) if own else resolved
     what: Literal["column", "topic"] = "topic" if channels.topics else "column"
-    notes = [Finding(AbsentTruth(what, item.described, _similar(item, names)), item.channel, "note") for item in absent]
+    notes = [Finding(AbsentTruth(what, cell.described, _similar(cell, names)), cell.channel, "note") for cell in absent]
     return replace(source, findings=(*source.findings, *notes)), resolved
 
 
 def _resolved(path: Path, channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
-    """Return the map with the names that its columns have here, and the ground truth that is left out of it."""
+    """Return the map with the file's own column names, and the ground truth that is missing from the file."""
     absent = [
-        item
-        for item in channels.sources
-        if item.channel in GROUND_TRUTH and any(is_absent(column, names) for column in _asked(item, channels))
+        source
+        for source in channels.sources
+        if source.channel in GROUND_TRUTH and any(is_absent(column, names) for column in _requested(source, channels))
     ]
     time = channels.time
     if time.column is not None:
         time = replace(time, key=find_key(path, "time", time.column, names))
     sources = tuple(
-        replace(item, keys=tuple(find_key(path, item.channel, column, names) for column in _asked(item, channels)))
-        for item in channels.sources
-        if item not in absent
+        replace(
+            source,
+            keys=tuple(find_key(path, source.channel, column, names) for column in _requested(source, channels)),
+        )
+        for source in channels.sources
+        if source not in absent
     )
     return replace(channels, time=time, sources=sources), absent
 
 
-def _asked(item: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
-    """What the machine file calls the columns of a channel."""
-    return (item.described,) if channels.topics else item.columns
+def _requested(source: ChannelSource, channels: ChannelMap) -> tuple[str | int, ...]:
+    """Return the columns of a channel by their names in the machine file."""
+    return (source.described,) if channels.topics else source.columns
 
 
-def _similar(item: ChannelSource, names: Sequence[str]) -> str:
-    return next(iter(get_close_matches(item.described, names, n=1, cutoff=0.6)), "")
+def _similar(source: ChannelSource, names: Sequence[str]) -> str:
+    return next(iter(get_close_matches(source.described, names, n=1, cutoff=0.6)), "")
 
 
-def _alike(column: str, names: Sequence[str]) -> list[str]:
-    """The numbers of the columns of one name, whatever their units."""
+def _numbers_of(column: str, names: Sequence[str]) -> list[str]:
+    """Return the numbers of all columns with this name, whatever their units."""
     return [str(i) for i, name in enumerate(names) if column in (name.partition("#")[0], split_unit(name)[0])]

@@ -1,4 +1,4 @@
-"""What the readers of other containers share: their library, sizes that a small file declares, one line an error."""
+"""Checks that the readers of containers share: optional library, declared sizes, errors of a library in one line."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from cdtool.findings import Finding
 from cdtool.findings.containers import ColumnLeftOut, RoundedColumn
 from cdtool.recording import FloatArray
 
-# Above this many bytes, and this many times its own size, a file unpacks to more than any log: it is refused.
+# A file that unpacks to more than this many bytes and to more than this multiple of its own size is refused.
 _FREE, _RATIO = 256 * 2**20, 200
 _LARGEST_EXACT = 2**53
-# HDF5's filters that only rearrange or check bytes: shuffle, Fletcher's checksum.
-_NO_PACKERS = (2, 3)
+# HDF5 filters that do not compress: shuffle, Fletcher32 checksum.
+_FILTERS_WITHOUT_COMPRESSION = (2, 3)
 
 
 def library(module: str, extra: str, path: Path) -> Any:
-    """An optional library; raises RecordingError that names the extra where it is absent."""
+    """Return an optional library; raises RecordingError that names the extra if the library is not installed."""
     try:
         return import_module(module)
     except ImportError as fault:
@@ -35,7 +35,7 @@ def library(module: str, extra: str, path: Path) -> Any:
 
 
 def check_size(path: Path, values: int) -> None:
-    """Refuse a file that declares far more numbers than a log of its size holds; raises RecordingError."""
+    """Raise RecordingError if a file declares far more numbers than a log of its size can contain."""
     size, declared = path.stat().st_size, 8 * values
     if declared > _FREE and declared > _RATIO * size:
         raise RecordingError(
@@ -45,31 +45,31 @@ def check_size(path: Path, values: int) -> None:
 
 
 def check_chunks(path: Path, name: str, dataset: Any) -> None:
-    """Refuse an HDF5 dataset that is packed twice, or in chunks far larger than its file; raises RecordingError.
+    """Raise RecordingError if an HDF5 dataset is compressed twice, or has chunks far larger than its file.
 
-    A chunk is unpacked as a whole, whatever is read of it, and each packing may shrink zeros to a thousandth.
+    HDF5 decompresses whole chunks even if only a part is read, and each compression may shrink zeros to a thousandth.
     """
     check_size(path, math.prod(dataset.chunks or ()) * dataset.dtype.itemsize // 8)
-    packing = dataset.id.get_create_plist()
-    packers = [packing.get_filter(i)[0] for i in range(packing.get_nfilters())]
-    if sum(packer not in _NO_PACKERS for packer in packers) > 1:
+    properties = dataset.id.get_create_plist()
+    filters = [properties.get_filter(i)[0] for i in range(properties.get_nfilters())]
+    if sum(number not in _FILTERS_WITHOUT_COMPRESSION for number in filters) > 1:
         raise RecordingError(f"{path}: dataset '{name}' is compressed more than once: refused", "save it again")
 
 
 @contextmanager
 def one_line_errors(path: Path, kind: str) -> Iterator[None]:
-    """Any error of a library on a damaged file becomes one RecordingError."""
+    """Raise any error of a library as one RecordingError."""
     try:
         yield
     except (CdtoolError, KeyboardInterrupt):
         raise
-    except Exception as fault:  # damaged bytes provoke all kinds of errors
+    except Exception as fault:  # damaged bytes cause errors of any type
         reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
         raise RecordingError(f"{path}: damaged or not {kind}: {reason}", "copy or save it again") from fault
 
 
 def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> FloatArray:
-    """Integers, booleans and floats as float64; integers that float64 cannot hold are told."""
+    """Return integers, booleans or floats as float64; add a finding if float64 cannot represent all integers."""
     if values.dtype.kind in "iu" and values.size:
         largest = max(abs(int(values.min())), abs(int(values.max())))
         if largest > _LARGEST_EXACT:
@@ -77,6 +77,6 @@ def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> 
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
-def left_out(name: str, kind: str) -> Finding:
-    """The note on a column that holds no numbers."""
+def left_out_finding(name: str, kind: str) -> Finding:
+    """Return the note on a column that is left out because its values are not numbers."""
     return Finding(ColumnLeftOut(name, kind), severity="note")

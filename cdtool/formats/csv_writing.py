@@ -1,4 +1,4 @@
-"""Writing one table of a recording as CSV: every float64 in as few digits as read back to the bit."""
+"""Write one table of a recording as CSV: each float64 with the fewest digits that read back to the same bits."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from pathlib import Path
 
 from cdtool.columns import Column
 from cdtool.formats.column_names import OWN_CLOCK
-from cdtool.formats.groups import Group, Part, Parts, Written, one_table, stored
+from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys, single_group
 
 _ROWS = 2**14
 
 
-def write_csv_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-    """Write a table with its provenance in lines that begin with #, and units in the header: `torque [N m]`."""
-    group = one_table(path, groups)
+def write_csv_table(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
+    """Write a table with its provenance in lines that start with #, and with units in the header: `torque [N m]`."""
+    group = single_group(path, groups)
     header = [_heading(column) for column in chain(*group.flat)]
     if group.own_clock:
         header.insert(0, f"{OWN_CLOCK} [s]")
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        for key, value in stored(provenance).items():
+        for key, value in prefix_keys(provenance).items():
             file.write(f"# {key}: {' '.join(value.split())}\n")
         file.write(",".join(map(_quoted, header)) + "\n")
         for (part,) in parts:

@@ -1,6 +1,6 @@
-"""The clock of a container that may count from an epoch: its first stamp is taken off before anything is rounded.
+"""The clock of a container that may count from an epoch: its first stamp is subtracted before anything is rounded.
 
-Nanoseconds since 1970 have 19 digits, float64 has 16: only their differences are exact.
+Nanoseconds since 1970 have 19 digits and float64 has 16, so that only their differences are exact.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ from cdtool.recording import FloatArray
 
 @dataclass(frozen=True)
 class EpochClock:
-    """Stamps as a file holds them: `read(start, end)` gives them, integers as integers.
+    """The stamps of a file: `read(start, end)` returns them without conversion, integers as integers.
 
-    A stamp counts `factor` [s] from `base` [s] after 1970, or after what nobody tells; those in `missing` are none.
+    A stamp is a multiple of `factor` [s], counted from `base` [s] after 1970 or after an unknown start. Stamps that are
+    equal to one of `missing` are missing.
     """
 
     read: Callable[[int, int], npt.NDArray[Any]]
@@ -38,11 +39,11 @@ class EpochClock:
 
     @property
     def start(self) -> Fraction | None:
-        """The first stamp [s], exactly; None where it is no number."""
+        """Return the first stamp [s] without rounding; None if it is not a finite number."""
         return None if self.first is None else self.base + self.first * _decimal(self.factor)
 
     def times(self, start: int, end: int, origin: Fraction) -> FloatArray:
-        """Times [s] after `origin`; NaN where there is no stamp."""
+        """Return times [s] after `origin`; NaN where the stamp is missing."""
         raw = self.read(start, end)
         if not origin or self.start is None:
             times = np.asarray(raw, dtype=np.float64) * self.factor + float(self.base - origin)
@@ -54,9 +55,10 @@ class EpochClock:
 
 
 def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding], channel: str) -> EpochClock:
-    """The clock; where its stamps cannot be times in the stated unit but count from 1970 in another one, that one's.
+    """Return the clock in the unit that its stamps can have.
 
-    A warning with both readings is added to the findings.
+    If the stamps cannot be times in the stated unit but are plausible times since 1970 in another unit, the clock is
+    returned in that unit, and a warning with both readings is added to the findings.
     """
     stamp = float(clock.first) if clock.first is not None else 0.0
     meant = contradicted_by_epoch(stamp, clock.factor)
@@ -67,15 +69,15 @@ def with_plausible_unit(clock: EpochClock, stated: str, findings: list[Finding],
 
 
 def common_origin(clocks: Iterable[EpochClock]) -> Fraction:
-    """The first stamp of all [s], to be taken off, where clocks count from an epoch; 0 where one does not."""
+    """Return the earliest first stamp [s], to be subtracted, if all clocks count from an epoch; 0 otherwise."""
     starts = [clock.start for clock in clocks if clock.start is not None]
     earliest = min(starts, default=Fraction(0))
     return earliest if earliest > EPOCH else Fraction(0)
 
 
 def _since(raw: npt.NDArray[Any], first: Fraction) -> FloatArray:
-    """Stamps less the first one; between integers without rounding."""
-    if raw.dtype.kind == "u":  # modulo 2^64, which gives stamps before the first one their sign
+    """Return the stamps minus the first one; differences of integers are exact."""
+    if raw.dtype.kind == "u":  # modulo 2^64, so that stamps before the first one become negative
         return (raw.astype(np.uint64) - np.uint64(int(first))).view(np.int64).astype(np.float64)
     if raw.dtype.kind == "i":
         return (raw.astype(np.int64) - np.int64(int(first))).astype(np.float64)
@@ -89,5 +91,5 @@ def _exact(stamp: Any) -> Fraction | None:
 
 
 def _decimal(factor: float) -> Fraction:
-    """1e-9 is meant to be 1 / 10^9, which a float is not."""
+    """Return the decimal value of a factor: 1e-9 stands for 1 / 10^9, which float64 cannot represent."""
     return Fraction(repr(factor))

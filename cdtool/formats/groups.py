@@ -1,4 +1,4 @@
-"""What is written to a container: columns that share a clock, rows after rows, and where the log comes from."""
+"""What a writer receives: columns that share a clock, their rows in parts, and the provenance of the log."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from cdtool.columns import Column
 from cdtool.errors import UsageError
 from cdtool.recording import FloatArray
 
-# What the metadata of a converted file begin with.
+# Prefix of the metadata keys in a converted file.
 PREFIX = "cdtool."
-# Of the provenance: how much of the log no checksum covers; only there where that is so.
+# Key of the provenance: how much of the log no checksum covers. Absent if checksums cover all of it.
 UNVERIFIED = "unverified"
 
 
 @dataclass(frozen=True)
 class Group:
-    """Columns of one clock, without their rows: `rows` of them follow as Part.
+    """Columns of one clock, without their rows: `rows` rows follow as Part.
 
-    A column's values are (n,), or (n, J): one a joint, called as `joints`. `timed`: the times are known; `start` [s] is
-    the earliest. `is_table`: the clock is one of the columns, as it was logged, and needs no other.
+    A column's values are (n,), or (n, J) with one value per joint; `joints` are the names. `timed`: the times are
+    known, and `start` [s] is the earliest. `is_table`: the logged clock is one of the columns; no other is needed.
     """
 
     name: str
@@ -38,12 +38,12 @@ class Group:
 
     @property
     def own_clock(self) -> bool:
-        """A column of its own has to hold the times."""
+        """Return whether the times need a column of their own."""
         return self.timed and not self.is_table
 
     @property
     def flat(self) -> list[list[Column]]:
-        """Each column as columns of (n,) values: `torque shoulder`, `torque elbow`."""
+        """Return each column as columns of (n,) values: `torque shoulder`, `torque elbow`."""
         return [
             [column]
             if column.values.ndim == 1
@@ -54,7 +54,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Part:
-    """The next rows of a group: `time` (n,) [s] where it is known, `values` (n,) or (n, J) of its columns in order."""
+    """The next rows of a group: `time` (n,) [s] if known, and `values` (n,) or (n, J) of its columns in order."""
 
     time: FloatArray | None
     values: tuple[FloatArray, ...]
@@ -64,41 +64,43 @@ class Part:
 
     @property
     def flat(self) -> list[FloatArray]:
-        """The values of the group's flat columns."""
+        """Return the values of the group's flat columns."""
         return list(chain(*([item] if item.ndim == 1 else list(np.ascontiguousarray(item.T)) for item in self.values)))
 
 
-# The next rows of each group; None: none now. No row is later than one of the parts that follow.
+# The next rows of each group; None if a group has no rows in this step. No row is later than a row of a later step.
 Parts = Iterable[Sequence[Part | None]]
 
-# Names as [channels] takes them: group by group, column by column, one a joint (a topic's array: one in all).
-Written = list[list[list[str]]]
+# Names for [channels]: group by group, column by column, one name per joint (an array of a topic has one name).
+WrittenNames = list[list[list[str]]]
 
 
 class Writer(Protocol):
-    """Writes groups with their provenance to a file; gives, column by column, how the machine file names it there."""
+    """Write groups with their provenance to a file; return the name of each column for the machine file."""
 
-    def __call__(self, path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-        """Names as [channels] takes them, group by group, column by column, joint by joint."""
+    def __call__(
+        self, path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]
+    ) -> WrittenNames:
+        """Return the names for [channels], group by group, column by column, joint by joint."""
         ...
 
 
-def one_table(path: Path, groups: Sequence[Group]) -> Group:
-    """The only group; raises UsageError where there are several."""
+def single_group(path: Path, groups: Sequence[Group]) -> Group:
+    """Return the only group; raises UsageError if there are several."""
     if len(groups) != 1:
-        raise UsageError(f"{path}: {len(groups)} clocks do not go into one table", "one file a clock")
+        raise UsageError(f"{path}: a table has one clock, but there are {len(groups)}", "write one file per clock")
     return groups[0]
 
 
-def need_clocks(path: Path, groups: Sequence[Group]) -> None:
-    """Raise UsageError where the container needs times and those of a group are not known."""
+def require_clocks(path: Path, groups: Sequence[Group]) -> None:
+    """Raise UsageError if the times of a group are not known; for containers that need times."""
     if not all(group.timed for group in groups):
         raise UsageError(
-            f"{path}: no column of the log looks like its clock, and this container needs one",
-            "name the clock in a machine file, and give it with -m",
+            f"{path}: no column of the log is recognised as its clock, and this container needs a clock",
+            "name the clock in a machine file, and pass the file with -m",
         )
 
 
-def stored(provenance: Mapping[str, str]) -> dict[str, str]:
-    """Provenance under the keys that it has in a file."""
+def prefix_keys(provenance: Mapping[str, str]) -> dict[str, str]:
+    """Return the provenance under the keys that are written to a file."""
     return {f"{PREFIX}{key}": value for key, value in provenance.items()}

@@ -18,17 +18,17 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import ClocksWithoutUnit, UnusableClock
 from cdtool.findings.containers import PackedValues, RowsAsColumns
-from cdtool.formats.column_names import asked_keys
+from cdtool.formats.column_names import requested_keys
 from cdtool.formats.container_checks import (
     check_chunks,
     check_size,
-    left_out,
+    left_out_finding,
     library,
     one_line_errors,
 )
 from cdtool.formats.epoch_clock import EpochClock, common_origin, with_plausible_unit
-from cdtool.formats.pieces import InPieces, Pieces
-from cdtool.formats.slices import Sliced, header_of, side_by_side
+from cdtool.formats.pieces import Pieces, PiecewiseFormat
+from cdtool.formats.slices import SlicedColumn, header_of, interleave
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
@@ -60,10 +60,10 @@ _WIDEST = 64
 
 @dataclass(frozen=True)
 class Packing:
-    """How the numbers of a dataset are packed; `missing` are raw values that stand for none.
+    """How the numbers of a dataset are packed; `missing` are the raw values of missing numbers.
 
     CF Metadata Conventions 1.11, sections 2.5.1 (missing data), 4.4 (time) and 8.1 (packed data): a number is
-    raw * scale_factor + add_offset; raw values equal to _FillValue or missing_value are none.
+    raw * scale_factor + add_offset; raw values equal to _FillValue or missing_value are missing.
     """
 
     scale: float = 1.0
@@ -72,50 +72,51 @@ class Packing:
 
     @classmethod
     def of(cls, attributes: Mapping[str, Any]) -> Packing:
-        """By a dataset's attributes; raises ValueError for one that is not a number."""
+        """Return the packing that a dataset's attributes state; raises ValueError if one of them is not a number."""
         scale, offset = (
             _numbers(attributes, key) or (default,) for key, default in zip(_KEYS, (1.0, 0.0), strict=True)
         )
         return cls(scale[0], offset[0], tuple(value for key in _MISSING for value in _numbers(attributes, key)))
 
     def unpacked(self, raw: npt.NDArray[Any]) -> FloatArray:
-        """Return the numbers that are meant; NaN where one is missing."""
+        """Return the unpacked numbers; NaN where a number is missing."""
         values = np.array(raw, dtype=np.float64)
         if self.scale != 1.0:
             values *= self.scale
         if self.offset != 0.0:
             values += self.offset
         if self.missing:
-            # As the file's own type has them: 0.1 of 32 bits is not that of 64.
+            # Compared in the file's own type: 0.1 in 32 bits differs from 0.1 in 64 bits.
             missing = self.missing if raw.dtype.kind != "f" else np.array(self.missing).astype(raw.dtype)
             values[np.isin(raw.astype(np.float64), np.array(missing, dtype=np.float64))] = np.nan
         return values
 
     def finding(self, column: str) -> list[Finding]:
-        """Return the note on a column that is packed."""
+        """Return the note on a packed column; empty if the column is not packed."""
         if (self.scale, self.offset) == (1.0, 0.0):
             return []
         return [Finding(PackedValues(self.scale, self.offset), column, "note")]
 
 
 def times_since(unit: str, calendar: str) -> tuple[float, Fraction] | None:
-    """`milliseconds since 2024-01-01 12:00`: the factor to s, and the date in s since 1970; None of any other unit.
+    """Return the factor to s and the date [s] since 1970 of a unit such as `milliseconds since 2024-01-01 12:00`.
 
-    Raises ValueError where the date or the calendar is not known: days of 360 to a year have no date.
+    The result is None for any other unit. Raises ValueError if the date or the calendar is not supported: the dates of
+    a calendar of 360 days are not Gregorian dates.
     """
-    told = _SINCE.fullmatch(unit)
-    if told is None or told["unit"].lower() not in _UNITS:
+    match = _SINCE.fullmatch(unit)
+    if match is None or match["unit"].lower() not in _UNITS:
         return None
-    date = _DATE.fullmatch(told["date"])
+    date = _DATE.fullmatch(match["date"])
     if date is None:
-        raise ValueError(f"the date of '{unit}' is not understood")
+        raise ValueError(f"the date of '{unit}' cannot be read")
     if calendar.lower() not in _CALENDARS:
-        raise ValueError(f"its calendar '{calendar}' has other days than ours")
+        raise ValueError(f"its calendar '{calendar}' is not the Gregorian calendar")
     year, month, day = (int(part) for part in date["day"].split("-"))
     days = int((np.datetime64(f"{year:04d}-{month:02d}-{day:02d}") - np.datetime64(0, "D")).astype(np.int64))
     seconds = 3600 * int(date["hour"] or 0) + 60 * int(date["minute"] or 0) + Fraction(date["second"] or 0)
     east = 3600 * int(date["zone"] or 0) + 60 * int(date["part"] or 0)
-    return _UNITS[told["unit"].lower()], 86400 * days + seconds + (east if date["sign"] == "-" else -east)
+    return _UNITS[match["unit"].lower()], 86400 * days + seconds + (east if date["sign"] == "-" else -east)
 
 
 def _numbers(attributes: Mapping[str, Any], key: str) -> tuple[float, ...]:
@@ -123,26 +124,26 @@ def _numbers(attributes: Mapping[str, Any], key: str) -> tuple[float, ...]:
         return ()
     values = np.asarray(attributes[key]).ravel()
     if values.dtype.kind not in "biuf" or not 0 < len(values) <= 8 or (key in _KEYS and not np.isfinite(values).all()):
-        raise ValueError(f"its attribute {key} is no number")
+        raise ValueError(f"its attribute {key} is not a number")
     return tuple(values.tolist())
 
 
 @dataclass(frozen=True)
-class Hdf5(InPieces):
+class Hdf5(PiecewiseFormat):
     """HDF5 files: a column is a dataset's path, `drive/torque`; a matrix `q` is `q[0]`, `q[1]` and so on.
 
-    A dataset `time`, `t` or `timestamp` with a unit of time (`s`, `seconds since 2024-01-01`) is the clock of those
-    beside it that are as long. Numbers are unpacked as the CF conventions say.
+    A dataset `time`, `t` or `timestamp` with a unit of time (`s`, `seconds since 2024-01-01`) is the clock of the
+    datasets of equal length in the same group. Numbers are unpacked by the CF conventions.
     """
 
     name: ClassVar[str] = "hdf5"
     suffixes: ClassVar[tuple[str, ...]] = (".h5", ".hdf5", ".hdf")
 
     def sniff(self, path: Path) -> bool:
-        """True if the file holds HDF5's magic bytes at its start or behind a user block, as MATLAB 7.3 writes it."""
+        """Return whether HDF5's signature is at the file's start or after a user block, such as MATLAB 7.3 writes."""
         with path.open("rb") as file:
-            for place in (0, 512, 1024, 2048):
-                file.seek(place)
+            for offset in (0, 512, 1024, 2048):
+                file.seek(offset)
                 if file.read(len(_MAGIC)) == _MAGIC:
                     return True
         return False
@@ -150,126 +151,131 @@ class Hdf5(InPieces):
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         h5py = library("h5py", "hdf5", path)
         if not self.sniff(path):
-            raise RecordingError(f"{path}: is no HDF5 file", "see cdtool list formats")
+            raise RecordingError(f"{path}: is not an HDF5 file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "an HDF5 file"), h5py.File(path, "r") as file:
-            tree = _Tree(path, h5py, file, findings)
-            names = tuple(tree.places)
-            keys = [key for key in asked_keys(path, wanted, names) if some is None or key in some]
+            tree = _Datasets(path, h5py, file, findings)
+            names = tuple(tree.locations)
+            keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
             if not keys:
-                raise RecordingError(f"{path}: holds no dataset of numbers", "see h5dump -n")
+                raise RecordingError(f"{path}: has no dataset of numbers", "list its contents with h5dump -n")
             check_size(path, sum(tree.rows(key) for key in keys))
-            for name in dict.fromkeys(tree.places[key][0] for key in keys):
+            for name in dict.fromkeys(tree.locations[key][0] for key in keys):
                 check_chunks(path, name, tree.datasets[name])
-            origin = tree.take_epoch(keys)
+            origin = tree.set_origin(keys)
             columns = [tree.column(key) for key in keys]
-            yield from side_by_side(columns)
-            findings += [found for key in keys for found in rounding_finding(key, tree.rounded[key])]
-            findings += tree.unnamed_clocks()
+            yield from interleave(columns)
+            findings += [finding for key in keys for finding in rounding_finding(key, tree.rounded[key])]
+            findings += tree.clocks_without_unit()
             origin += float(file.attrs.get("cdtool.origin_s", 0.0))
         headers = {column.name: header_of(column) for column in columns}
-        told = {"datasets": str(len(tree.datasets))}
-        return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), told, names)
+        details = {"datasets": str(len(tree.datasets))}
+        return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, names)
 
 
-class _Tree:
-    """The datasets of numbers of an open file: `places` maps a column to its dataset and its place in it."""
+class _Datasets:
+    """The datasets of numbers of an open file.
+
+    `locations` maps a column to its dataset and, if the dataset is a matrix, to the index of the column in it.
+    """
 
     def __init__(self, path: Path, h5py: Any, file: Any, findings: list[Finding]) -> None:
         self.path, self.h5py, self.findings = path, h5py, findings
         self.datasets: dict[str, Any] = {}
         self.packings: dict[str, Packing] = {}
-        self.places: dict[str, tuple[str, int | None]] = {}
+        self.locations: dict[str, tuple[str, int | None]] = {}
         self.rounded: Counter[str] = Counter()
         self._clocks: dict[str, EpochClock | None] = {}
         self._origin = Fraction(0)
-        # Hard links only: a soft or external one may lead in circles, or out of the file.
+        # Hard links only: a soft or external link may form a cycle, or point to another file.
         file.visititems(self._visit)
 
-    def _visit(self, name: str, item: Any) -> None:
-        if not isinstance(item, self.h5py.Dataset):
+    def _visit(self, name: str, node: Any) -> None:
+        if not isinstance(node, self.h5py.Dataset):
             return
-        why = _unusable(item)
+        reason = _unusable(node)
         try:
-            packing = Packing() if why else Packing.of(item.attrs)
+            packing = Packing() if reason else Packing.of(node.attrs)
         except ValueError as fault:
-            why = f"packed, but {fault}"
-        if why:
-            self.findings.append(left_out(name, why))
+            reason = f"packed, but {fault}"
+        if reason:
+            self.findings.append(left_out_finding(name, reason))
             return
-        self.datasets[name], self.packings[name] = item, packing
+        self.datasets[name], self.packings[name] = node, packing
         self.findings += packing.finding(name)
-        if item.ndim == 1 or 1 in item.shape:
-            self.places[name] = (name, None)
+        if node.ndim == 1 or 1 in node.shape:
+            self.locations[name] = (name, None)
             return
-        for i in range(min(item.shape)):
-            self.places[f"{name}[{i}]"] = (name, i)
-        if item.shape[0] < item.shape[1]:
-            self.findings.append(Finding(RowsAsColumns("dataset", name, *item.shape), severity="note"))
+        for i in range(min(node.shape)):
+            self.locations[f"{name}[{i}]"] = (name, i)
+        if node.shape[0] < node.shape[1]:
+            self.findings.append(Finding(RowsAsColumns("dataset", name, *node.shape), severity="note"))
 
     def rows(self, key: str) -> int:
-        """How many values a column has."""
-        return int(max(self.datasets[self.places[key][0]].shape))
+        """Return the number of values of a column."""
+        return int(max(self.datasets[self.locations[key][0]].shape))
 
-    def column(self, key: str) -> Sliced:
-        """One column with its unit, and its clock where the file knows it."""
-        name, place = self.places[key]
+    def column(self, key: str) -> SlicedColumn:
+        """Return one column with its unit, and with its clock if the file has one for it."""
+        name, index = self.locations[key]
         dataset, rows = self.datasets[name], self.rows(key)
 
         def values(start: int, end: int) -> FloatArray:
-            numbers = self.packings[name].unpacked(_rows_of(dataset, place, start, end))
+            numbers = self.packings[name].unpacked(_rows_of(dataset, index, start, end))
             self.rounded[key] += rounded_integers(numbers) if dataset.dtype.kind in "iu" else 0
             return numbers
 
-        found = self._clock(key)
-        if found is None:
-            return Sliced(key, rows, values, unit=_unit(dataset))
-        path, clock = found
+        own = self._clock(key)
+        if own is None:
+            return SlicedColumn(key, rows, values, unit=_unit(dataset))
+        path, clock = own
 
         def time(start: int, end: int) -> FloatArray:
             return clock.times(start, end, self._origin)
 
-        return Sliced(key, rows, values, path, time, _unit(dataset))
+        return SlicedColumn(key, rows, values, path, time, _unit(dataset))
 
-    def take_epoch(self, keys: Sequence[str]) -> float:
-        """Let the times of these columns begin at 0 where they count from an epoch; seconds that are taken off."""
-        found = dict(clock for key in keys if (clock := self._clock(key)) is not None)
-        self._origin = common_origin(found.values())
+    def set_origin(self, keys: Sequence[str]) -> float:
+        """Let the times of these columns start at 0 if they count from an epoch; return the subtracted time [s]."""
+        clocks = dict(clock for key in keys if (clock := self._clock(key)) is not None)
+        self._origin = common_origin(clocks.values())
         return float(self._origin)
 
-    def unnamed_clocks(self) -> list[Finding]:
-        """A warning where groups have datasets that are called as clocks are, of which no unit tells that they are."""
-        paths = [path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES and self._made(path) is None]
+    def clocks_without_unit(self) -> list[Finding]:
+        """Return a warning if several groups have datasets with the name of a clock but without a unit of time."""
+        paths = [
+            path for path in self.datasets if path.rpartition("/")[2] in _CLOCK_NAMES and self._clock_at(path) is None
+        ]
         if len({path.rpartition("/")[0] for path in paths}) < 2:
             return []
         return [Finding(ClocksWithoutUnit(tuple(paths)))]
 
     def _clock(self, key: str) -> tuple[str, EpochClock] | None:
-        """The dataset that is a column's clock; a clock is its own."""
-        name, count = self.places[key][0], self.rows(key)
+        """Return path and clock of a column; the clock of a clock is itself. None if the column has no clock."""
+        name, count = self.locations[key][0], self.rows(key)
         folder, _, own = name.rpartition("/")
-        for clock in (own, *_CLOCK_NAMES) if own in _CLOCK_NAMES else _CLOCK_NAMES:
-            path = f"{folder}/{clock}" if folder else clock
-            made = self._made(path) if path in self.datasets and self.datasets[path].size == count else None
-            if made is not None:
-                return path, made
+        for clock_name in (own, *_CLOCK_NAMES) if own in _CLOCK_NAMES else _CLOCK_NAMES:
+            path = f"{folder}/{clock_name}" if folder else clock_name
+            clock = self._clock_at(path) if path in self.datasets and self.datasets[path].size == count else None
+            if clock is not None:
+                return path, clock
         return None
 
-    def _made(self, path: str) -> EpochClock | None:
-        """A dataset as a clock; None where it has no unit of time."""
+    def _clock_at(self, path: str) -> EpochClock | None:
+        """Return a dataset as a clock; None if it has no unit of time."""
         if path not in self._clocks:
             self._clocks[path] = self._as_clock(path)
         return self._clocks[path]
 
     def _as_clock(self, path: str) -> EpochClock | None:
         dataset, packing = self.datasets[path], self.packings[path]
-        told = _unit(dataset) or "?"
+        stated = _unit(dataset) or "?"
         try:
-            since = times_since(told, _text(dataset.attrs.get("calendar")))
+            since = times_since(stated, _text(dataset.attrs.get("calendar")))
         except ValueError as fault:
             self.findings.append(Finding(UnusableClock(str(fault)), path))
             return None
-        unit = find_unit(told)
+        unit = find_unit(stated)
         if since is None and (unit is None or unit.si != "s"):
             return None
         factor, base = since or (unit.factor if unit is not None else 1.0, Fraction(0))
@@ -279,14 +285,14 @@ class _Tree:
 
         base += Fraction(packing.offset) * Fraction(repr(factor))
         clock = EpochClock(read, factor * packing.scale, base, packing.missing)
-        return with_plausible_unit(clock, told, self.findings, path)
+        return with_plausible_unit(clock, stated, self.findings, path)
 
 
-def _rows_of(dataset: Any, place: int | None, start: int, end: int) -> Any:
-    """Values of a vector, or of one column of a matrix, whose longer side are its rows."""
-    if place is None:
+def _rows_of(dataset: Any, index: int | None, start: int, end: int) -> Any:
+    """Return values of a vector, or of column `index` of a matrix; the rows are along the longer dimension."""
+    if index is None:
         return dataset[start:end] if dataset.ndim == 1 else _long_side(dataset, start, end)
-    return dataset[place, start:end] if dataset.shape[0] < dataset.shape[1] else dataset[start:end, place]
+    return dataset[index, start:end] if dataset.shape[0] < dataset.shape[1] else dataset[start:end, index]
 
 
 def _long_side(dataset: Any, start: int, end: int) -> Any:
@@ -294,11 +300,12 @@ def _long_side(dataset: Any, start: int, end: int) -> Any:
 
 
 def _unusable(dataset: Any) -> str:
-    """Why a dataset is left out; empty where it is a column or a matrix of numbers in this very file."""
+    """Return why a dataset is left out; empty for a column or a matrix of numbers that is stored in this file."""
     if dataset.is_virtual or dataset.external:
-        return "kept in other files"
+        return "stored in other files"
     if dataset.dtype.kind not in "biuf":
-        return {"c": "complex", "O": "of texts or references", "V": "a compound"}.get(dataset.dtype.kind, "no number")
+        kinds = {"c": "complex", "O": "of texts or references", "V": "a compound"}
+        return kinds.get(dataset.dtype.kind, "not numeric")
     if _text(dataset.attrs.get("MATLAB_class")) in ("char", "cell", "struct"):
         return f"a MATLAB {_text(dataset.attrs.get('MATLAB_class'))}"
     if dataset.ndim not in (1, 2) or 0 in dataset.shape:

@@ -1,4 +1,4 @@
-"""Writing a recording as HDF5: a dataset a column, a group a clock."""
+"""Write a recording as HDF5: one dataset per column, one group per clock."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ import numpy as np
 from cdtool.columns import Column
 from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import library
-from cdtool.formats.groups import Group, Parts, Written, stored
+from cdtool.formats.groups import Group, Parts, WrittenNames, prefix_keys
 
-_ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+_TERMINATION_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
-def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-    """Write a dataset a column, units as attributes; several clocks are groups, each with its `time`.
+def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
+    """Write one dataset per column, with units as attributes; each of several clocks is a group with its own `time`.
 
-    Raises OSError where the disk is full or cannot be written.
+    Raises OSError if the disk is full or cannot be written.
     """
     h5py = library("h5py", "hdf5", path)
-    # An exception in what the library calls to write would leave it with a file that it cannot close.
-    with held_signals() as deliver, _Disk(path, "wb+") as disk:
+    # An exception within the library's calls of `write` would leave it with a file that it cannot close.
+    with deferred_signals() as deliver, _CheckedFile(path, "wb+") as disk:
 
         def check() -> None:
             deliver()
@@ -42,10 +42,10 @@ def write_hdf5(path: Path, groups: Sequence[Group], parts: Parts, provenance: Ma
 
 def _write(
     file: Any, check: Callable[[], None], groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]
-) -> Written:
-    names: Written = []
+) -> WrittenNames:
+    names: WrittenNames = []
     datasets: list[list[Any]] = []
-    for key, value in stored(provenance).items():
+    for key, value in prefix_keys(provenance).items():
         file.attrs[key] = value
     for group in groups:
         folder = file if len(groups) == 1 else file.create_group(group.name, track_order=True)
@@ -66,16 +66,16 @@ def _write(
     return names
 
 
-class _Disk(FileIO):
-    """What HDF5 writes to: from the first `fault` on it swallows the rest.
+class _CheckedFile(FileIO):
+    """The file that HDF5 writes to: after the first error (`fault`) it discards all data without raising.
 
-    The library could not close a file that it cannot write to, and would crash at the end of the process.
+    The library cannot close a file after a failed write, and would crash at the end of the process.
     """
 
     fault: OSError | None = None
 
     def write(self, data: Any) -> int:
-        """All of it, or as if."""
+        """Write all data and return the size; after an error discard the data and return the same size."""
         rest = memoryview(data).cast("B")
         size = len(rest)
         try:
@@ -86,7 +86,7 @@ class _Disk(FileIO):
         return size
 
     def truncate(self, size: int | None = None) -> int:
-        """Make the file that long, or as if."""
+        """Set the file's size and return it; after an error return the size without setting it."""
         try:
             if self.fault is None:
                 return super().truncate(size)
@@ -95,7 +95,7 @@ class _Disk(FileIO):
         return self.tell() if size is None else size
 
     def check(self) -> None:
-        """Raise the OSError of what could not be written."""
+        """Raise the OSError of the first write that failed."""
         if self.fault is not None:
             raise self.fault
 
@@ -108,25 +108,24 @@ def _dataset(folder: Any, column: Column, rows: int) -> Any:
 
 
 def _link(name: str) -> str:
-    """A name without the slash that would make a group of it."""
+    """Return a name without slashes, which would create groups."""
     return name.replace("/", ".")
 
 
 @contextmanager
-def held_signals() -> Iterator[Callable[[], None]]:
-    """Hold SIGINT, SIGTERM and SIGHUP until the end, or until the function that this yields is called.
+def deferred_signals() -> Iterator[Callable[[], None]]:
+    """Defer SIGINT, SIGTERM and SIGHUP to the end of the context, or to a call of the function that it yields.
 
-    Where a library calls back into Python, nothing must be raised.
-    What they then do, and raise, is what they would have done. Outside the main thread, which alone gets signals,
-    nothing is held.
+    Use it if a library calls back into Python code that must not raise. Deferred signals are passed to their previous
+    handlers, which may raise. Only the main thread receives signals: in other threads this has no effect.
     """
-    came: list[int] = []
-    before: dict[int, Any] = {}
+    pending: list[int] = []
+    handlers: dict[int, Any] = {}
 
     def deliver() -> None:
-        while came:
-            number = came.pop(0)
-            handler = before[number]
+        while pending:
+            number = pending.pop(0)
+            handler = handlers[number]
             if callable(handler):
                 handler(number, None)
             elif handler == signal.SIG_DFL:
@@ -136,11 +135,11 @@ def held_signals() -> Iterator[Callable[[], None]]:
     if threading.current_thread() is not threading.main_thread():
         yield deliver
         return
-    for number in _ENDING:
-        before[number] = signal.signal(number, lambda number, _: came.append(number))
+    for number in _TERMINATION_SIGNALS:
+        handlers[number] = signal.signal(number, lambda number, _: pending.append(number))
     try:
         yield deliver
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
         deliver()

@@ -19,7 +19,7 @@ from cdtool.findings import Finding
 from cdtool.findings.containers import RowsAsColumns, VariableLeftOut
 from cdtool.formats.column_names import wanted_keys
 from cdtool.formats.container_checks import check_chunks, check_size, library, one_line_errors
-from cdtool.formats.mat_check import MAGIC, check_whole
+from cdtool.formats.mat_check import MAGIC, check_complete
 from cdtool.formats.source import Source
 
 _NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
@@ -37,12 +37,12 @@ class Mat:
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
 
     def sniff(self, path: Path) -> bool:
-        """True if the file starts as MATLAB writes it (versions 5 to 7.3)."""
+        """Return whether the file starts like a MATLAB file of version 5 to 7.3."""
         with path.open("rb") as file:
             return file.read(len(MAGIC)) == MAGIC or _is_v73(path)
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all; raises RecordingError."""
+        """Return the columns that `wanted` names, or all columns; raises RecordingError."""
         shapes, others = _contents(path)
         names = tuple(name for variable, shape in shapes.items() for name in _names(variable, shape))
         keys = list(names) if wanted is None else wanted_keys(path, wanted, names)
@@ -50,7 +50,7 @@ class Mat:
         read = [variable for variable, shape in shapes.items() if set(_names(variable, shape)) & set(keys)]
         values = _load(path, {variable: shapes[variable] for variable in (*read, *scalars)})
         columns: dict[str, Column] = {}
-        findings = [Finding(VariableLeftOut(name, f"a {kind}"), severity="note") for name, kind in others]
+        findings = [Finding(VariableLeftOut(name, _with_article(kind)), severity="note") for name, kind in others]
         for variable in read:
             array = np.asarray(values[variable])
             if np.iscomplexobj(array):
@@ -63,17 +63,17 @@ class Mat:
             for i, key in enumerate(_names(variable, shapes[variable])):
                 if key in keys:
                     columns[key] = Column(key, np.ascontiguousarray(table[:, i], dtype=np.float64))
-        lost = [key for key in keys if key not in columns]
-        if wanted is not None and lost:
-            raise RecordingError(f"{path}: column '{lost[0]}' is complex", "save its real part")
+        not_read = [key for key in keys if key not in columns]
+        if wanted is not None and not_read:
+            raise RecordingError(f"{path}: column '{not_read[0]}' is complex", "save its real part")
         if not columns:
-            raise RecordingError(f"{path}: holds no vector or matrix of numbers", "see `whos` in MATLAB")
+            raise RecordingError(f"{path}: has no vector or matrix of numbers", "list its variables with `whos`")
         details = {variable: f"{np.asarray(values[variable]).ravel()[0]:g}" for variable in scalars}
         return Source(path, self.name, columns, findings=tuple(findings), details=details, names=names)
 
 
 def _names(variable: str, shape: tuple[int, int]) -> list[str]:
-    """The columns of a variable; none for a scalar."""
+    """Return the names of a variable's columns; empty for a scalar."""
     if shape == (1, 1):
         return []
     if 1 in shape:
@@ -81,18 +81,22 @@ def _names(variable: str, shape: tuple[int, int]) -> list[str]:
     return [f"{variable}[{i}]" for i in range(min(shape))]
 
 
+def _with_article(kind: str) -> str:
+    return f"{'an' if kind.startswith(('a', 'e', 'i', 'o', 'u', '8 ', '11 ', '18 ')) else 'a'} {kind}"
+
+
 def _contents(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, str]]]:
-    """The numeric variables with their shapes, and the others with their kind."""
+    """Return the numeric variables with their shapes, and the other variables with their kinds."""
     from scipy.io import whosmat
 
     if _is_v73(path):
         return _contents_of_v73(path)
-    check_whole(path)
+    check_complete(path)
     shapes: dict[str, tuple[int, int]] = {}
     others: list[tuple[str, str]] = []
     try:
         listed = whosmat(str(path), appendmat=False)
-    except Exception as fault:  # damaged bytes provoke all kinds of errors
+    except Exception as fault:  # damaged bytes cause errors of any type
         raise _unreadable(path, fault) from fault
     for name, shape, kind in listed:
         if kind in _NUMERIC and len(shape) == 2 and 0 not in shape:
@@ -109,7 +113,7 @@ def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
     if _is_v73(path):
         return _load_v73(path, variables)
     try:
-        # Only variables of numbers are named: no struct, object or function is ever built.
+        # Only variables of numbers are requested, so that scipy never constructs a struct, object or function.
         values: dict[str, Any] = loadmat(str(path), appendmat=False, variable_names=list(variables))
     except Exception as fault:  # as above
         raise _unreadable(path, fault) from fault
@@ -117,7 +121,7 @@ def _load(path: Path, variables: dict[str, tuple[int, int]]) -> dict[str, Any]:
         value = np.asarray(values.get(variable))
         if value.dtype.kind not in "biufc" or value.shape != shape:
             raise RecordingError(
-                f"{path}: damaged: variable '{variable}' is not as announced", "save it again with -v7"
+                f"{path}: damaged: variable '{variable}' differs from its declaration", "save it again with -v7"
             )
     return values
 
@@ -128,45 +132,48 @@ def _unreadable(path: Path, fault: Exception) -> RecordingError:
 
 
 def _is_v73(path: Path) -> bool:
-    """True if the file starts as MATLAB writes version 7.3: its own header, HDF5 behind it."""
+    """Return whether the file starts like MATLAB version 7.3: a MATLAB header, followed by HDF5."""
     with path.open("rb") as file:
         head = file.read(_USER_BLOCK + len(_HDF5))
     return head.startswith(_V73) and head.endswith(_HDF5)
 
 
 def _contents_of_v73(path: Path) -> tuple[dict[str, tuple[int, int]], list[tuple[str, str]]]:
-    """Return the numeric variables with their shapes as MATLAB has them, and the others with their kind.
+    """Return the numeric variables with their MATLAB shapes, and the other variables with their kinds.
 
-    A dataset's dimensions are MATLAB's in reverse, its attribute MATLAB_class is the variable's class; structs and
-    sparse matrices are groups, complex numbers compounds:
+    A dataset has MATLAB's dimensions in reverse order, and its attribute MATLAB_class is the variable's class. Structs
+    and sparse matrices are groups; complex numbers are compounds:
     https://www.mathworks.com/help/matlab/import_export/mat-file-versions.html
     """
     shapes: dict[str, tuple[int, int]] = {}
     others: list[tuple[str, str]] = []
     with _opened(path) as (h5py, file):
         for name in file:
-            if name.startswith("#"):  # what cells and objects refer to
+            if name.startswith("#"):  # targets of references in cells and objects
                 continue
             if not isinstance(file.get(name, getlink=True), h5py.HardLink):
                 others.append((name, "link"))
                 continue
-            item = file[name]
-            kind = _kind(item) if isinstance(item, h5py.Dataset) else _group_kind(item)
+            node = file[name]
+            kind = _kind(node) if isinstance(node, h5py.Dataset) else _group_kind(node)
             if kind:
                 others.append((name, kind))
             else:
-                shapes[name] = _shape(item)
+                shapes[name] = _shape(node)
     return shapes, others
 
 
 def _load_v73(path: Path, variables: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-    """Return the values of these variables as MATLAB has them; raises RecordingError for damage or a bomb."""
+    """Return the values of these variables in MATLAB's shape.
+
+    Raises RecordingError if the file is damaged, or is a decompression bomb.
+    """
     with _opened(path) as (_, file):
-        found = {name: file[name] for name in variables}
-        check_size(path, sum(dataset.size * (1 + _is_complex(dataset)) for dataset in found.values()))
-        for name, dataset in found.items():
+        datasets = {name: file[name] for name in variables}
+        check_size(path, sum(dataset.size * (1 + _is_complex(dataset)) for dataset in datasets.values()))
+        for name, dataset in datasets.items():
             check_chunks(path, name, dataset)
-        return {name: _values(dataset) for name, dataset in found.items()}
+        return {name: _values(dataset) for name, dataset in datasets.items()}
 
 
 @contextmanager
@@ -176,34 +183,34 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     except RecordingError as fault:
         raise RecordingError(
             f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed",
-            f"{fault.hint}; or save it with: save(name, ..., '-v7')",
+            f"{fault.hint}; or save it in MATLAB with save(name, ..., '-v7')",
         ) from fault
     with one_line_errors(path, "a MATLAB 7.3 file"), h5py.File(path, "r") as file:
         yield h5py, file
 
 
 def _kind(dataset: Any) -> str:
-    """What a dataset is if it is no vector, matrix or single number; else nothing."""
-    told = _class(dataset)
+    """Return the kind of a dataset; empty for a vector, a matrix or a single number."""
+    matlab_class = _class(dataset)
     if dataset.is_virtual or dataset.external:
-        return "array kept in other files"
-    if told in ("char", "cell", "struct", "function_handle") or "MATLAB_object_decode" in dataset.attrs:
-        return told.replace("_handle", "")
-    if "MATLAB_empty" in dataset.attrs and 0 < dataset.size <= _MOST_DIMENSIONS:  # its values are its dimensions
+        return "array stored in other files"
+    if matlab_class in ("char", "cell", "struct", "function_handle") or "MATLAB_object_decode" in dataset.attrs:
+        return matlab_class.replace("_handle", "")
+    if "MATLAB_empty" in dataset.attrs and 0 < dataset.size <= _MOST_DIMENSIONS:  # its values are the dimensions
         return f"{' x '.join(map(str, dataset[()].ravel().tolist()))} array"
     if dataset.dtype.kind not in "biuf" and not _is_complex(dataset):
-        return told or "text or a compound"
-    odd = dataset.ndim > 2 or 0 in dataset.shape
-    return f"{' x '.join(map(str, dataset.shape[::-1]))} array" if odd else ""
+        return matlab_class or "text or a compound"
+    not_a_matrix = dataset.ndim > 2 or 0 in dataset.shape
+    return f"{' x '.join(map(str, dataset.shape[::-1]))} array" if not_a_matrix else ""
 
 
 def _group_kind(group: Any) -> str:
     return "sparse" if "MATLAB_sparse" in group.attrs else _class(group) or "struct"
 
 
-def _class(item: Any) -> str:
-    told = item.attrs.get("MATLAB_class", b"")
-    return told.decode("utf-8", "replace") if isinstance(told, bytes) else str(told)
+def _class(node: Any) -> str:
+    matlab_class = node.attrs.get("MATLAB_class", b"")
+    return matlab_class.decode("utf-8", "replace") if isinstance(matlab_class, bytes) else str(matlab_class)
 
 
 def _is_complex(dataset: Any) -> bool:
@@ -211,7 +218,7 @@ def _is_complex(dataset: Any) -> bool:
 
 
 def _shape(dataset: Any) -> tuple[int, int]:
-    """MATLAB's rows and columns; what other tools wrote with one dimension is a column."""
+    """Return MATLAB's rows and columns; a dataset with one dimension, written by other tools, is one column."""
     rows, *columns = (*dataset.shape[::-1], 1, 1)[: max(2, dataset.ndim)]
     return int(rows), math.prod(columns)
 

@@ -1,7 +1,7 @@
-"""Is a .mat file (version 5 to 7) whole? scipy's reader ends the process, without an error, at some damaged ones.
+"""Check that a .mat file (version 5 to 7) is complete: some damaged files crash the process in scipy's reader.
 
-The file's elements are walked: each must lie within the one that holds it, and the numbers of an array must be of a
-known kind and as many as its dimensions say. https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf
+Each element must be within the element that contains it, and the numbers of an array must be of a known kind and as
+many as its dimensions require. https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cdtool.formats.container_checks import check_size
 
 MAGIC = b"MATLAB 5.0 MAT-file"
 _HEADER = 128
-# Flags and dimensions of an array lie within its first bytes: MATLAB has at most 32 dimensions.
+# Flags and dimensions of an array are within its first bytes: MATLAB has at most 32 dimensions.
 _HEAD = 256
 _MATRIX, _COMPRESSED = 14, 15
 _NUMBER_SIZES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8}
@@ -25,11 +25,11 @@ _NUMERIC_CLASSES = range(6, 16)
 _COMPLEX = 1 << 11
 
 
-def check_whole(path: Path) -> None:
-    """Raises RecordingError, with the byte, if the file is cut off or damaged."""
+def check_complete(path: Path) -> None:
+    """Raise RecordingError, with the byte, if the file is cut off or damaged."""
     content = path.read_bytes()
     if not content.startswith(MAGIC) or len(content) < _HEADER:
-        raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with: save(name, ..., '-v7')")
+        raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
     order = ">" if content[126:128] == b"MI" else "<"
     _refuse_bomb(path, content, order)
     at = _HEADER
@@ -49,7 +49,7 @@ def check_whole(path: Path) -> None:
 
 
 def _refuse_bomb(path: Path, content: bytes, order: str) -> None:
-    """Refuse a file whose elements, or the numbers of its arrays, need far more memory than it, before unpacking it."""
+    """Raise RecordingError, before decompression, if the elements or arrays need far more memory than the file."""
     at, unpacked, numbers = _HEADER, 0, 0
     with suppress(ValueError, struct.error, zlib.error):  # damage is reported with its byte later
         while at < len(content):
@@ -57,8 +57,8 @@ def _refuse_bomb(path: Path, content: bytes, order: str) -> None:
             element = content[start : start + min(size, _HEAD)]
             if kind == _COMPRESSED:
                 element = zlib.decompressobj().decompress(content[start : start + size], _HEAD)
-                kind, claimed = struct.unpack_from(f"{order}II", element)
-                unpacked += claimed
+                kind, declared = struct.unpack_from(f"{order}II", element)
+                unpacked += declared
                 element = element[8:]
             if kind == _MATRIX:
                 with suppress(ValueError, struct.error):
@@ -68,7 +68,7 @@ def _refuse_bomb(path: Path, content: bytes, order: str) -> None:
 
 
 def _array_size(element: bytes, order: str) -> int:
-    """How many numbers an array has by the dimensions in its first bytes; 0 where it holds none."""
+    """Return the number of values that the dimensions in an array's first bytes declare; 0 if it is not numeric."""
     if struct.unpack_from(f"{order}I", element, 8)[0] & 0xFF not in _NUMERIC_CLASSES:
         return 0
     size = struct.unpack_from(f"{order}I", element, 20)[0]
@@ -77,25 +77,25 @@ def _array_size(element: bytes, order: str) -> int:
 
 
 def _tag(content: bytes, at: int, order: str) -> tuple[int, int, int]:
-    """Kind, start and size of the element at a byte; raises ValueError where it does not lie in the content."""
+    """Return kind, start and size of the element at a byte; raises ValueError if it extends beyond the content."""
     kind, size = struct.unpack_from(f"{order}II", content, at)
     start = at + 8
     if kind >> 16:  # a small element: kind and size in two bytes each, the data in the other four
         kind, size, start = kind & 0xFFFF, kind >> 16, at + 4
         if size > 4:
-            raise ValueError(f"a small element claims {size} bytes")
+            raise ValueError(f"a small element declares {size} bytes")
     if start + size > len(content):
-        raise ValueError(f"an element claims {size} bytes where {len(content) - start} are left")
+        raise ValueError(f"an element declares {size} bytes, but only {len(content) - start} are left")
     return kind, start, size
 
 
 def _inflated(packed: bytes, order: str) -> tuple[int, bytes]:
-    # Never more than the element says of itself: its size is known from its first bytes.
+    # Decompress at most the size that the element declares in its first bytes.
     stream = zlib.decompressobj()
     kind, size = struct.unpack(f"{order}II", stream.decompress(packed, 8))
     content = stream.decompress(stream.unconsumed_tail, size) if size else b""
     if len(content) < size:
-        raise ValueError(f"an element claims {size} bytes and holds {len(content)}")
+        raise ValueError(f"an element declares {size} bytes and has {len(content)}")
     return kind, content
 
 
@@ -114,9 +114,9 @@ def _check_array(content: bytes, order: str) -> None:
     for _ in range(2 if flags & _COMPLEX else 1):
         kind, at, size = _tag(content, _padded(at + size), order)
         if kind not in _NUMBER_SIZES:
-            raise ValueError(f"an array holds numbers of an unknown kind ({kind})")
+            raise ValueError(f"the numbers of an array are of an unknown kind ({kind})")
         if size != count * _NUMBER_SIZES[kind]:
-            raise ValueError(f"an array of {count} numbers holds {size} bytes")
+            raise ValueError(f"an array of {count} numbers has {size} bytes")
 
 
 def _padded(at: int) -> int:

@@ -1,6 +1,6 @@
-"""Writing a recording as MCAP: a topic a clock, a message a sample, in a ROS 2 type that its columns define.
+"""Write a recording as MCAP: one topic per clock, one message per sample, with a ROS 2 type defined by the columns.
 
-A message's time is a whole number of nanoseconds; `time_s` in it is the exact one, so that nothing is lost.
+A message's log time is a whole number of nanoseconds; its field `time_s` is the exact time, so that nothing is lost.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts, Written, need_clocks, stored
+from cdtool.formats.groups import UNVERIFIED, Group, Part, Parts, WrittenNames, prefix_keys, require_clocks
 from cdtool.formats.mcap.exact_times import EXACT_TIME, METADATA, PACKAGE
 from cdtool.recording import FloatArray
 
@@ -22,28 +22,28 @@ _SECOND = 10**9
 _ROWS = 2**14
 
 
-def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-    """Write the groups, message by message in the order of their times; names are `/clock_1 torque`."""
+def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
+    """Write the groups, message by message in the order of their times; the names have the form `/clock_1 torque`."""
     from mcap.writer import CompressionType, Writer
 
-    need_clocks(path, groups)
+    require_clocks(path, groups)
     start = _start(groups, float(provenance.get("origin_s", "0")))
     fields = [_field_names([column.name for column in group.columns]) for group in groups]
     with path.open("wb") as file:
-        # What no checksum covered in the log gets none here: it would be stamped as good.
+        # Messages without a checksum in the log get none here: a checksum would mark them as verified.
         checked = UNVERIFIED not in provenance
         writer: Any = Writer(file, compression=CompressionType.ZSTD, enable_crcs=checked)
         writer.start(profile="ros2", library="cdtool")
-        writer.add_metadata(METADATA, stored(provenance))
+        writer.add_metadata(METADATA, prefix_keys(provenance))
         channels = []
         for group, names in zip(groups, fields, strict=True):
             schema = writer.register_schema(_type_name(group), "ros2msg", _definition(group, names).encode())
             channels.append(writer.register_channel(f"/{group.name}", "cdr", schema))
         done = [0] * len(groups)
         for ready in parts:
-            for which, stamp, payload in _messages(ready, start):
-                writer.add_message(channels[which], stamp, payload, stamp, done[which])
-                done[which] += 1
+            for number, stamp, payload in _messages(ready, start):
+                writer.add_message(channels[number], stamp, payload, stamp, done[number])
+                done[number] += 1
         writer.finish()
     return [
         [
@@ -55,14 +55,14 @@ def write_mcap_topics(path: Path, groups: Sequence[Group], parts: Parts, provena
 
 
 def _start(groups: Sequence[Group], origin: float) -> int:
-    """Nanoseconds of time 0; an earlier time than 0 ns cannot be written, and moves all."""
+    """Return the log time [ns] of time 0; it is later than the origin if the earliest log time would be negative."""
     earliest = min((group.start for group in groups if group.rows), default=0.0)
     start = round(origin * _SECOND)
     return max(start, math.ceil(-earliest * _SECOND)) if earliest < 0.0 else start
 
 
 def _messages(ready: Sequence[Part | None], start: int) -> Iterator[tuple[int, int, bytes]]:
-    """(group, stamp, payload) in the order of the stamps; at equal ones in the order of the groups."""
+    """Yield (group, stamp, payload) in the order of the stamps; equal stamps in the order of the groups."""
     stamps = [start + np.rint(_time(part) * _SECOND).astype(np.int64) for part in ready]
     which = np.repeat(np.arange(len(ready)), [len(part) for part in stamps])
     row = np.concatenate([np.arange(len(part)) for part in stamps])
@@ -80,7 +80,7 @@ def _time(part: Part | None) -> FloatArray:
 
 
 def _packed(part: Part | None, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Iterator[bytes]:
-    """CDR of those rows."""
+    """Yield these rows in CDR."""
     if part is None:
         return iter(())
     table = np.column_stack([_time(part)[rows], *(column[rows] for column in part.values)]).astype("<f8")
@@ -101,13 +101,13 @@ def _type_name(group: Group) -> str:
 
 
 def _field_names(names: Sequence[str]) -> list[str]:
-    """Names as ROS 2 allows them: small letters, digits, single underscores; each once."""
-    found: list[str] = []
+    """Return unique names that ROS 2 allows: lower-case letters, digits, single underscores."""
+    fields: list[str] = []
     for name in names:
         plain = re.sub(r"_+", "_", re.sub(r"[^a-z0-9]", "_", name.lower())).strip("_")
         plain = plain if plain[:1].isalpha() else f"column_{plain}".rstrip("_")
-        made, number = plain, 2
-        while made in found or made == EXACT_TIME:
-            made, number = f"{plain}_{number}", number + 1
-        found.append(made)
-    return found
+        field, number = plain, 2
+        while field in fields or field == EXACT_TIME:
+            field, number = f"{plain}_{number}", number + 1
+        fields.append(field)
+    return fields

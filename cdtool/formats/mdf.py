@@ -21,24 +21,24 @@ from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.containers import NeverFinalised, ValuesCutOff
-from cdtool.formats.column_names import asked_keys
-from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
-from cdtool.formats.groups import Group, Parts, Written, need_clocks, stored
-from cdtool.formats.pieces import InPieces, Pieces
-from cdtool.formats.slices import Sliced, header_of, side_by_side
+from cdtool.formats.column_names import requested_keys
+from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
+from cdtool.formats.groups import Group, Parts, WrittenNames, prefix_keys, require_clocks
+from cdtool.formats.pieces import Pieces, PiecewiseFormat
+from cdtool.formats.slices import SlicedColumn, header_of, interleave
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _MAGICS = (b"MDF     ", b"UnFinMF ")
-# A conversion by a formula is a text that a library would evaluate: only plain arithmetic is let through.
+# A library would evaluate the text of a conversion formula: only plain arithmetic is accepted.
 _ARITHMETIC = re.compile(r"[0-9Xx.eE+\-*/() ]*")
 _ORIGIN = re.compile(r"^cdtool\.origin_s: (\S+)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
-class Mdf(InPieces):
-    """MDF files: a column is a channel, with its group's number before it where several groups have one of that name.
+class Mdf(PiecewiseFormat):
+    """MDF files: a column is a channel, prefixed with its group's number if several groups have a channel of that name.
 
     Each group's master channel is the clock of its channels. Attachments are not opened.
     """
@@ -47,15 +47,15 @@ class Mdf(InPieces):
     suffixes: ClassVar[tuple[str, ...]] = (".mf4", ".mdf", ".mf3")
 
     def sniff(self, path: Path) -> bool:
-        """True if the file starts as MDF does."""
+        """Return whether the file starts like an MDF file."""
         with path.open("rb") as file:
             return file.read(8) in _MAGICS
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         asammdf = library("asammdf", "mdf", path)
-        logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # what it says comes as an error or a finding
+        logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its problems are reported as errors or findings
         if not self.sniff(path):
-            raise RecordingError(f"{path}: is no MDF file", "see cdtool list formats")
+            raise RecordingError(f"{path}: is not an MDF file", "see cdtool list formats")
         findings: list[Finding] = []
         with path.open("rb") as file:
             unfinished = file.read(8) == _MAGICS[1]
@@ -63,29 +63,32 @@ class Mdf(InPieces):
             if unfinished:
                 findings.append(Finding(NeverFinalised(), severity="loss"))
             channels = _channels(log, findings)
-            keys = [key for key in asked_keys(path, wanted, tuple(channels)) if some is None or key in some]
+            keys = [key for key in requested_keys(path, wanted, tuple(channels)) if some is None or key in some]
             if not keys:
-                raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
+                raise RecordingError(f"{path}: has no channel of numbers", "see cdtool info")
             check_size(path, sum(log.groups[channels[key][0]].channel_group.cycles_nr for key in keys))
-            columns: list[Sliced] = []
+            columns: list[SlicedColumn] = []
             for key in keys:
                 column = _column(log, key, *channels[key], findings)
                 if column is not None:
                     columns.append(column)
                 elif wanted is not None:
-                    raise RecordingError(f"{path}: channel '{key}' holds no numbers", "name another one")
+                    raise RecordingError(f"{path}: channel '{key}' is not numeric", "map another channel")
             if not columns:
-                raise RecordingError(f"{path}: holds no channel of numbers", "see cdtool info")
-            yield from side_by_side(columns)
-            told = _ORIGIN.search(str(log.header.description)) if hasattr(log.header, "description") else None
+                raise RecordingError(f"{path}: has no channel of numbers", "see cdtool info")
+            yield from interleave(columns)
+            stated = _ORIGIN.search(str(log.header.description)) if hasattr(log.header, "description") else None
             details = {"version": str(log.version), "start": str(log.start_time)}
         headers = {column.name: header_of(column) for column in columns}
-        found, origin = tuple(dict.fromkeys(findings)), float(told[1]) if told else 0.0
-        return Source(path, self.name, headers, origin, found, details, tuple(channels))
+        origin = float(stated[1]) if stated else 0.0
+        return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, tuple(channels))
 
 
 def _opened(asammdf: Any, path: Path) -> Any:
-    """The open log. What asammdf leaves half made of a damaged file complains when it is destroyed: not heard here."""
+    """Return the open log.
+
+    Objects that asammdf has created from a damaged file raise when they are destroyed; these errors are suppressed.
+    """
     hook = sys.unraisablehook
     try:
         return asammdf.MDF(path)
@@ -99,40 +102,40 @@ def _opened(asammdf: Any, path: Path) -> Any:
 
 
 def _channels(log: Any, findings: list[Finding]) -> dict[str, tuple[int, int]]:
-    """Group and place of every channel that may hold numbers, by the names of their columns; the masters are none."""
-    every = [
-        (group, place, channel)
+    """Return group and index of every channel that may have numbers, by column name; master channels are left out."""
+    candidates = [
+        (group, index, channel)
         for group, content in enumerate(log.groups)
-        for place, channel in enumerate(content.channels)
-        if log.masters_db.get(group) != place
+        for index, channel in enumerate(content.channels)
+        if log.masters_db.get(group) != index
     ]
-    count = Counter(channel.name for _, _, channel in every)
-    found: dict[str, tuple[int, int]] = {}
-    for group, place, channel in every:
+    count = Counter(channel.name for _, _, channel in candidates)
+    channels: dict[str, tuple[int, int]] = {}
+    for group, index, channel in candidates:
         name = channel.name if count[channel.name] == 1 else f"{group}/{channel.name}"
-        while name in found:
+        while name in channels:
             name += "'"
         formula = str(getattr(channel.conversion, "formula", "") or "")
         if not log.groups[group].channel_group.cycles_nr:
-            findings.append(left_out(name, "empty"))
+            findings.append(left_out_finding(name, "empty"))
         elif not _ARITHMETIC.fullmatch(formula):
-            findings.append(left_out(name, f"given by the formula '{formula[:40]}', which is not evaluated"))
+            findings.append(left_out_finding(name, f"defined by the formula '{formula[:40]}', which is not evaluated"))
         else:
-            found[name] = (group, place)
-    return found
+            channels[name] = (group, index)
+    return channels
 
 
-def _column(log: Any, key: str, group: int, place: int, findings: list[Finding]) -> Sliced | None:
-    """A channel as a column; None, and told, where it holds no numbers."""
-    first = _signal(log, group, place, 0, 1)
+def _column(log: Any, key: str, group: int, index: int, findings: list[Finding]) -> SlicedColumn | None:
+    """Return a channel as a column; None, with a finding, if its values are not numbers."""
+    first = _signal(log, group, index, 0, 1)
     if first.samples.dtype.kind not in "biuf" or first.samples.ndim != 1:
         kind = "of texts" if first.samples.dtype.kind in "SUO" else "an array or a structure"
-        findings.append(left_out(key, kind))
+        findings.append(left_out_finding(key, kind))
         return None
     rows = int(log.groups[group].channel_group.cycles_nr)
 
     def values(start: int, end: int) -> FloatArray:
-        signal = _signal(log, group, place, start, end)
+        signal = _signal(log, group, index, start, end)
         numbers = as_numbers(key, signal.samples, findings)
         if signal.invalidation_bits is not None and np.any(signal.invalidation_bits):
             numbers = np.where(np.asarray(signal.invalidation_bits), np.nan, numbers)
@@ -143,39 +146,39 @@ def _column(log: Any, key: str, group: int, place: int, findings: list[Finding])
 
     factor = _time_factor(log, group)
     if factor is None:
-        return Sliced(key, rows, values, unit=first.unit or None)
+        return SlicedColumn(key, rows, values, unit=first.unit or None)
 
     def time(start: int, end: int) -> FloatArray:
-        times = np.asarray(_signal(log, group, place, start, end).timestamps, dtype=np.float64)
+        times = np.asarray(_signal(log, group, index, start, end).timestamps, dtype=np.float64)
         return times if factor == 1.0 else times * factor
 
-    return Sliced(key, rows, values, str(group), time, first.unit or None)
+    return SlicedColumn(key, rows, values, str(group), time, first.unit or None)
 
 
-def _signal(log: Any, group: int, place: int, start: int, end: int) -> Any:
-    """Some rows of a channel."""
+def _signal(log: Any, group: int, index: int, start: int, end: int) -> Any:
+    """Return the rows from `start` to before `end` of a channel."""
     return log.get(
-        group=group, index=place, ignore_invalidation_bits=True, record_offset=start, record_count=end - start
+        group=group, index=index, ignore_invalidation_bits=True, record_offset=start, record_count=end - start
     )
 
 
 def _time_factor(log: Any, group: int) -> float | None:
-    """From the master's unit to seconds; None where it is no time (an angle, a distance)."""
+    """Return the factor from the master's unit to seconds; None if the master is an angle or a distance."""
     master = log.masters_db.get(group)
     unit = None if master is None else find_unit(log.groups[group].channels[master].unit or "s")
     return unit.factor if unit is not None and unit.si == "s" else None
 
 
-def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-    """Write MDF 4.10: a channel a column with its unit, a group a clock; provenance as the file's comment."""
+def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
+    """Write MDF 4.10: one channel per column with its unit, one group per clock; provenance as the file's comment."""
     asammdf = library("asammdf", "mdf", path)
-    need_clocks(path, groups)
+    require_clocks(path, groups)
     shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with asammdf.MDF(version="4.10") as log:
-        # The log's own start, or the epoch's: the moment of writing would make other bytes of the same log.
+        # The log's own start, or the epoch: with the time of writing the same log would give different bytes.
         start = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=float(provenance.get("origin_s", "0")))
         log.header.start_time = start
-        log.header.comment = "\n".join(f"{key}: {value}" for key, value in stored(provenance).items())
+        log.header.comment = "\n".join(f"{key}: {value}" for key, value in prefix_keys(provenance).items())
         for group in groups:
             signals = [
                 asammdf.Signal(samples=np.empty(0), timestamps=np.empty(0), name=part.name, unit=part.unit or "")
@@ -184,9 +187,9 @@ def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Map
             log.append(signals, acq_name=group.name, comment=group.name, common_timebase=True)
         for ready in parts:
             for number, part in enumerate(ready):
-                if part is not None:  # kept by asammdf in a temporary file
+                if part is not None:  # asammdf buffers it in a temporary file
                     log.extend(number, [(values, None) for values in (part.time, *part.flat)])
-        with path.open("wb+") as file:  # by its name asammdf would give it another suffix
+        with path.open("wb+") as file:  # given a path, asammdf would change the suffix
             log.save(file)
     return [
         [[f"{number}/{p.name}" if shared[p.name] > 1 else p.name for p in parts] for parts in group.flat]

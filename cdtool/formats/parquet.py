@@ -1,4 +1,4 @@
-"""Parquet and Feather (Arrow IPC): tables of columns with types, by pyarrow."""
+"""Parquet and Feather (Arrow IPC): tables of typed columns, by pyarrow."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import StampsAsSeconds
 from cdtool.findings.containers import CutBehindRow
-from cdtool.formats.column_names import OWN_CLOCK, asked_keys, split_unit
-from cdtool.formats.container_checks import as_numbers, check_size, left_out, library, one_line_errors
+from cdtool.formats.column_names import OWN_CLOCK, requested_keys, split_unit
+from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.parquet_check import check_batches, check_pages
-from cdtool.formats.pieces import VALUES_A_PIECE, InPieces, Pieces
+from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 
 _PARQUET, _ARROW = b"PAR1", b"ARROW1"
 _UNIT_KEYS = (b"unit", b"units", b"Unit")
-# In the metadata of a table that cdtool wrote from several clocks.
+# Metadata key of a table that cdtool wrote from several clocks.
 OWN_CLOCKS = b"cdtool.own_clocks"
 _FEWEST_ROWS = 2**12
 
 
 @dataclass(frozen=True)
-class Parquet(InPieces):
-    """Tables of Arrow's kind, `.parquet` and `.feather`: a missing value (null) is NaN, a time stamp seconds."""
+class Parquet(PiecewiseFormat):
+    """Arrow tables, `.parquet` and `.feather`: a missing value (null) becomes NaN, a time stamp becomes seconds."""
 
     name: ClassVar[str] = "parquet"
     suffixes: ClassVar[tuple[str, ...]] = (".parquet", ".feather", ".arrow")
 
     def sniff(self, path: Path) -> bool:
-        """True if the file starts as Parquet or Arrow writes it."""
+        """Return whether the file starts like a Parquet or Arrow file."""
         with path.open("rb") as file:
             head = file.read(len(_ARROW))
         return head == _ARROW or head.startswith(_PARQUET)
@@ -46,27 +46,27 @@ class Parquet(InPieces):
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         arrow = library("pyarrow", "parquet", path)
         if not self.sniff(path):
-            raise RecordingError(f"{path}: is no Parquet or Feather file", "see cdtool list formats")
+            raise RecordingError(f"{path}: is not a Parquet or Feather file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "a Parquet or Feather file"):
-            table = _Table(path, arrow, findings)
+            table = _ArrowTable(path, arrow, findings)
             names = tuple(table.schema.names)
-            keys = [key for key in asked_keys(path, wanted, names) if some is None or key in some]
+            keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
             read = [key for key in keys if table.is_number(key)]
-            findings += [left_out(key, str(table.schema.field(key).type)) for key in keys if key not in read]
-            lost = [key for key in keys if key not in read]
-            if wanted is not None and lost:
-                raise RecordingError(f"{path}: column '{lost[0]}' holds no numbers", "name another column")
+            findings += [left_out_finding(key, str(table.schema.field(key).type)) for key in keys if key not in read]
+            not_read = [key for key in keys if key not in read]
+            if wanted is not None and not_read:
+                raise RecordingError(f"{path}: column '{not_read[0]}' is not numeric", "map another column")
             if not read:
-                raise RecordingError(f"{path}: holds no column of numbers", "see cdtool info")
+                raise RecordingError(f"{path}: has no column of numbers", "see cdtool info")
             yield from table.pieces(read)
         details = {"rows": str(table.rows), "container": table.kind}
-        found = tuple(dict.fromkeys(findings))
-        return Source(path, self.name, table.headers(read), table.origin, found, details, names)
+        unique = tuple(dict.fromkeys(findings))
+        return Source(path, self.name, table.headers(read), table.origin, unique, details, names)
 
 
-class _Table:
-    """A file's schema and rows, whichever of the two containers it is; `rows` holds once they were read."""
+class _ArrowTable:
+    """Schema and rows of a file in either container; `rows` is their number after `pieces` has read them."""
 
     def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
         self.path, self.arrow, self.findings = path, arrow, findings
@@ -85,40 +85,40 @@ class _Table:
         self._starts: dict[str, Any] = {}  # of columns of time stamps
 
     def is_number(self, key: str) -> bool:
-        """True for numbers, booleans and time stamps."""
+        """Return whether a column has numbers, booleans or time stamps."""
         types, kind = self.arrow.types, self.schema.field(key).type
         return bool(
             types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_timestamp(kind)
         )
 
     def headers(self, keys: Sequence[str]) -> dict[str, Column]:
-        """The columns without their rows."""
+        """Return the columns without their rows."""
         own = np.empty(0) if self.own_clocks else None
-        kept = [key for key in keys if not (self.own_clocks and key == OWN_CLOCK)]
-        return {key: Column(key, np.empty(0), own, self._unit(key)) for key in kept}
+        values = [key for key in keys if not (self.own_clocks and key == OWN_CLOCK)]
+        return {key: Column(key, np.empty(0), own, self._unit(key)) for key in values}
 
     def pieces(self, keys: Sequence[str]) -> Iterator[Piece]:
-        """The rows of these columns, a group of rows at a time."""
+        """Yield the rows of these columns, one group of rows at a time."""
         read = list(dict.fromkeys((*keys, OWN_CLOCK) if self.own_clocks else keys))
         for batch in self._batches(read):
             self.rows += batch.num_rows
             check_size(self.path, self.rows * len(keys))
-            found = {key: self._numbers(key, batch.column(batch.schema.get_field_index(key))) for key in read}
+            columns = {key: self._numbers(key, batch.column(batch.schema.get_field_index(key))) for key in read}
             if not self.own_clocks:
-                yield Piece("", None, {key: values for key, (values, _) in found.items()}, batch.num_rows)
+                yield Piece("", None, {key: values for key, (values, _) in columns.items()}, batch.num_rows)
                 continue
-            time, _ = found.pop(OWN_CLOCK)
-            for key, (values, absent) in found.items():
-                # Written by cdtool from several clocks: no value (null) means no sample of this column then.
+            time, _ = columns.pop(OWN_CLOCK)
+            for key, (values, absent) in columns.items():
+                # Written by cdtool from several clocks: null means that this column has no sample at this time.
                 yield Piece(key, time[~absent], {key: values[~absent]}, int(np.count_nonzero(~absent)))
 
     def _of_parquet(self, keys: Sequence[str]) -> Iterator[Any]:
         check_size(self.path, self._file.metadata.num_rows * len(keys))
         check_pages(self.path, self._file.metadata, keys)
-        return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_A_PIECE // len(keys)), columns=list(keys)))
+        return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)))
 
     def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
-        """Values, and which of them are absent (null)."""
+        """Return the values, and which of them are absent (null)."""
         absent = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
         if self.arrow.types.is_timestamp(column.type):
             return self._seconds(key, column.to_numpy(zero_copy_only=False).astype("datetime64[ns]"))
@@ -126,7 +126,7 @@ class _Table:
         return as_numbers(key, values.to_numpy(zero_copy_only=False), self.findings), absent
 
     def _seconds(self, key: str, stamps: Any) -> tuple[FloatArray, Any]:
-        """A time stamp as seconds from the first: what float64 can hold exactly."""
+        """Return time stamps as seconds after the first one, which float64 can represent, and which are absent."""
         absent = np.isnat(stamps)
         if key not in self._starts and not absent.all():
             self._starts[key] = stamps[~absent][0]
@@ -139,12 +139,12 @@ class _Table:
         if self.arrow.types.is_timestamp(self.schema.field(key).type):
             return "s"
         metadata = self.schema.field(key).metadata or {}
-        told = next((metadata[name].decode("utf-8", "replace") for name in _UNIT_KEYS if name in metadata), None)
-        return told or split_unit(key)[1]
+        stated = next((metadata[name].decode("utf-8", "replace") for name in _UNIT_KEYS if name in metadata), None)
+        return stated or split_unit(key)[1]
 
 
 class _Feather:
-    """An Arrow file by its record batches; of one that is cut off those before the cut."""
+    """An Arrow file as record batches; if the file is cut off, only the batches before the cut."""
 
     def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
         self._path, self._arrow, self._findings = path, arrow, findings
@@ -159,16 +159,16 @@ class _Feather:
                 self.schema = self._stream(stream).schema
 
     def batches(self, keys: Sequence[str]) -> Iterator[Any]:
-        """The columns `keys`, batch by batch; Arrow trusts what a file declares unless it is asked to check."""
-        for batch in self._read() if self._whole is None else map(self._whole.get_batch, self._numbers()):
+        """Yield the columns `keys`, batch by batch. Arrow does not check a file's declarations without `validate`."""
+        for batch in self._before_cut() if self._whole is None else map(self._whole.get_batch, self._batch_numbers()):
             batch.validate(full=True)
             yield batch.select(list(keys))
 
-    def _numbers(self) -> range:
+    def _batch_numbers(self) -> range:
         return range(self._whole.num_record_batches)
 
-    def _read(self) -> Iterator[Any]:
-        """What lies before a cut."""
+    def _before_cut(self) -> Iterator[Any]:
+        """Yield the batches before the cut."""
         rows = 0
         with self._path.open("rb") as stream, suppress(self._arrow.ArrowInvalid, OSError, StopIteration):
             reader = self._stream(stream)
@@ -179,5 +179,5 @@ class _Feather:
         self._findings.append(Finding(CutBehindRow(rows), severity="loss"))
 
     def _stream(self, stream: Any) -> Any:
-        stream.seek(8)  # behind the magic bytes and their padding an Arrow file is a stream
+        stream.seek(8)  # after the magic bytes and their padding, an Arrow file is a stream
         return self._ipc.open_stream(stream)

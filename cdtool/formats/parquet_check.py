@@ -1,6 +1,6 @@
-"""How much do the pages of a Parquet file unpack to? Its library allots whatever a page's header claims.
+"""Check to what size the pages of a Parquet file decompress: its library allocates what a page's header declares.
 
-The footer's figures may be others: headers are walked, page by page. They are written in Thrift's compact protocol.
+The sizes in the footer may differ, so that the headers are read page by page. They use Thrift's compact protocol.
 https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift, struct PageHeader
 """
 
@@ -18,7 +18,7 @@ from cdtool.formats.container_checks import check_size
 
 _UNPACKED, _PACKED = 2, 3  # fields of a page's header
 _BINARY, _LIST, _SET, _MAP, _STRUCT = 8, 9, 10, 11, 12
-_SIZES = {1: 0, 2: 0, 3: 1, 7: 8}  # types of a fixed size: true, false, a byte, a double
+_SIZES = {1: 0, 2: 0, 3: 1, 7: 8}  # types of fixed size: true, false, byte, double
 _FIRST, _MAGIC = 8, b"ARROW1"
 _CONTINUED = 0xFFFFFFFF
 _DICTIONARY, _BATCH = 2, 3
@@ -26,9 +26,9 @@ _BLOCK = 24
 
 
 def check_pages(path: Path, metadata: Any, keys: Collection[str]) -> None:
-    """Refuse a Parquet file whose columns `keys` unpack to far more than a log; raises RecordingError.
+    """Raise RecordingError if the columns `keys` of a Parquet file decompress to far more than a log.
 
-    `metadata` is its footer, as pyarrow reads it.
+    `metadata` is the file's footer as read by pyarrow.
     """
     columns = [j for j in range(metadata.num_columns) if metadata.schema.column(j).path in keys]
     values = unpacked = 0
@@ -42,12 +42,12 @@ def check_pages(path: Path, metadata: Any, keys: Collection[str]) -> None:
 
 
 def _unpacked(path: Path, content: mmap.mmap, chunk: Any) -> int:
-    """To how many bytes a column's pages in one row group unpack."""
+    """Return the decompressed size [bytes] of a column's pages in one row group."""
     at = min(chunk.dictionary_page_offset or chunk.data_page_offset, chunk.data_page_offset)
     end, total = at + chunk.total_compressed_size, 0
     while at < end:
         try:
-            fields, at = _Header(content, at).numbers()
+            fields, at = _PageHeader(content, at).numbers()
         except IndexError:
             fields = {}
         if min(fields.get(_PACKED, -1), fields.get(_UNPACKED, -1)) < 0:
@@ -57,24 +57,24 @@ def _unpacked(path: Path, content: mmap.mmap, chunk: Any) -> int:
     return total
 
 
-class _Header:
-    """A struct of Thrift's compact protocol; raises IndexError at the file's end."""
+class _PageHeader:
+    """A struct of Thrift's compact protocol; reading raises IndexError at the file's end."""
 
     def __init__(self, content: mmap.mmap, at: int) -> None:
         self.content, self.at = content, at
 
     def numbers(self) -> tuple[dict[int, int], int]:
-        """Its integers by the numbers of their fields, and where it ends."""
-        found: dict[int, int] = {}
+        """Return the integers by field number, and the byte where the struct ends."""
+        integers: dict[int, int] = {}
         number = 0
         while head := self._byte():
             kind, step = head & 15, head >> 4
             number = number + step if step else self._integer()
             if 4 <= kind <= 6:
-                found[number] = self._integer()
+                integers[number] = self._integer()
             else:
                 self._skip(kind)
-        return found, self.at
+        return integers, self.at
 
     def _skip(self, kind: int) -> None:
         if kind == _STRUCT:
@@ -98,7 +98,7 @@ class _Header:
             self._varint()
 
     def _skip_element(self, kind: int) -> None:
-        """As a field, but that a truth value takes a byte."""
+        """Skip an element of a list: like a field, except that a boolean has one byte."""
         if self.at >= len(self.content):
             raise IndexError("the file ends")
         if kind in (1, 2):
@@ -119,82 +119,82 @@ class _Header:
             if byte < 128:
                 return value
             if shift > 63:
-                raise IndexError("no integer")
+                raise IndexError("an integer of more than 64 bits")
 
     def _integer(self) -> int:
-        """Zigzag: the sign is the lowest bit."""
+        """Return an integer in zigzag encoding, whose lowest bit is the sign."""
         value = self._varint()
         return (value >> 1) ^ -(value & 1)
 
 
 def check_batches(path: Path) -> None:
-    """Refuse a Feather (Arrow IPC) file whose compressed batches unpack to far more than a log; raises RecordingError.
+    """Raise RecordingError if the compressed batches of a Feather (Arrow IPC) file decompress to far more than a log.
 
-    Arrow allots whatever a compressed buffer claims before it looks. The file's messages are walked, both one behind
-    the other and where the footer points; of a compressed batch each buffer begins with the number of bytes it unpacks
-    to (https://arrow.apache.org/docs/format/Columnar.html#ipc-file-format). Damage is not looked for: where a message
-    cannot be walked, Arrow will not read it either.
+    Arrow allocates the size that a compressed buffer declares before it decompresses the buffer. The file's messages
+    are read both in sequence and at the positions that the footer names. Each buffer of a compressed batch starts with
+    its decompressed size (https://arrow.apache.org/docs/format/Columnar.html#ipc-file-format). Damage is not reported:
+    Arrow does not read a damaged message either.
     """
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        claimed = 0
+        declared = 0
         for at in sorted({*_in_sequence(content), *_in_footer(content)}):
             try:
-                claimed += _claimed(content, at)
+                declared += _declared_size(content, at)
             except (struct.error, IndexError, ValueError):
                 continue
-            check_size(path, claimed // 8)
+            check_size(path, declared // 8)
 
 
 @dataclass(frozen=True)
-class _Table:
-    """A table of a flatbuffer: a vtable says at which byte a field lies, if it is there."""
+class _FlatbufferTable:
+    """A table of a flatbuffer: its vtable states the byte of each field that is present."""
 
     content: mmap.mmap
     at: int
 
     def field(self, number: int) -> int:
-        """Where a field lies, 0 if it is not there."""
+        """Return the byte of a field; 0 if the field is absent."""
         vtable = self.at - _read(self.content, "<i", self.at)
-        place = 4 + 2 * number
-        if place >= _read(self.content, "<H", vtable):
+        entry = 4 + 2 * number
+        if entry >= _read(self.content, "<H", vtable):
             return 0
-        offset = _read(self.content, "<H", vtable + place)
+        offset = _read(self.content, "<H", vtable + entry)
         return self.at + offset if offset else 0
 
-    def table(self, number: int) -> _Table | None:
-        """A field that is a table."""
-        place = self.field(number)
-        return _Table(self.content, _pointed(self.content, place)) if place else None
+    def table(self, number: int) -> _FlatbufferTable | None:
+        """Return a field that is a table; None if the field is absent."""
+        at = self.field(number)
+        return _FlatbufferTable(self.content, _target(self.content, at)) if at else None
 
     def vector(self, number: int) -> tuple[int, int]:
-        """Where a field's elements begin, and how many they are."""
-        place = self.field(number)
-        if not place:
+        """Return the byte of a field's first element, and the number of elements."""
+        at = self.field(number)
+        if not at:
             return 0, 0
-        start = _pointed(self.content, place)
+        start = _target(self.content, at)
         return start + 4, _read(self.content, "<I", start)
 
 
-def _claimed(content: mmap.mmap, at: int) -> int:
-    """To how many bytes the compressed buffers of the message at that byte unpack, as they say."""
+def _declared_size(content: mmap.mmap, at: int) -> int:
+    """Return the decompressed size [bytes] that the compressed buffers of the message at that byte declare."""
     message, body = _message(content, at)
-    kind = message.field(1)
+    kind_at = message.field(1)
     header = message.table(2)
-    which = content[kind] if kind else 0
-    batch = header.table(1) if which == _DICTIONARY and header is not None else header
-    if which not in (_DICTIONARY, _BATCH) or batch is None or not batch.field(3):
+    kind = content[kind_at] if kind_at else 0
+    batch = header.table(1) if kind == _DICTIONARY and header is not None else header
+    if kind not in (_DICTIONARY, _BATCH) or batch is None or not batch.field(3):
         return 0
     first, count = batch.vector(2)
-    claimed = 0
-    for place in range(first, min(first + 16 * count, len(content)), 16):
-        offset, length = struct.unpack_from("<qq", content, place)
+    declared = 0
+    for entry in range(first, min(first + 16 * count, len(content)), 16):
+        offset, length = struct.unpack_from("<qq", content, entry)
         if length >= 8:
-            claimed += max(0, _read(content, "<q", body + offset))
-    return claimed
+            declared += max(0, _read(content, "<q", body + offset))
+    return declared
 
 
 def _in_sequence(content: mmap.mmap) -> Iterator[int]:
-    """Where messages begin, one behind the other from the file's start; up to the first that is not whole."""
+    """Yield the bytes where consecutive messages start, from the file's start to the first incomplete message."""
     at = _FIRST
     while at + 8 <= len(content):
         try:
@@ -210,33 +210,33 @@ def _in_sequence(content: mmap.mmap) -> Iterator[int]:
 
 
 def _in_footer(content: mmap.mmap) -> Iterator[int]:
-    """Where the footer says that dictionaries and batches begin."""
+    """Yield the bytes where dictionaries and batches start according to the footer."""
     end = len(content) - len(_MAGIC) - 4
     if end < _FIRST or content[-len(_MAGIC) :] != _MAGIC:
         return
     try:
         start = end - _read(content, "<i", end)
-        footer = _Table(content, _pointed(content, start))
+        footer = _FlatbufferTable(content, _target(content, start))
         for number in (_DICTIONARY, _BATCH):
             first, count = footer.vector(number)
-            for place in range(first, min(first + _BLOCK * count, end), _BLOCK):
-                yield _read(content, "<q", place)
+            for block in range(first, min(first + _BLOCK * count, end), _BLOCK):
+                yield _read(content, "<q", block)
     except (struct.error, ValueError):
         return
 
 
-def _message(content: mmap.mmap, at: int) -> tuple[_Table, int]:
-    """The message at that byte, and where its body begins; raises ValueError at the end of the messages."""
+def _message(content: mmap.mmap, at: int) -> tuple[_FlatbufferTable, int]:
+    """Return the message at that byte, and the byte where its body starts; raises ValueError after the last message."""
     size = _read(content, "<I", at)
-    if size == _CONTINUED:  # older files have no such mark
+    if size == _CONTINUED:  # older files do not have this marker
         at += 4
         size = _read(content, "<I", at)
     if not size:
         raise ValueError("no message")
-    return _Table(content, _pointed(content, at + 4)), at + 4 + size
+    return _FlatbufferTable(content, _target(content, at + 4)), at + 4 + size
 
 
-def _pointed(content: mmap.mmap, at: int) -> int:
+def _target(content: mmap.mmap, at: int) -> int:
     return at + int(_read(content, "<I", at))
 
 

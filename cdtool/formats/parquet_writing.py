@@ -1,4 +1,4 @@
-"""Writing recordings as Parquet and Feather (Arrow IPC): one table, piece by piece."""
+"""Write recordings as Parquet and Feather (Arrow IPC): one table, piece by piece."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ import numpy as np
 from cdtool.columns import Column
 from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import library
-from cdtool.formats.groups import Group, Part, Parts, Written, need_clocks, stored
+from cdtool.formats.groups import Group, Part, Parts, WrittenNames, prefix_keys, require_clocks
 from cdtool.formats.parquet import OWN_CLOCKS
 from cdtool.recording import BoolArray, FloatArray
 
-# What is written at once: so many numbers, 8 MiB of them, but no fewer rows.
+# One row group contains this many numbers (8 MiB), but at least this many rows.
 _VALUES, _FEWEST_ROWS = 2**20, 2**14
 
 
-def write_parquet(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
-    """Write one table as Parquet: of several clocks a row for every time, null where a clock has no sample."""
+def write_parquet(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
+    """Write one table as Parquet; with several clocks, one row per time, and null where a clock has no sample."""
     return _write_table(path, groups, parts, provenance, feather=False)
 
 
-def write_feather(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> Written:
+def write_feather(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
     """Write one table as Feather, as `write_parquet` does."""
     return _write_table(path, groups, parts, provenance, feather=True)
 
 
 def _write_table(
     path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str], *, feather: bool
-) -> Written:
+) -> WrittenNames:
     arrow = library("pyarrow", "parquet", path)
     several = len(groups) > 1
     if several:
-        need_clocks(path, groups)
+        require_clocks(path, groups)
     columns = [Column(OWN_CLOCK, np.empty(0), unit="s")] if several or groups[0].own_clock else []
     columns += [column for group in groups for column in chain(*group.flat)]
     fields = [
         arrow.field(column.name, arrow.float64(), metadata={"unit": column.unit} if column.unit else None)
         for column in columns
     ]
-    metadata = stored(provenance) | ({OWN_CLOCKS.decode(): "1"} if several else {})
+    metadata = prefix_keys(provenance) | ({OWN_CLOCKS.decode(): "1"} if several else {})
     schema = arrow.schema(fields, metadata=metadata)
     with _opened(arrow, path, schema, feather=feather) as write:
         for ready in parts:
@@ -55,23 +55,23 @@ def _write_table(
 
 @contextmanager
 def _opened(arrow: Any, path: Path, schema: Any, *, feather: bool) -> Iterator[Callable[[Any], None]]:
-    """What takes the next rows of the file; they wait until a group of rows is full."""
+    """Yield a function that writes the next rows of the file; it buffers them until a row group is full."""
     if feather:
         ipc = library("pyarrow.ipc", "parquet", path)
         writer = ipc.new_file(str(path), schema, options=ipc.IpcWriteOptions(compression="zstd"))
     else:
         writer = library("pyarrow.parquet", "parquet", path).ParquetWriter(path, schema, compression="zstd")
-    waiting: list[Any] = []
-    most = max(_FEWEST_ROWS, _VALUES // len(schema.names))
+    buffered: list[Any] = []
+    group_rows = max(_FEWEST_ROWS, _VALUES // len(schema.names))
 
     def flush() -> None:
-        if waiting:
-            writer.write_table(arrow.concat_tables(waiting).combine_chunks(), most)
-        waiting.clear()
+        if buffered:
+            writer.write_table(arrow.concat_tables(buffered).combine_chunks(), group_rows)
+        buffered.clear()
 
     def write(table: Any) -> None:
-        waiting.append(table)
-        if sum(part.num_rows for part in waiting) >= most:
+        buffered.append(table)
+        if sum(part.num_rows for part in buffered) >= group_rows:
             flush()
 
     with writer:
@@ -87,48 +87,48 @@ def _of_one(arrow: Any, group: Group, part: Part | None) -> list[Any]:
 
 
 def _of_several(arrow: Any, groups: Sequence[Group], ready: Sequence[Part | None]) -> list[Any]:
-    """The times of any clock, then each column at the rows of its own."""
+    """Return the times of all clocks, then each column with its values in the rows of its own clock."""
     times = [np.empty(0) if part is None or part.time is None else part.time for part in ready]
     table, rows = _rows(times)
     arrays = [_array(arrow, table)]
-    for group, part, places in zip(groups, ready, rows, strict=True):
+    for group, part, own in zip(groups, ready, rows, strict=True):
         empty = [np.empty(0)] * len(list(chain(*group.flat)))
-        arrays += [_spread(arrow, values, places, len(table)) for values in (part.flat if part is not None else empty)]
+        arrays += [_spread(arrow, values, own, len(table)) for values in (part.flat if part is not None else empty)]
     return arrays
 
 
 def _rows(times: Sequence[FloatArray]) -> tuple[FloatArray, list[Any]]:
-    """All times in order, and where the samples of each clock go; a time that a clock repeats has a row for each."""
-    turns = [_turns(time) for time in times]
-    time, turn = np.concatenate(times), np.concatenate(turns)
-    order = np.lexsort((turn, time))
+    """Return all times in order, and the rows of each clock's samples; a repeated time has one row per repetition."""
+    repetitions = [_repetitions(time) for time in times]
+    time, repetition = np.concatenate(times), np.concatenate(repetitions)
+    order = np.lexsort((repetition, time))
     new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(time[order]) != 0.0) | (np.diff(turn[order]) != 0)
+    new[1:] = (np.diff(time[order]) != 0.0) | (np.diff(repetition[order]) != 0)
     row = np.empty(len(order), dtype=np.intp)
     row[order] = np.cumsum(new) - 1
     return time[order][new], np.split(row, np.cumsum([len(part) for part in times])[:-1])
 
 
-def _turns(time: FloatArray) -> Any:
-    """How often each time was there before."""
+def _repetitions(time: FloatArray) -> Any:
+    """Return for each time how many earlier samples have the same time."""
     order = np.argsort(time, kind="stable")
     new = np.ones(len(time), dtype=bool)
     new[1:] = np.diff(time[order]) != 0.0
     number = np.arange(len(time))
-    turns = np.empty(len(time), dtype=np.intp)
-    turns[order] = number - np.maximum.accumulate(np.where(new, number, 0))
-    return turns
+    repetitions = np.empty(len(time), dtype=np.intp)
+    repetitions[order] = number - np.maximum.accumulate(np.where(new, number, 0))
+    return repetitions
 
 
 def _spread(arrow: Any, values: FloatArray, rows: Any, count: int) -> Any:
-    """Values at their rows of a longer table, null elsewhere."""
+    """Return values in these rows of a longer table, null in the other rows."""
     spread, absent = np.zeros(count), np.ones(count, dtype=bool)
     spread[rows], absent[rows] = values, False
     return _array(arrow, spread, absent)
 
 
 def _array(arrow: Any, values: FloatArray, absent: BoolArray | None = None) -> Any:
-    """An arrow array of numbers, null where absent; made from its buffers, since pyarrow's own way imports pandas."""
+    """Return an Arrow array of numbers, null where absent; built from buffers, as pyarrow's function imports pandas."""
     data = np.ascontiguousarray(values, dtype=np.float64)
     present = None if absent is None else arrow.py_buffer(np.packbits(~absent, bitorder="little"))
     return arrow.Array.from_buffers(arrow.float64(), len(data), [present, arrow.py_buffer(data)])

@@ -1,6 +1,6 @@
-"""A file piece by piece: for logs that need not fit into memory.
+"""Read a file piece by piece, for logs that need not fit into memory.
 
-A format that can hand its columns over so has a method `pieces`; the columns of any other are a piece a clock.
+A format that supports this has a method `pieces`; the columns of any other format become one piece per clock.
 """
 
 from __future__ import annotations
@@ -18,51 +18,51 @@ from cdtool.columns import Column, Piece
 from cdtool.formats.source import Format, Source
 from cdtool.recording import FloatArray
 
-# What a format cuts its pieces to: 8 MiB of float64, all columns together.
-VALUES_A_PIECE = 1 << 20
+# Size of a piece: 8 MiB of float64, all columns together.
+VALUES_PER_PIECE = 1 << 20
 
 
-# At their end pieces give the source: its columns have names, units and widths, but no rows.
+# The generator's return value is the source, whose columns have names, units and widths, but no rows.
 Pieces = Generator[Piece, None, Source]
 
 
 class MappedLog(Protocol):
-    """The columns of a map piece by piece, as often as is asked for; each column is a clock of its own.
+    """The columns of a channel map, which can be read piece by piece repeatedly; each column has a clock of its own.
 
-    `settled`: the times of the last pass count from the origin that its source has.
+    `settled`: the times of the last pass are relative to the origin of its source.
     """
 
     settled: bool
 
     def pieces(self) -> Pieces:
-        """The columns from the first row on; raises RecordingError."""
+        """Yield the columns from the first row to the last; raises RecordingError."""
         ...
 
 
-def mapped_log(found: Format, path: Path, wanted: ChannelMap) -> MappedLog | None:
-    """The columns that `wanted` names of a file that need not fit into memory; None where the format has none such."""
-    opened: Callable[[Path, ChannelMap], MappedLog] | None = getattr(found, "mapped", None)
-    return None if opened is None else opened(path, wanted)
+def open_mapped_log(file_format: Format, path: Path, wanted: ChannelMap) -> MappedLog | None:
+    """Return the columns that `wanted` names, to be read piece by piece; None if the format does not support it."""
+    opener: Callable[[Path, ChannelMap], MappedLog] | None = getattr(file_format, "mapped", None)
+    return None if opener is None else opener(path, wanted)
 
 
-class InPieces(ABC):
-    """A format that reads a file piece by piece: all of it at once is the join of these pieces."""
+class PiecewiseFormat(ABC):
+    """A format that reads a file piece by piece; `columns` joins the pieces."""
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """Return the columns that `wanted` names, or all numeric ones; raises RecordingError."""
-        return joined(self._read(path, wanted, None), sort=False)
+        """Return the columns that `wanted` names, or all numeric columns; raises RecordingError."""
+        return join_pieces(self._read(path, wanted, None), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
-        """Yield all numeric columns, or those of `keys`, some MiB at a time; raises RecordingError."""
+        """Yield all numeric columns, or the columns `keys`, some MiB at a time; raises RecordingError."""
         return self._read(path, None, keys)
 
     @abstractmethod
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        """Yield the columns of a map, or those of `some`, or all."""
+        """Yield the columns of a channel map, the columns `some`, or all columns."""
 
 
-class Run:
-    """Pieces on their way; `source` holds once they have been run through."""
+class PieceRun:
+    """An iterator over pieces; `source` is set after the last piece."""
 
     def __init__(self, pieces: Pieces) -> None:
         self._pieces = pieces
@@ -72,14 +72,14 @@ class Run:
         self.source = yield from self._pieces
 
 
-def read_pieces(found: Format, path: Path, keys: Collection[str] | None = None) -> Pieces:
-    """All numeric columns of a file piece by piece, or at least those of `keys`; raises RecordingError."""
-    reader: Callable[..., Pieces] | None = getattr(found, "pieces", None)
-    return (yield from (reader(path, keys) if reader is not None else as_pieces(found.columns(path))))
+def read_pieces(file_format: Format, path: Path, keys: Collection[str] | None = None) -> Pieces:
+    """Yield all numeric columns of a file piece by piece, or at least the columns `keys`; raises RecordingError."""
+    reader: Callable[..., Pieces] | None = getattr(file_format, "pieces", None)
+    return (yield from (reader(path, keys) if reader is not None else split_by_clock(file_format.columns(path))))
 
 
-def as_pieces(source: Source) -> Pieces:
-    """A source that is in memory: a piece for each of its clocks."""
+def split_by_clock(source: Source) -> Pieces:
+    """Yield a source that is in memory as one piece per clock."""
     clocks: dict[tuple[int, int], list[Column]] = {}
     for column in source.columns.values():
         clocks.setdefault((id(column.time), len(column.values)), []).append(column)
@@ -90,13 +90,13 @@ def as_pieces(source: Source) -> Pieces:
 
 
 def header(column: Column) -> Column:
-    """A column without its rows."""
+    """Return a column without its rows."""
     return replace(column, values=column.values[:0], time=None if column.time is None else column.time[:0])
 
 
-def joined(pieces: Pieces, sort: bool) -> Source:
-    """A source with all its rows in memory; with `sort` those of each clock in the order of its times."""
-    run = Run(pieces)
+def join_pieces(pieces: Pieces, sort: bool) -> Source:
+    """Return a source with all its rows in memory; with `sort`, the rows of each clock are sorted by time."""
+    run = PieceRun(pieces)
     times: dict[str, list[FloatArray]] = {}
     counts: dict[str, int] = {}
     parts: dict[str, tuple[str, list[tuple[int, FloatArray]]]] = {}
@@ -107,17 +107,17 @@ def joined(pieces: Pieces, sort: bool) -> Source:
             times.setdefault(piece.clock, []).append(piece.time)
         for name, values in piece.values.items():
             parts.setdefault(name, (piece.clock, []))[1].append((first, values))
-    clocks = {clock: _in_order(np.concatenate(found), sort) for clock, found in times.items()}
+    clocks = {clock: _in_order(np.concatenate(arrays), sort) for clock, arrays in times.items()}
     columns: dict[str, Column] = {}
     for name, column in run.source.columns.items():
-        clock, found = parts.pop(name, ("", []))  # so that no more than one column is there twice
-        values = _put(found, counts.get(clock, 0), column.values.shape[1:])
+        clock, arrays = parts.pop(name, ("", []))  # popped, so that at most one column exists twice in memory
+        values = _assemble(arrays, counts.get(clock, 0), column.values.shape[1:])
         time, order = clocks.get(clock, (None, None))
         columns[name] = replace(column, values=values if order is None else values[order], time=time)
     return replace(run.source, columns=columns)
 
 
-def _put(parts: list[tuple[int, FloatArray]], rows: int, shape: tuple[int, ...]) -> FloatArray:
+def _assemble(parts: list[tuple[int, FloatArray]], rows: int, shape: tuple[int, ...]) -> FloatArray:
     values = np.full((rows, *shape), np.nan)
     for first, part in parts:
         values[first : first + len(part)] = part

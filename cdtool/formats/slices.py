@@ -1,4 +1,4 @@
-"""Columns that lie one behind the other in a file, cut into pieces side by side."""
+"""Read columns that a file stores one after the other, and yield them as pieces of many columns."""
 
 from __future__ import annotations
 
@@ -8,39 +8,39 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.columns import Column, Piece
-from cdtool.formats.pieces import VALUES_A_PIECE
+from cdtool.formats.pieces import VALUES_PER_PIECE
 from cdtool.recording import FloatArray
 
-# Reads the rows from one to before another.
-Read = Callable[[int, int], FloatArray]
+# Read the rows from `start` to before `end`.
+ReadRows = Callable[[int, int], FloatArray]
 
 
 @dataclass(frozen=True)
-class Sliced:
-    """A column of `rows` values (n,); `clock` names what gives its `time` [s], None: it is a column of a table."""
+class SlicedColumn:
+    """A column of `rows` values (n,). `clock` names its clock; `time` reads its times [s], None for a table column."""
 
     name: str
     rows: int
-    values: Read
+    values: ReadRows
     clock: str = ""
-    time: Read | None = None
+    time: ReadRows | None = None
     unit: str | None = None
 
 
-def header_of(column: Sliced) -> Column:
-    """The column without its rows."""
+def header_of(column: SlicedColumn) -> Column:
+    """Return the column without its rows."""
     return Column(column.name, np.empty(0), None if column.time is None else np.empty(0), column.unit)
 
 
-def side_by_side(columns: Sequence[Sliced]) -> Iterator[Piece]:
-    """The same share of every clock's rows, then the next: clocks that run side by side stay so.
+def interleave(columns: Sequence[SlicedColumn]) -> Iterator[Piece]:
+    """Yield the same share of each clock's rows in turn, so that clocks that run in parallel advance together.
 
-    Columns of tables that are equally long are one table.
+    Table columns of equal length form one table.
     """
-    clocks: dict[str, list[Sliced]] = {}
+    clocks: dict[str, list[SlicedColumn]] = {}
     for column in columns:
         clocks.setdefault(column.clock if column.time is not None else f"#{column.rows}", []).append(column)
-    cuts = max(1, -(-sum(column.rows for column in columns) // VALUES_A_PIECE))
+    cuts = max(1, -(-sum(column.rows for column in columns) // VALUES_PER_PIECE))
     for cut in range(cuts):
         for clock, members in clocks.items():
             rows, read = members[0].rows, members[0].time

@@ -1,4 +1,4 @@
-"""What a format hands over: named columns of numbers with their times, not yet channels."""
+"""The result of a format's reader: named columns of numbers with their times, not yet assigned to channels."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdtool.findings import Finding
 
 @dataclass(frozen=True)
 class TopicDetails:
-    """What a container states about a topic: the type of its messages, how many it holds, and how they are encoded."""
+    """The details that a container states about a topic: message type, number of messages and encoding."""
 
     schema: str
     messages: int
@@ -25,7 +25,7 @@ class TopicDetails:
 
     @classmethod
     def of_parts(cls, parts: Sequence[TopicDetails]) -> TopicDetails:
-        """Return those of a topic by those of the parts of its log: the messages of all are added up."""
+        """Return the details of a topic from those in the parts of its log, with the sum of the messages."""
         schemas = dict.fromkeys(part.schema for part in parts)
         encodings = dict.fromkeys(part.encoding for part in parts)
         return cls(" or ".join(schemas), sum(part.messages for part in parts), " or ".join(encodings))
@@ -33,11 +33,11 @@ class TopicDetails:
 
 @dataclass(frozen=True)
 class Source:
-    """A file's columns. `origin` [s] has been taken off every `Column.time`, or off the stamps of a table.
+    """The columns of a file. `origin` [s] was subtracted from every `Column.time`, or from the stamps of a table.
 
-    `names` are all columns of the file in its order, read or not; `first_row` is the file's line of the first sample
-    (0: not known). `details` are what the file states about itself, `topics` what it states about each topic;
-    `dialect` is how a table of text is written, as `[csv]` of a machine file.
+    `names` are all columns of the file in its order, whether read or not; `first_row` is the line of the first sample
+    (0: not known). `details` are statements of the file about itself, `topics` about each topic; `dialect` is the
+    dialect of a text table, as `[csv]` of a machine file.
     """
 
     path: Path
@@ -53,20 +53,20 @@ class Source:
 
 
 def in_words(details: Mapping[str, str], topics: Mapping[str, TopicDetails]) -> dict[str, str]:
-    """Return what a log states about itself and its topics, in words."""
+    """Return the statements of a log about itself and its topics as texts."""
     return {**details, **{name: str(topic) for name, topic in topics.items()}}
 
 
 class Format(Protocol):
-    """The contract of a format; each class below formats/ is one, registered under its file's name."""
+    """The contract of a format, which each format's class in this package implements."""
 
     name: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
 
     def sniff(self, path: Path) -> bool:
-        """True if the file's first bytes are of this format."""
+        """Return whether the file's first bytes are of this format."""
         ...
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all numeric ones; raises RecordingError."""
+        """Return the columns that `wanted` names, or all numeric columns; raises RecordingError."""
         ...

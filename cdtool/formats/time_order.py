@@ -1,4 +1,4 @@
-"""Pieces of several clocks in the order of their times, however late the file has some of them."""
+"""Merge pieces of several clocks in the order of their times, even if the file stores some of them late."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 from cdtool.columns import Column, Piece
 from cdtool.recording import FloatArray
 
-# Rows are handed on once so many wait, or twice as many as had to be left waiting before.
+# Rows are yielded when this many are buffered, or twice as many as remained in the buffer the last time.
 _ROWS = 1 << 15
 
 
 @dataclass
 class Lateness:
-    """By how much any row's time lies behind the highest before it [s]: what has to wait for it, and how long."""
+    """The largest delay `late` [s] of a row's time behind the highest time before it: how long other rows must wait."""
 
     highest: float = -np.inf
     late: float = 0.0
 
     def add(self, time: FloatArray) -> None:
-        """Take the times of a piece."""
+        """Add the times of a piece."""
         known = time[np.isfinite(time)]
         if not len(known):
             return
@@ -34,25 +34,26 @@ class Lateness:
 def by_time(
     pieces: Iterable[Piece], columns: Mapping[str, Sequence[Column]], late: float, sort: bool, most: int = _ROWS
 ) -> Iterator[dict[str, Piece]]:
-    """The rows of all clocks in the order of their times, a piece of each clock at once; rows of one time together.
+    """Yield the rows of all clocks in the order of their times, a piece of each clock at once.
 
-    `columns` are those of each clock: a value that a piece does not have is NaN, a clock that is not named is passed
-    over. No row may be later than `late` [s] (Lateness): so much of the log is held in memory, and `most` rows. Without
-    `sort` the rows of a clock stay in the file's order where its times run backward.
+    Rows with the same time are in the same step. `columns` are the columns of each clock: a value that a piece does not
+    have is NaN, and clocks that are not named are skipped. No row may be delayed by more than `late` [s] (see
+    `Lateness`): memory contains that time span of the log and up to `most` rows. Without `sort` the rows of a clock
+    stay in the file's order even if its times run backward.
     """
     waiting: dict[str, list[Piece]] = {clock: [] for clock in columns}
-    highest, held, left = -np.inf, 0, 0
+    highest, buffered, left = -np.inf, 0, 0
     for piece in pieces:
         if piece.clock not in columns or piece.time is None or not piece.rows:
             continue
         waiting[piece.clock].append(piece)
         highest = float(np.fmax(highest, np.fmax.reduce(piece.time)))
-        held += piece.rows
-        if held >= max(most, 2 * left):
-            # Rows of one time stay together, whatever the difference was rounded to.
+        buffered += piece.rows
+        if buffered >= max(most, 2 * left):
+            # A margin for rounding errors, so that rows with the same time stay together.
             limit = highest - late - 4.0 * np.spacing(abs(highest) + late)
             ready = _ready(waiting, columns, limit, sort)
-            left = held = sum(part.rows for parts in waiting.values() for part in parts)
+            left = buffered = sum(part.rows for parts in waiting.values() for part in parts)
             if ready:
                 yield ready
     if rest := _ready(waiting, columns, np.inf, sort):
@@ -62,7 +63,7 @@ def by_time(
 def _ready(
     waiting: dict[str, list[Piece]], columns: Mapping[str, Sequence[Column]], limit: float, sort: bool
 ) -> dict[str, Piece]:
-    """What lies before `limit` [s] of each clock; the rest goes on waiting."""
+    """Return the rows of each clock before `limit` [s]; the other rows stay in `waiting`."""
     ready: dict[str, Piece] = {}
     for clock, parts in waiting.items():
         if not parts:
@@ -79,7 +80,7 @@ def _ready(
 
 
 def _part(clock: str, time: FloatArray, values: Mapping[str, FloatArray], rows: slice) -> Piece:
-    """A copy: a view would keep all the rest in memory."""
+    """Return a copy of these rows: a view would keep the whole arrays in memory."""
     return Piece(
         clock, time[rows].copy(), {name: column[rows].copy() for name, column in values.items()}, len(time[rows])
     )
@@ -90,6 +91,6 @@ def _column(parts: Sequence[Piece], column: Column) -> FloatArray:
 
 
 def values_of(piece: Piece, column: Column) -> FloatArray:
-    """A column's values in a piece, NaN where it has none."""
-    found = piece.values.get(column.name)
-    return np.full((piece.rows, *column.values.shape[1:]), np.nan) if found is None else found
+    """Return a column's values in a piece; NaN if the piece does not contain the column."""
+    values = piece.values.get(column.name)
+    return np.full((piece.rows, *column.values.shape[1:]), np.nan) if values is None else values

@@ -16,7 +16,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.formats.column_names import resolve_columns
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.pieces import MappedLog, Run
+from cdtool.formats.pieces import MappedLog, PieceRun
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.ingest.channel_assembly import (
@@ -166,7 +166,7 @@ class LoggedFile:
     def _survey(self) -> tuple[Source, Lateness]:
         """Collect the statistics, assuming that all messages are in the order of time."""
         lateness, orders = Lateness(), dict[str, Lateness]()
-        run = Run(self._log.pieces())
+        run = PieceRun(self._log.pieces())
 
         def checked_pieces() -> Iterator[Piece]:
             for piece in run:
@@ -190,7 +190,7 @@ class LoggedFile:
 
     def _in_order(self) -> Iterator[Piece]:
         """Yield the pieces of all fields, those of each field in the order of their times."""
-        run = Run(self._log.pieces())
+        run = PieceRun(self._log.pieces())
         if self._is_sorted:
             yield from run
         else:

@@ -11,7 +11,7 @@ import numpy as np
 
 from cdtool.columns import Piece
 from cdtool.distribution import Distribution
-from cdtool.formats.pieces import Pieces, Run
+from cdtool.formats.pieces import PieceRun, Pieces
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.recording import FloatArray
@@ -100,7 +100,7 @@ class LogStatistics:
         self.clock_of: dict[str, str] = {}
         self.digests: dict[str, Any] = {}  # of columns of tables: one may be the clock of others
         lateness = Lateness()
-        run = Run(read(None))
+        run = PieceRun(read(None))
         for piece in run:
             self._add(piece)
             if piece.time is not None:
@@ -114,7 +114,7 @@ class LogStatistics:
 
     def pieces(self, keys: Collection[str] | None = None) -> Iterator[Piece]:
         """Read the log again."""
-        return iter(Run(self._read(keys)))
+        return iter(PieceRun(self._read(keys)))
 
     def values_of(self, name: str) -> Iterator[FloatArray]:
         """Read a column's values again, piece by piece."""

@@ -18,7 +18,7 @@ from cdtool.findings import Finding
 from cdtool.formats import FORMATS
 from cdtool.formats.column_names import OWN_CLOCK, resolve_columns
 from cdtool.formats.csv.text import read_sample
-from cdtool.formats.pieces import Pieces, Run, joined, read_pieces
+from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source, in_words
 from cdtool.ingest.channel_assembly import assemble_recording
 from cdtool.ingest.header_units import unit_findings
@@ -99,7 +99,7 @@ def choose_format(path: Path) -> Format:
 
 def survey(path: Path) -> Source:
     """Return all numeric columns of a log with their rows, and its warnings; raises RecordingError."""
-    return joined(log_pieces(path), sort=True) if path.is_dir() else choose_format(path).columns(path)
+    return join_pieces(log_pieces(path), sort=True) if path.is_dir() else choose_format(path).columns(path)
 
 
 def log_pieces(log: Path, keys: Collection[str] | None = None, read: ReadFile = read_pieces) -> Pieces:
@@ -119,7 +119,7 @@ def _part_pieces(folder: Path, keys: Collection[str] | None, read: ReadFile) -> 
     start: float | None = None
     parts: list[tuple[Source, Mapping[str, Span]]] = []
     for part in (*log.filled, *log.empty):
-        run = Run(read(choose_format(part), part, keys))
+        run = PieceRun(read(choose_format(part), part, keys))
         spans: dict[str, Span] = {}
         for piece in run:
             start = piece.origin if start is None else start

@@ -10,7 +10,7 @@ import numpy as np
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.formats.groups import Group, Part
-from cdtool.formats.pieces import MappedLog, mapped_log
+from cdtool.formats.pieces import MappedLog, open_mapped_log
 from cdtool.ingest.channel_pieces import ChannelPieces
 from cdtool.ingest.reading import LogFolder, choose_format, read_as_logged
 from cdtool.machine_file import MachineFile
@@ -72,7 +72,7 @@ def _mapped_logs(files: Sequence[Path], channels: ChannelMap) -> dict[Path, Mapp
     """Return the mapped fields of each file; empty if the format of one file cannot read mapped fields in pieces."""
     logs: dict[Path, MappedLog] = {}
     for path in files:
-        log = mapped_log(choose_format(path), path, channels)
+        log = open_mapped_log(choose_format(path), path, channels)
         if log is None:
             return {}
         logs[path] = log

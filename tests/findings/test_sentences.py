@@ -285,8 +285,8 @@ SENTENCES: list[tuple[Fact, str]] = [
         "4 of 10 messages cannot be read: ReaderError: no index",
     ),
     (
-        containers.DamagedAt(345, "the checksum of a chunk does not fit", containers.LostBytes(24)),
-        "damaged at byte 345 (the checksum of a chunk does not fit): 24 bytes lost",
+        containers.DamagedAt(345, "the checksum of a chunk does not match", containers.LostBytes(24)),
+        "damaged at byte 345 (the checksum of a chunk does not match): 24 bytes lost",
     ),
     (
         containers.DamagedAt(345, "zstd", containers.LostBytes(999, is_chunk=True, messages=20, time=(1.5, 2.25))),
@@ -308,8 +308,8 @@ SENTENCES: list[tuple[Fact, str]] = [
         "damaged at 3 more places: 999 bytes and 2 chunks lost, 40 messages named by indexes",
     ),
     (
-        containers.MessagesLost("a message names channel 7, which is not there", 2),
-        "a message names channel 7, which is not there: 2 messages lost",
+        containers.MessagesLost("a message names channel 7, which is not defined", 2),
+        "a message names channel 7, which is not defined: 2 messages lost",
     ),
     (
         containers.ChunksRefused(1),
@@ -319,8 +319,8 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (
-        containers.SummaryDamaged("the checksum of the summary does not fit", 20),
-        "the summary is damaged (the checksum of the summary does not fit): 20 messages read without it",
+        containers.SummaryDamaged("the checksum of the summary does not match", 20),
+        "the summary is damaged (the checksum of the summary does not match): 20 messages read without it",
     ),
     (containers.MessageCountDiffers(20, 18), "the file's summary says 20 messages, 18 were read"),
     (containers.Unverified(24, 24), "24 of 24 messages without a checksum: unverified"),

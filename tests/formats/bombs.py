@@ -1,4 +1,4 @@
-"""Small files that claim to become large: made in a moment, without ever holding what they claim."""
+"""Decompression bombs: small files with a large declared size, written without allocating that size."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 MIB = 2**20
-# MATLAB's own header of a file of version 7.3, in front of HDF5.
+# MATLAB's header of a file of version 7.3, before the HDF5 part.
 MAT_HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Jan  6 09:00:00 2025 HDF5 schema 1.00 ."
 
 
 def deflated_zeros(mib: int) -> bytes:
-    """A zlib stream of so many MiB of zeros: one block of 1 MiB, again and again."""
+    """Return a zlib stream of `mib` MiB of zeros, as repeated blocks of 1 MiB."""
     packer = zlib.compressobj(9)
     first = packer.compress(bytes(MIB)) + packer.flush(zlib.Z_FULL_FLUSH)
     block = packer.compress(bytes(MIB)) + packer.flush(zlib.Z_FULL_FLUSH)
@@ -30,7 +30,7 @@ def with_mat_header(path: Path) -> Path:
 
 
 def hdf5_never_written(path: Path) -> Path:
-    """A dataset of 75 GiB of which nothing was written."""
+    """Write a dataset of 75 GiB without data."""
     import h5py
 
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -39,7 +39,7 @@ def hdf5_never_written(path: Path) -> Path:
 
 
 def hdf5_one_chunk(path: Path, mib: int = 4096) -> Path:
-    """1000 values in one chunk of 4 GiB."""
+    """Write 1000 values in one chunk of 4 GiB."""
     import h5py
 
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -51,7 +51,7 @@ def hdf5_one_chunk(path: Path, mib: int = 4096) -> Path:
 
 
 def hdf5_packed_twice(path: Path, mib: int = 4096) -> Path:
-    """1000 values in a chunk of 8 kB, whose bytes unpack, twice, to 4 GiB."""
+    """Write 1000 values in a chunk of 8 kB that is compressed twice and decompresses to 4 GiB."""
     import h5py
 
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -68,7 +68,7 @@ def hdf5_packed_twice(path: Path, mib: int = 4096) -> Path:
 
 
 def parquet_of_zeros(path: Path, rows: int = 10**8) -> Path:
-    """100 million times false, which is 763 MiB as numbers: of a run of them no more than its length is written."""
+    """Write false 100 million times, which is 763 MiB as numbers, as runs of which only the lengths are stored."""
     import pyarrow as arrow
     import pyarrow.parquet as parquet
 
@@ -80,19 +80,19 @@ def parquet_of_zeros(path: Path, rows: int = 10**8) -> Path:
 
 
 def parquet_with_false_rows(path: Path, rows: int = 10**8) -> Path:
-    """The same, but its footer says 10 rows where it says how many there are in all."""
+    """Write the same file with 10 as the total number of rows in its footer."""
     content = bytearray(parquet_of_zeros(path, rows).read_bytes())
     footer = len(content) - 8 - struct.unpack("<I", content[-8:-4])[0]
-    told = b"\x16" + varint(2 * rows)  # the field behind the schema: a long, the next number
-    at = content.index(told, footer)
-    padded = bytes([20 | 128]) + b"\x80" * (len(told) - 3) + b"\0"  # 10, in as many bytes
-    content[at + 1 : at + len(told)] = padded
+    stated = b"\x16" + varint(2 * rows)  # the field after the schema: a long with the next field number
+    at = content.index(stated, footer)
+    padded = bytes([20 | 128]) + b"\x80" * (len(stated) - 3) + b"\0"  # 10, in as many bytes
+    content[at + 1 : at + len(stated)] = padded
     path.write_bytes(content)
     return path
 
 
 def parquet_with_a_false_page(path: Path, claimed: int = 2**31 - 8) -> Path:
-    """12,288 values whose page says that it unpacks to 2 GiB."""
+    """Write 12,288 values in a page with a declared size of 2 GiB."""
     import pyarrow as arrow
     import pyarrow.parquet as parquet
 
@@ -103,7 +103,7 @@ def parquet_with_a_false_page(path: Path, claimed: int = 2**31 - 8) -> Path:
     chunk = parquet.read_metadata(path).row_group(0).column(0)
     total, start = chunk.total_compressed_size, chunk.data_page_offset
     header = next(
-        made for size in range(total - 60, total) if len(made := _page_header(claimed, size, rows)) + size == total
+        head for size in range(total - 60, total) if len(head := _page_header(claimed, size, rows)) + size == total
     )
     content = bytearray(path.read_bytes())
     content[start : start + len(header)] = header
@@ -112,7 +112,7 @@ def parquet_with_a_false_page(path: Path, claimed: int = 2**31 - 8) -> Path:
 
 
 def feather_of_zeros(path: Path, compression: str = "zstd", batches: int = 20) -> Path:
-    """1.5 GiB of zeros in batches of 80 MB."""
+    """Write 1.5 GiB of zeros in batches of 80 MB."""
     import pyarrow as arrow
     import pyarrow.ipc as ipc
 
@@ -125,16 +125,16 @@ def feather_of_zeros(path: Path, compression: str = "zstd", batches: int = 20) -
 
 
 def varint(value: int) -> bytes:
-    """An unsigned integer as Thrift and protobuf write it."""
-    made = bytearray()
+    """Return an unsigned integer in the varint encoding of Thrift and protobuf."""
+    encoded = bytearray()
     while value > 127:
-        made.append(value & 127 | 128)
+        encoded.append(value & 127 | 128)
         value >>= 7
-    return bytes([*made, value])
+    return bytes([*encoded, value])
 
 
 def _page_header(unpacked: int, packed: int, values: int) -> bytes:
-    """A data page's header, in Thrift's compact protocol: fields 1, 2, 3 and 5, which holds four of its own."""
+    """Return a data page's header in Thrift's compact protocol: fields 1, 2, 3 and 5, a struct of four fields."""
     sizes = b"".join(b"\x15" + varint(2 * number) for number in (0, unpacked, packed))
     inner = b"".join(b"\x15" + varint(2 * number) for number in (values, 0, 3, 3))
     return sizes + b"\x2c" + inner + b"\0\0"

@@ -36,7 +36,7 @@ force = { topic = "/load_cell", field = "wrench.force.z" }
 
 @pytest.fixture
 def machine(tmp_path: Path) -> Callable[..., MachineFile]:
-    """Write a machine file with these channels (and machine table) and read it."""
+    """Return a function that writes a machine file with these channels (and machine table) and reads it."""
 
     def write(channels: str = COLUMNS, machine_table: str = _MACHINE) -> MachineFile:
         path = tmp_path / "machine.toml"
@@ -48,7 +48,7 @@ def machine(tmp_path: Path) -> Callable[..., MachineFile]:
 
 @pytest.fixture
 def log(tmp_path: Path) -> Callable[..., Path]:
-    """Write a log file."""
+    """Return a function that writes a log file."""
 
     def write(content: str | bytes, name: str = "log.csv") -> Path:
         path = tmp_path / name

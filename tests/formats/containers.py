@@ -1,4 +1,4 @@
-"""Small recordings that the tests of several containers write, and how recordings are compared: to the bit."""
+"""Small recordings that the tests of several containers write, and an exact comparison of recordings."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ minimum_speed = 0.015  # m/s
 
 
 def machine_file(folder: Path, text: str = MACHINE) -> Path:
-    """A machine file for all of these recordings."""
+    """Write a machine file for all of these recordings."""
     path = folder / "machine.toml"
     path.write_text(text)
     return path
 
 
 def two_clocks(path: Path, start_ns: int = 0) -> Path:
-    """An MCAP file: a drive at 1 kHz and an accelerometer at 3 kHz that begins later; odd floats, a missing value."""
+    """Write an MCAP file: a drive at 1 kHz and an accelerometer at 3 kHz that starts later."""
     random = np.random.default_rng(4)
     drive = Stream(
         "/drive",
@@ -61,13 +61,13 @@ def two_clocks(path: Path, start_ns: int = 0) -> Path:
 
 
 def logged(path: Path | str, machine: Path | str) -> Recording:
-    """A file's channels as logged."""
+    """Return the channels of a file as logged."""
     source, channels = mapped_source(Path(path), read_machine_file(machine))
     return assemble_recording(source, channels, read_machine_file(machine).machine)
 
 
 def assert_same(recording: Recording, other: Recording, exact_time: bool = True) -> None:
-    """Channels, units, values and times are equal to the bit; or times within a nanosecond."""
+    """Check that channels, units, values and times are exactly equal, or the times to about a nanosecond."""
     assert set(recording.channels) == set(other.channels)
     for name, series in recording.channels.items():
         assert other[name].unit == series.unit
@@ -75,5 +75,5 @@ def assert_same(recording: Recording, other: Recording, exact_time: bool = True)
         if exact_time:
             assert other[name].time.tobytes() == series.time.tobytes(), name
         else:
-            mine, its = series.time - recording.start, other[name].time - other.start
-            np.testing.assert_allclose(its, mine, rtol=0.0, atol=1.5e-9)
+            time, other_time = series.time - recording.start, other[name].time - other.start
+            np.testing.assert_allclose(other_time, time, rtol=0.0, atol=1.5e-9)

@@ -1,8 +1,8 @@
-"""Awkward tables of text, each with what a careful person would read from it: columns, or that it must be refused.
+"""Unusual text tables, each with its expected columns, or with the words of the error if it must be refused.
 
-A case is made anew for every seed. Files are as scopes, PLCs, LabVIEW, Excel, MATLAB, Python and ROS write them, or as
-they come out of a copy that was cut or a power that was lost. The truth is made of the numbers, never of what a reader
-gave.
+Every seed gives other cases. The tables are like those of oscilloscopes, PLCs, LabVIEW, Excel, MATLAB, Python and ROS,
+or are cut off by an incomplete copy or a power failure. The expected columns are computed from the numbers, never by a
+reader.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from functools import cache
 import numpy as np
 
 Columns = dict[str, list[float]]
-Made = tuple["str | bytes", "Columns | None"]
+Content = tuple["str | bytes", "Columns | None"]
 
 
 @dataclass(frozen=True)
 class Case:
-    """`content` is the file. `columns` are all that a survey gives (None: refused); `said` are words of the error.
+    """A file: `columns` are all columns of a survey (None: refused), `words` are part of the error.
 
-    `kind` is that of a finding, empty where none is required; "a or b" is one of the two.
-    `pins` are the lines of `[csv]` with which it is read; `clock` and `time` the column of the time and its truth [s].
+    `kind` is the kind of a required finding ("a or b" is one of two; empty: none is required). `pins` are the lines of
+    `[csv]` with which the file is read; `clock` and `time` are the column of the time and its expected values [s].
     """
 
     name: str
     content: bytes
     columns: Columns | None
-    said: str = ""
+    words: str = ""
     kind: str = ""
     pins: str = ""
     clock: str = ""
@@ -69,42 +69,42 @@ class Table:
         above: str = "",
         below_header: str = "",
     ) -> str:
-        """The table, `above` and `below_header` with `\\n` for the end of a line."""
+        """Return the table; the lines of `above` and `below_header` are separated by `\\n`."""
         lines = [separator.join(self.names) + head_trail] if header else []
         lines = [*above.splitlines(), *lines, *below_header.splitlines()]
         lines += [separator.join(cell.replace(".", decimal) for cell in row) + trail for row in self.rows]
         return end.join(lines) + (end if last else "")
 
 
-_MAKERS: list[tuple[str, Callable[[Table], Made], dict[str, str]]] = []
+_MAKERS: list[tuple[str, Callable[[Table], Content], dict[str, str]]] = []
 
 
-def _case(name: str, **told: str) -> Callable[[Callable[[Table], Made]], Callable[[Table], Made]]:
-    def keep(make: Callable[[Table], Made]) -> Callable[[Table], Made]:
-        _MAKERS.append((name, make, told))
+def _case(name: str, **options: str) -> Callable[[Callable[[Table], Content]], Callable[[Table], Content]]:
+    def register(make: Callable[[Table], Content]) -> Callable[[Table], Content]:
+        _MAKERS.append((name, make, options))
         return make
 
-    return keep
+    return register
 
 
-def _plain(name: str, make: Callable[[Table], str | bytes], names: tuple[str, ...] = (), **told: str) -> None:
-    _MAKERS.append((name, lambda table: (make(table), table.truth(*names)), told))
+def _plain(name: str, make: Callable[[Table], str | bytes], names: tuple[str, ...] = (), **options: str) -> None:
+    _MAKERS.append((name, lambda table: (make(table), table.truth(*names)), options))
 
 
-def _refused(name: str, make: Callable[[Table], str | bytes], said: str, pins: str = "") -> None:
-    _MAKERS.append((name, lambda table: (make(table), None), {"said": said, "pins": pins}))
+def _refused(name: str, make: Callable[[Table], str | bytes], words: str, pins: str = "") -> None:
+    _MAKERS.append((name, lambda table: (make(table), None), {"words": words, "pins": pins}))
 
 
 @cache
 def cases(seed: int) -> list[Case]:
-    """All cases of one seed."""
-    made = []
-    for number, (name, make, told) in enumerate(_MAKERS):
+    """Return all cases of one seed."""
+    all_cases = []
+    for number, (name, make, options) in enumerate(_MAKERS):
         content, columns = make(Table(np.random.default_rng([seed, number])))
         raw = content.encode() if isinstance(content, str) else content
-        said, kind, pins = (told.get(key, "") for key in ("said", "kind", "pins"))
-        made.append(Case(name, raw, columns, said, kind, pins))
-    return made
+        words, kind, pins = (options.get(key, "") for key in ("words", "kind", "pins"))
+        all_cases.append(Case(name, raw, columns, words, kind, pins))
+    return all_cases
 
 
 # --- separators, decimal marks, line ends, encodings
@@ -131,7 +131,7 @@ for _codec in ("utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"):
 _plain("encoding: UTF-16 big endian with its mark", lambda table: b"\xfe\xff" + table.text().encode("utf-16-be"))
 
 
-def _lettered(table: Table, codec: str, names: tuple[str, str, str]) -> Made:
+def _lettered(table: Table, codec: str, names: tuple[str, str, str]) -> Content:
     table.names = list(names)
     return table.text(";").encode(codec), table.truth(*names)
 
@@ -146,9 +146,9 @@ for _codec, _names in {
 _plain("sep= of Excel", lambda table: "sep=;\r\n" + table.text(";", ",", "\r\n"), kind="named_separator")
 _plain("sep= of a tab", lambda table: "sep=\t\r\n" + table.text("\t", end="\r\n"))
 _refused("sep= that the rows contradict", lambda table: "sep=;\n" + table.text(","), "one cell")
-_plain("blanks about the cells", lambda table: table.text(" ; "))
+_plain("blanks around the cells", lambda table: table.text(" ; "))
 _plain(
-    "columns set with blanks",
+    "columns aligned with blanks",
     lambda table: "\n".join("  ".join(f"{c:>12}" for c in r) for r in [table.names, *table.rows]) + "\n",
 )
 
@@ -156,16 +156,16 @@ _plain(
 
 
 def _numbers(
-    name: str, separator: str, write: Callable[[float], str], quote: str = "", refused: bool = False, **told: str
+    name: str, separator: str, write: Callable[[float], str], quote: str = "", refused: bool = False, **options: str
 ) -> None:
-    def make(table: Table) -> Made:
+    def make(table: Table) -> Content:
         values = [float(round(x, 2)) for x in table.rng.uniform(1.0e3, 9.9e6, table.count)]
         values[0] = 1234567.5
         body = "".join(f"{i}{separator}{quote}{write(x)}{quote}\n" for i, x in enumerate(values))
         truth = None if refused else {"n": [float(i) for i in range(table.count)], "v": values}
         return f"n{separator}v\n{body}", truth
 
-    _MAKERS.append((name, make, told))
+    _MAKERS.append((name, make, options))
 
 
 def _swap(text: str, comma: str, point: str) -> str:
@@ -176,8 +176,8 @@ _numbers("thousands: 1.234,5 in Excel", ";", lambda x: _swap(f"{x:,.2f}", ".", "
 _numbers("thousands: 1,234.5 with semicolons", ";", lambda x: f"{x:,.2f}")
 _numbers("thousands: 1,234.5 in quotes", ",", lambda x: f"{x:,.2f}", '"')
 _numbers("thousands: 1'234.5 of Switzerland", ";", lambda x: _swap(f"{x:,.2f}", "'", "."))
-_numbers("thousands: a blank that does not break", ";", lambda x: _swap(f"{x:,.2f}", "\u00a0", ","))
-_numbers("thousands: a narrow blank", "\t", lambda x: _swap(f"{x:,.2f}", "\u202f", ","))
+_numbers("thousands: a non-breaking space", ";", lambda x: _swap(f"{x:,.2f}", "\u00a0", ","))
+_numbers("thousands: a narrow non-breaking space", "\t", lambda x: _swap(f"{x:,.2f}", "\u202f", ","))
 _numbers("thousands: a blank", ";", lambda x: _swap(f"{x:,.2f}", " ", ","))
 _numbers("quoted decimal comma between commas", ",", lambda x: f"{x:.2f}".replace(".", ","), '"')
 _numbers("quoted numbers", ",", lambda x: f"{x:.2f}", '"')
@@ -188,8 +188,8 @@ _numbers("seventeen digits", ",", lambda x: f"{x:.17g}")
 _numbers("thirty digits", ",", lambda x: f"{x:.30f}")
 
 
-@_case("the minus sign of typesetters")
-def _(table: Table) -> Made:
+@_case("the typographic minus sign")
+def _(table: Table) -> Content:
     return table.text(";").replace("-", "\u2212"), table.truth()
 
 
@@ -198,19 +198,19 @@ def _thousand_or_decimal(table: Table, write: Callable[[int, int], str]) -> str:
     return "n;v\n" + "".join(f"{i};{write(a, b)}\n" for i, (a, b) in enumerate(rows))
 
 
-_refused("1,234 alone", lambda table: _thousand_or_decimal(table, lambda a, b: f"{a},{b}"), "thousands")
+_refused("only 1,234", lambda table: _thousand_or_decimal(table, lambda a, b: f"{a},{b}"), "thousands")
 _refused(
-    "1,234 in quotes alone",
+    "only 1,234 in quotes",
     lambda table: _thousand_or_decimal(table, lambda a, b: f'"{a},{b}"').replace(";", ","),
     "thousands",
 )
 _refused(
-    "1.234 beside 0,5",
+    "1.234 next to 0,5",
     lambda table: _thousand_or_decimal(table, lambda a, b: f"{a}.{b};0,{a}5").replace("n;v", "n;v;w"),
-    "beside",
+    "next to",
 )
 _refused(
-    "decimal point here, comma there",
+    "decimal points and decimal commas",
     lambda table: _thousand_or_decimal(table, lambda a, b: f"{a}.5;0,{b}5").replace("n;v", "n;v;w"),
     "decimal",
 )
@@ -232,15 +232,15 @@ _refused(
 )
 
 
-@_case("a first row with a number in brackets keeps its place", kind="unread_cells")
-def _(table: Table) -> Made:
+@_case("a first row with a number in brackets", kind="unread_cells")
+def _(table: Table) -> Content:
     truth = table.truth()
     truth["a"][0] = math.nan
     return _with_cell(table, "(1.5)", 0), truth
 
 
 @_case("1,234 pinned as thousands", pins='thousands = ","\ndecimal = "."')
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     values = [int(x) for x in table.rng.integers(1000, 999999, table.count)]
     return "n;v\n" + "".join(f"{i};{x:,}\n" for i, x in enumerate(values)), {
         "n": [float(i) for i in range(table.count)],
@@ -249,7 +249,7 @@ def _(table: Table) -> Made:
 
 
 @_case("1,234 pinned as decimals", pins='decimal = ","')
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     values = [f"{a}.{b}" for a, b in table.rng.integers(100, 999, (table.count, 2))]
     return "n;v\n" + "".join(f"{i};{x.replace('.', ',')}\n" for i, x in enumerate(values)), {
         "n": [float(i) for i in range(table.count)],
@@ -258,7 +258,7 @@ def _(table: Table) -> Made:
 
 
 @_case("0,125 can only be a decimal")
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     values = [f"{a}.{b}" for a, b in table.rng.integers(100, 999, (table.count, 2))]
     values[3] = "0.125"
     return "n;v\n" + "".join(f"{i};{x.replace('.', ',')}\n" for i, x in enumerate(values)), {
@@ -268,7 +268,7 @@ def _(table: Table) -> Made:
 
 
 @_case("infinite, nan, empty, Microsoft's")
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     words = {
         "inf": math.inf,
         "-Inf": -math.inf,
@@ -290,7 +290,7 @@ _refused("a text for a missing value", lambda table: _with_cell(table, "N/A"), "
 
 
 @_case("a text for a missing value, pinned", pins='missing = ["N/A", "--"]')
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     truth = table.truth()
     truth["a"][5] = math.nan
     return _with_cell(table, "N/A"), truth
@@ -303,7 +303,7 @@ def _with_cell(table: Table, cell: str, row: int = 5) -> str:
     return "\n".join(lines) + "\n"
 
 
-# --- what stands above the rows
+# --- lines above the rows
 
 _plain("no header", lambda table: table.text(header=False), ("0", "1", "2"))
 _plain("no header, decimal comma", lambda table: table.text(";", ",", header=False), ("0", "1", "2"))
@@ -341,27 +341,29 @@ _plain(
 _plain("comments of MATLAB", lambda table: table.text(" ", above="% made by hand\n% 1 kHz"))
 _plain("names in a comment, as NumPy writes them", lambda table: "# " + table.text(" "), kind="names_from_comment")
 _plain("rostopic echo -p", lambda table: "%" + table.text(), kind="names_from_comment")
-_plain("a drawn line below the names", lambda table: table.text(" | ", below_header="----+----+----"))
+_plain("a ruler below the names", lambda table: table.text(" | ", below_header="----+----+----"))
 _plain(
-    "the header again",
+    "a repeated header",
     lambda table: table.text().replace("\n" + table.t[6], "\nt,a,b\n" + table.t[6], 1),
     kind="header_lines",
 )
 _plain(
-    "the header again, with units",
+    "a repeated header with units",
     lambda table: table.text(below_header="s,A,rpm").replace("\n" + table.t[6], "\nt,a,b\ns,A,rpm\n" + table.t[6], 1),
 )
 _plain("blank lines", lambda table: table.text(end="\n\n"), kind="blank_lines")
 _plain("blank lines above", lambda table: "\n\n" + table.text())
-_plain("a separator behind every line", lambda table: table.text(";", ",", trail=";", head_trail=";"))
-_plain("a separator behind the rows only", lambda table: table.text(trail=","))
-_plain("a separator behind the header only", lambda table: table.text(head_trail=","))
-_plain("a separator behind the rows, no header", lambda table: table.text(trail=",", header=False), ("0", "1", "2"))
+_plain("a separator at the end of every line", lambda table: table.text(";", ",", trail=";", head_trail=";"))
+_plain("a separator at the end of the rows only", lambda table: table.text(trail=","))
+_plain("a separator at the end of the header only", lambda table: table.text(head_trail=","))
+_plain(
+    "a separator at the end of the rows, no header", lambda table: table.text(trail=",", header=False), ("0", "1", "2")
+)
 _plain("a footer", lambda table: table.text() + "End of file\n", kind="words_below_rows")
 _plain("a footer with sums", lambda table: table.text() + "\nSum,1.5,2\nMean,0.1,0.2\n", kind="footer_skipped")
 _plain("a footer padded to the width", lambda table: table.text(";", ",") + "End of file;;\n", kind="footer_skipped")
 _plain(
-    "a scope: x-axis and second",
+    "an oscilloscope: x-axis and second",
     lambda table: table.text(header=False, above="x-axis,1,2\nsecond,Volt,Volt"),
     ("x-axis", "1", "2"),
 )
@@ -377,27 +379,27 @@ _plain(
     ("time", "motor torque", "b"),
 )
 _refused("a header of another width", lambda table: table.text(header=False, above="t,a,b,c"), "4 names")
-_refused("a preamble close above the rows", lambda table: table.text(header=False, above="rate,1000"), "2 names")
+_refused("a preamble directly above the rows", lambda table: table.text(header=False, above="rate,1000"), "2 names")
 _refused(
-    "a first row that may be names", lambda table: table.text(header=False, above="0.000,OVL,1.5"), "may hold names"
+    "a first row that may be names", lambda table: table.text(header=False, above="0.000,OVL,1.5"), "may be the names"
 )
 _refused("numbers that may be names", lambda table: table.text(header=False, above="0,1,2"), "may number")
 _plain(
     "numbers pinned as names", lambda table: table.text(header=False, above="0,1,2"), ("0", "1", "2"), pins="header = 1"
 )
 _plain(
-    "a preamble pinned away",
+    "a preamble skipped by a pin",
     lambda table: table.text(header=False, above="rate,1000"),
     ("0", "1", "2"),
     pins="skip_lines = 1",
 )
-_refused("a pinned header that is none", lambda table: table.text(above="rig 3\n\n"), "line 1", "header = 1")
-_refused("a pinned separator that is none", lambda table: table.text(), "one cell", 'separator = ";"')
-_refused("a pinned decimal mark that is none", lambda table: table.text(";", ","), "not a number", 'decimal = "."')
+_refused("a wrong pinned header", lambda table: table.text(above="rig 3\n\n"), "line 1", "header = 1")
+_refused("a wrong pinned separator", lambda table: table.text(), "one cell", 'separator = ";"')
+_refused("a wrong pinned decimal mark", lambda table: table.text(";", ","), "not a number", 'decimal = "."')
 
 
-@_case("a scope: names, units and an interval")
-def _(table: Table) -> Made:
+@_case("an oscilloscope: names, units and an interval")
+def _(table: Table) -> Content:
     empty = [math.nan] * table.count
     truth = {**table.truth("X", "CH1", "CH2"), "Start": empty, "Increment": empty}
     lines = ["X,CH1,CH2,Start,Increment", "Sequence,Volt,Volt,-1.2e-3,4.0e-6"]
@@ -405,14 +407,14 @@ def _(table: Table) -> Made:
 
 
 @_case("LabVIEW measurement", kind="words_above_rows")
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     head = "LabVIEW Measurement\t\nWriter_Version\t2\nDate\t2025/04/03\n***End_of_Header***\t\n\nChannels\t2\t\n"
     head += "X_Dimension\tTime\tTime\nDelta_X\t0.001\t0.001\n***End_of_Header***\t\t\nX_Value\tTorque\tSpeed\tComment\n"
     return head + table.text("\t", header=False), table.truth("X_Value", "Torque", "Speed")
 
 
-@_case("a column of words beside numbers")
-def _(table: Table) -> Made:
+@_case("a column of words next to numbers")
+def _(table: Table) -> Content:
     words = ["idle", "moving", "stopped"]
     lines = [f"{t},{words[i % 3]},{a}" for i, (t, a) in enumerate(zip(table.t, table.a, strict=True))]
     truth = table.truth()
@@ -420,7 +422,7 @@ def _(table: Table) -> Made:
 
 
 @_case("words with the separator in quotes")
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     lines = [f'{t},"moving, slowly ""{i}""",{a}' for i, (t, a) in enumerate(zip(table.t, table.a, strict=True))]
     truth = table.truth()
     return "t,state,a\n" + "\n".join(lines) + "\n", {"t": truth["t"], "a": truth["a"]}
@@ -430,11 +432,15 @@ def _(table: Table) -> Made:
 
 _refused("a row too short", lambda table: _with_row(table, "1,2"), "line 9 has 2 cells")
 _refused("a row too long", lambda table: _with_row(table, "1,2,3,4"), "line 9 has 4 cells")
-_refused("two rows run together", lambda table: _with_row(table, "1.0,2.0,3.01.0,2.0,3.0"), "line 9 has 5 cells")
+_refused(
+    "two rows without a line end between them",
+    lambda table: _with_row(table, "1.0,2.0,3.01.0,2.0,3.0"),
+    "line 9 has 5 cells",
+)
 _refused("words between the rows", lambda table: _with_row(table, "emergency stop"), "line 9")
 _refused("a quote that is not closed", lambda table: _with_row(table, '1,"2,3'), "quote")
-_refused("a picture", lambda _: b"\x89PNG\r\n\x1a\n" + bytes(99), "binary")
-_refused("a page", lambda _: "<html>1,2</html>", "markup")
+_refused("an image", lambda _: b"\x89PNG\r\n\x1a\n" + bytes(99), "binary")
+_refused("a web page", lambda _: "<html>1,2</html>", "markup")
 _refused("a text", lambda _: "Once upon a time.\nThere was a gate.\n", "no row of numbers")
 _refused("only a header", lambda _: "t,a,b\n", "no row of numbers")
 
@@ -453,9 +459,9 @@ def _cut(name: str, cut: Callable[[str], str | bytes], kind: str) -> None:
 
 
 _cut("cut within the last row", lambda text: text[: text.rindex(",")], "last_line_cut")
-_cut("cut behind a separator", lambda text: text[: text.rindex(",") + 1], "last_line_dropped")
+_cut("cut after a separator", lambda text: text[: text.rindex(",") + 1], "last_line_dropped")
 _cut(
-    "cut behind a sign or the first digit",
+    "cut after a sign or the first digit",
     lambda text: text[: text.rindex(",") + 2],
     "last_line_cut or last_line_dropped",
 )
@@ -463,12 +469,12 @@ _cut("cut within the last number", lambda text: text[:-2], "last_line_dropped")
 _cut("cut before the last decimals", lambda text: text[:-3], "last_line_dropped")
 _plain("cut of the last line end only", lambda table: table.text(last=False))
 _plain("NUL bytes at the end", lambda table: table.text().encode() + bytes(500), kind="nul_bytes_at_end")
-_cut("cut within a row, NUL bytes behind", lambda text: text[:-4].encode() + bytes(4096), "nul_bytes_at_end")
+_cut("cut within a row, followed by NUL bytes", lambda text: text[:-4].encode() + bytes(4096), "nul_bytes_at_end")
 _cut("cut within a row, UTF-16", lambda text: text[:-4].encode("utf-16"), "last_line_dropped")
 
 
 @_case("NUL bytes between the rows", kind="nul_lines")
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     lines = table.text().encode().splitlines(keepends=True)
     lines[5] = lines[5][:3] + bytes(40) + b"\n"
     return b"".join(lines), {name: [*values[:4], *values[5:]] for name, values in table.truth().items()}
@@ -483,21 +489,21 @@ def _timed(
     separator: str = ",",
     names: str = "stamp",
     refused: bool = False,
-    **told: str,
+    **options: str,
 ) -> None:
-    """`write(ms)` gives the stamp of so many milliseconds after 2025-04-25 23:59:58 (two midnights: none and one)."""
+    """Add a case; `write(ms)` returns the stamp `ms` milliseconds after 2025-04-25 23:59:58 (midnight follows)."""
 
-    def make(table: Table) -> Made:
+    def make(table: Table) -> Content:
         steps = np.cumsum(table.rng.integers(1, 400, table.count))
         stamps = [int(step - steps[0]) for step in steps]
-        decimal = "," if told.get("comma") else "."
+        decimal = "," if options.get("comma") else "."
         body = "".join(
             f"{write(ms)}{separator}{a.replace('.', decimal)}\n" for ms, a in zip(stamps, table.a, strict=True)
         )
         truth: Columns = {names.split(separator)[-1]: [ms / 1000.0 for ms in stamps], "a": [float(x) for x in table.a]}
         return f"{names}{separator}a\n{body}", None if refused else truth
 
-    _MAKERS.append((name, make, told))
+    _MAKERS.append((name, make, options))
 
 
 def _at(ms: int, layout: str, start: str = "2025-04-25T23:59:58") -> str:
@@ -516,14 +522,16 @@ _timed("British date, day above 12", lambda ms: _at(ms, "%d/%m/%Y %H:%M:%S.%L"))
 _timed("month by name", lambda ms: _at(ms, "%d-%b-%Y %H:%M:%S.%L"))
 _timed("half days", lambda ms: _at(ms, "%m/%d/%Y %I:%M:%S.%L %p"))
 _timed("date and time in two columns", lambda ms: _at(ms, "%d.%m.%Y;%H:%M:%S.%L"), ";", "date;time")
-_timed("03/04/2025", lambda ms: _at(ms, "%m/%d/%Y %H:%M:%S.%L", "2025-04-03T23:59:58"), refused=True, said="2025-04-03")
+_timed(
+    "03/04/2025", lambda ms: _at(ms, "%m/%d/%Y %H:%M:%S.%L", "2025-04-03T23:59:58"), refused=True, words="2025-04-03"
+)
 _timed(
     "03/04/2025 in a column of its own",
     lambda ms: _at(ms, "%m/%d/%Y;%H:%M:%S.%L", "2025-04-03T12:00:00"),
     ";",
     "date;time",
     refused=True,
-    said="2025-03-04",
+    words="2025-03-04",
 )
 _timed(
     "03/04/2025 pinned",
@@ -533,7 +541,7 @@ _timed(
 
 
 @_case("time of day over midnight", kind="written_times")
-def _(table: Table) -> Made:
+def _(table: Table) -> Content:
     stamps = [100 * i for i in range(table.count)]
     body = "".join(f"{_at(ms, '%H:%M:%S.%L')};{a}\n" for ms, a in zip(stamps, table.a, strict=True))
     midnight = [86398.0 + ms / 1000.0 for ms in stamps]
@@ -547,7 +555,7 @@ for _unit, _start, _step in (
     ("ns", 1700000000000000000, 10**7),
 ):
 
-    def _epoch(table: Table, start: int = _start, step: int = _step) -> Made:
+    def _epoch(table: Table, start: int = _start, step: int = _step) -> Content:
         stamps = [start + step * i for i in range(table.count)]
         body = "".join(f"{x},{a}\n" for x, a in zip(stamps, table.a, strict=True))
         return f"stamp,a\n{body}", {"stamp": [float(x) for x in stamps], "a": [float(x) for x in table.a]}

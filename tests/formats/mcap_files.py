@@ -1,4 +1,4 @@
-"""Streams, a map and files that the tests of MCAP share."""
+"""Streams, a channel map and files for the tests of MCAP."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def written(tmp_path):
 
 @pytest.fixture
 def by_hand(tmp_path):
-    """Messages of one topic: (log time, publish time, content), as JSON unless they are bytes."""
+    """Return a function that writes messages of one topic: (log time, publish time, content), as JSON or bytes."""
 
     def write(
         messages, encoding="json", schema_encoding="jsonschema", schema=b"{}", name="test_msgs/msg/Thing", **options

@@ -1,4 +1,4 @@
-"""A file of a few kB that claims to become many GB is refused at once, in one line, and before it takes the memory."""
+"""A file of a few kB with a decompressed size of many GB is refused in one line, before memory is allocated."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.formats import bombs
 from tests.noted_times import note
 
 SECONDS, MIB = 5.0, 300
-# Reads a plain file of each kind, then a bomb; prints the seconds, the MiB above the plain ones, and what was said.
+# Reads a plain file of each kind, then a bomb; prints the seconds, the MiB above the plain files, and the message.
 CHILD = """
 import json, resource, sys, time
 from pathlib import Path
@@ -29,11 +29,11 @@ for plain in sys.argv[2:]:
     survey(Path(plain))
 before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
 try:
-    said = f"was read: {list(survey(Path(sys.argv[1])).columns)}"
+    message = f"was read: {list(survey(Path(sys.argv[1])).columns)}"
 except RecordingError as fault:
-    said = str(fault)
+    message = str(fault)
 more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-print(json.dumps([time.perf_counter() - start, more, said]))
+print(json.dumps([time.perf_counter() - start, more, message]))
 """
 
 
@@ -69,7 +69,7 @@ def plain_files(folder: Path) -> list[Path]:
     ],
     ids=lambda item: item if isinstance(item, str) else item.__name__,
 )
-def test_a_bomb_is_refused_without_its_memory(make, name, tmp_path):
+def test_a_bomb_is_refused_without_allocating_its_memory(make, name, tmp_path):
     for library in ("h5py", "pyarrow"):
         pytest.importorskip(library)
     bomb = make(tmp_path / name)
@@ -77,8 +77,8 @@ def test_a_bomb_is_refused_without_its_memory(make, name, tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", CHILD, *paths], capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2]
     )
-    seconds, more, said = json.loads(done.stdout)
-    assert said.startswith(f"{bomb}: ") and ": refused (" in said and "\n" not in said
+    seconds, more, message = json.loads(done.stdout)
+    assert message.startswith(f"{bomb}: ") and ": refused (" in message and "\n" not in message
     note(seconds, SECONDS)
     assert more < MIB
 
@@ -105,7 +105,7 @@ def chunked(path: Path, **options) -> Path:
     [{}, {"chunks": (100,)}, {"compression": "gzip", "shuffle": True, "fletcher32": True}, {"compression": "lzf"}],
     ids=["contiguous", "chunked", "gzip, shuffled, with a checksum", "lzf"],
 )
-def test_a_dataset_that_is_packed_once_passes(tmp_path, options):
+def test_a_dataset_that_is_compressed_once_passes(tmp_path, options):
     path = chunked(tmp_path / "a.h5", **options)
     with pytest.importorskip("h5py").File(path) as file:
         check_chunks(path, "a", file["a"])
@@ -119,7 +119,7 @@ def test_a_dataset_that_is_packed_once_passes(tmp_path, options):
     ],
     ids=["one chunk", "packed twice"],
 )
-def test_a_chunk_that_unpacks_to_far_more_than_its_file_is_refused(tmp_path, make, message):
+def test_a_chunk_that_decompresses_to_far_more_than_its_file_is_refused(tmp_path, make, message):
     h5py = pytest.importorskip("h5py")
     path = make(tmp_path / "a.h5")
     with h5py.File(path) as file, pytest.raises(RecordingError, match=message):
@@ -136,7 +136,7 @@ def check_parquet(path: Path, *keys: str) -> None:
 @pytest.mark.parametrize("version", ["1.0", "2.0"])
 @pytest.mark.parametrize("compression", ["none", "snappy", "gzip", "zstd"])
 @pytest.mark.parametrize("dictionary", [True, False], ids=["dictionary", "plain"])
-def test_the_pages_of_a_plain_table_unpack_to_what_its_footer_says(tmp_path, version, compression, dictionary):
+def test_the_pages_of_a_plain_table_decompress_to_the_size_in_its_footer(tmp_path, version, compression, dictionary):
     parquet = pytest.importorskip("pyarrow.parquet")
     arrow = pytest.importorskip("pyarrow")
     random = np.random.default_rng(5)
@@ -152,14 +152,14 @@ def test_the_pages_of_a_plain_table_unpack_to_what_its_footer_says(tmp_path, ver
     parquet.write_table(arrow.table(columns), path, compression=compression, data_page_version=version, **options)
     metadata = parquet.read_metadata(path)
     check_pages(path, metadata, list(columns))
-    told = [metadata.row_group(i).column(j) for i in range(metadata.num_row_groups) for j in range(5)]
-    # What the footer says includes the pages' headers, of at most some 100 bytes each.
+    column_chunks = [metadata.row_group(i).column(j) for i in range(metadata.num_row_groups) for j in range(5)]
+    # The size in the footer includes the pages' headers, of at most about 100 bytes each.
     from cdtool.formats.parquet_check import _unpacked
 
     content = path.read_bytes()
-    for chunk in told:
-        found = _unpacked(path, content, chunk)
-        assert 0 < found <= chunk.total_uncompressed_size <= found * 1.2 + 400
+    for chunk in column_chunks:
+        size = _unpacked(path, content, chunk)
+        assert 0 < size <= chunk.total_uncompressed_size <= size * 1.2 + 400
 
 
 @pytest.mark.parametrize(
@@ -170,14 +170,14 @@ def test_the_pages_of_a_plain_table_unpack_to_what_its_footer_says(tmp_path, ver
     ],
     ids=["a false page", "false rows"],
 )
-def test_a_parquet_file_whose_footer_hides_what_it_unpacks_to_is_refused(tmp_path, make, message):
+def test_a_parquet_file_whose_footer_hides_its_decompressed_size_is_refused(tmp_path, make, message):
     pytest.importorskip("pyarrow")
     path = make(tmp_path / "a.parquet")
     with pytest.raises(RecordingError, match=message):
         check_parquet(path)
 
 
-def test_a_column_that_nobody_asked_for_may_be_as_large_as_it_likes(tmp_path):
+def test_a_column_that_is_not_requested_may_have_any_size(tmp_path):
     arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     path = bombs.parquet_of_zeros(tmp_path / "a.parquet")
     with pytest.raises(RecordingError, match="refused"):
@@ -186,7 +186,7 @@ def test_a_column_that_nobody_asked_for_may_be_as_large_as_it_likes(tmp_path):
     assert parquet.read_schema(path).equals(arrow.schema([("a", arrow.bool_())]))
 
 
-def test_a_page_whose_header_is_damaged_is_told(tmp_path):
+def test_a_page_with_a_damaged_header_is_reported(tmp_path):
     path = bombs.parquet_with_a_false_page(tmp_path / "a.parquet", claimed=98_304)
     check_parquet(path)
     content = bytearray(path.read_bytes())
@@ -220,37 +220,37 @@ def test_a_plain_feather_file_passes_whole_or_cut_anywhere(tmp_path, compression
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_a_feather_file_whose_batches_unpack_to_far_more_is_refused(tmp_path, compression):
+def test_a_feather_file_whose_batches_decompress_to_far_more_is_refused(tmp_path, compression):
     pytest.importorskip("pyarrow")
     path = bombs.feather_of_zeros(tmp_path / "a.feather", compression, batches=20 if compression == "zstd" else 45)
-    if compression == "lz4":  # which packs zeros to a 250th
+    if compression == "lz4":  # its ratio for zeros is 250
         assert 45 * 80e6 / path.stat().st_size > 200
     with pytest.raises(RecordingError, match=r"unpacks to \d+ MiB, \d+ times its size: refused"):
         check_batches(path)
 
 
-def test_a_buffer_that_claims_a_tebibyte_is_refused(tmp_path):
+def test_a_buffer_that_declares_a_tebibyte_is_refused(tmp_path):
     path = feather(tmp_path / "a.feather", "zstd", 4000)
     content = path.read_bytes()
-    told = struct.pack("<q", 8 * 1000)  # what the first batch's numbers unpack to
-    assert content.count(told) >= 4
-    path.write_bytes(content.replace(told, struct.pack("<q", 2**40), 1))
+    declared = struct.pack("<q", 8 * 1000)  # the decompressed size of the first batch's numbers
+    assert content.count(declared) >= 4
+    path.write_bytes(content.replace(declared, struct.pack("<q", 2**40), 1))
     with pytest.raises(RecordingError, match="unpacks to 1048576 MiB"):
         check_batches(path)
 
 
-def test_batches_that_only_the_footer_points_to_are_counted(tmp_path):
+def test_batches_that_only_the_footer_names_are_counted(tmp_path):
     pytest.importorskip("pyarrow")
     path = bombs.feather_of_zeros(tmp_path / "a.feather")
     content = bytearray(path.read_bytes())
     schema = 8 + 8 + struct.unpack("<I", content[12:16])[0]
-    content[schema : schema + 8] = b"\xff\xff\xff\xff\0\0\0\0"  # here the messages end, read one behind the other
+    content[schema : schema + 8] = b"\xff\xff\xff\xff\0\0\0\0"  # the end of the messages in sequence
     path.write_bytes(content)
     with pytest.raises(RecordingError, match="refused"):
         check_batches(path)
 
 
-def test_bytes_that_are_no_messages_are_left_to_the_library(tmp_path):
+def test_bytes_other_than_messages_are_passed_to_the_library(tmp_path):
     path = tmp_path / "a.feather"
     random = np.random.default_rng(2)
     for size in (1, 7, 8, 30, 400):

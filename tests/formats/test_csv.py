@@ -20,7 +20,7 @@ def values(source, name):
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", "|", " ", "   "])
-def test_the_separator_is_found_by_itself(log, separator):
+def test_the_separator_is_detected(log, separator):
     rows = [["t", "a", "b"], ["0", "1.5", "-2"], ["1", "2.5", "1e-3"]]
     source = read(log("\n".join(separator.join(row) for row in rows) + "\n"))
     assert list(source.columns) == ["t", "a", "b"]
@@ -30,7 +30,7 @@ def test_the_separator_is_found_by_itself(log, separator):
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("last", [True, False])
-def test_every_kind_of_line_end_gives_the_same_rows(log, end, last):
+def test_all_kinds_of_line_ends_give_the_same_rows(log, end, last):
     source = read(log(end.join(["t,a", "0,1", "1,2", "2,3"]) + (end if last else "")))
     assert values(source, "a") == [1, 2, 3]
     assert not source.findings
@@ -44,7 +44,7 @@ def test_a_file_without_header_has_its_columns_by_number(log):
     assert source.details["header"] == "none: columns by number"
 
 
-def test_a_unit_in_the_header_is_told_and_may_be_left_out_of_the_name(log):
+def test_a_unit_in_the_header_is_read_and_may_be_omitted_in_the_name(log):
     source = read(log("t [ms],torque (Nm),q[0],q[1]\n0,1,2,3\n"))
     assert source.columns["torque (Nm)"].unit == "Nm"
     assert source.columns["t [ms]"].unit == "ms"
@@ -53,7 +53,7 @@ def test_a_unit_in_the_header_is_told_and_may_be_left_out_of_the_name(log):
     assert column_key("q", source.names) is None
 
 
-def test_a_name_that_two_columns_share_without_their_units_is_not_guessed(log):
+def test_a_name_that_two_columns_share_without_their_units_is_ambiguous(log):
     names = read(log("f [N],f [V]\n0,1\n")).names
     assert column_key("f", names) is None
     assert column_key("f [V]", names) == "f [V]"
@@ -73,12 +73,12 @@ def test_a_decimal_comma_is_read_as_one(log, separator):
     assert source.details["decimal mark"] == "comma"
 
 
-def test_a_point_between_thousands_beside_a_decimal_comma_is_read_as_one(log, machine):
+def test_a_point_as_thousands_separator_with_a_decimal_comma_is_read(log, machine):
     source = read(log("t;i_motor;n_motor\n0;1,5;0\n1;1.234,5;0\n2;1,5;0\n"), machine().columns)
     assert values(source, "i_motor") == [1.5, 1234.5, 1.5]
 
 
-def test_a_point_at_another_place_in_a_column_with_decimal_commas_is_refused(log, machine):
+def test_a_misplaced_point_in_a_column_with_decimal_commas_is_refused(log, machine):
     path = log("t;i_motor;n_motor\n0;1,5;0\n1;1.23,5;0\n2;1,5;0\n")
     with pytest.raises(RecordingError, match=r"line 3, column 'i_motor': '1\.23,5' is not a number"):
         read(path, machine().columns)
@@ -105,7 +105,7 @@ def test_empty_cells_and_nan_are_missing_values(log):
     assert [math.isnan(value) for value in values(source, "a")] == [True, True, True, False]
 
 
-def test_quoted_cells_may_hold_the_separator(log):
+def test_quoted_cells_may_contain_the_separator(log):
     source = read(log('"t","torque, motor"\n"0","1.5"\n"1","2.5"\n'))
     assert values(source, "torque, motor") == [1.5, 2.5]
 
@@ -123,7 +123,7 @@ def test_a_column_of_words_is_left_out_of_a_survey_and_named(log):
 
 
 @pytest.mark.parametrize("text", ["abc", "1.5 V", "1_000", "NA", "0x10", "1 234"])
-def test_a_cell_that_is_no_number_is_named_with_line_column_and_text(log, machine, text):
+def test_a_cell_that_is_not_a_number_is_named_with_line_column_and_text(log, machine, text):
     path = log(f"# made by hand\nt,i_motor,n_motor\n0,1,2\n1,{text},3\n2,3,4\n")
     with pytest.raises(RecordingError) as fault:
         read(path, machine().columns)
@@ -156,10 +156,10 @@ def test_a_short_last_line_with_its_end_is_ragged(log):
         read(log("t,a\n0,1\n2\n"))
 
 
-def test_a_duplicate_name_matters_only_where_it_is_asked_for(log, machine):
+def test_a_duplicate_name_matters_only_if_it_is_requested(log, machine):
     assert values(read(log("t,i_motor,n_motor,x,x\n0,1,2,3,4\n"), machine().columns), "i_motor") == [1]
     path = log("t,i_motor,n_motor,n_motor\n0,1,2,3\n")
-    with pytest.raises(RecordingError, match=r"column 'n_motor' .* is there 2 times .*2 or 3"):
+    with pytest.raises(RecordingError, match=r"2 columns have the name 'n_motor' .*2 or 3"):
         read(path, machine().columns)
     numbered = machine(
         '[channels]\ntime = { column = "t", unit = "ms" }\nspeed = { column = 3, unit = "rad/s" }\n'
@@ -186,9 +186,9 @@ def test_a_column_number_beyond_the_file_is_an_error(log, machine):
     [
         (b"", "is empty"),
         (b"\n\n  \n", "is empty"),
-        (b"t,a\n", "holds a header in line 1 and no row of numbers"),
-        (b"# only\n# comments\n", "holds no row of numbers"),
-        (b"some words\nand more words\n", "holds no row of numbers: line 2"),
+        (b"t,a\n", "contains a header in line 1 and no row of numbers"),
+        (b"# only\n# comments\n", "contains no row of numbers"),
+        (b"some words\nand more words\n", "contains no row of numbers: line 2"),
         (b"t,a\n\x00\x01\x02\x03,\xff\n", "binary"),
         (b"\x89PNG\r\n\x1a\n1,2", "binary or markup"),
         (b"<html><body>1,2</body></html>", "binary or markup"),
@@ -196,7 +196,7 @@ def test_a_column_number_beyond_the_file_is_an_error(log, machine):
         (b't,a\n0,"1\n2,3\n4,5\n', "cells|quotes|table"),
     ],
 )
-def test_what_is_no_table_of_numbers_is_refused_in_one_line(log, content, message):
+def test_anything_but_a_table_of_numbers_is_refused_in_one_line(log, content, message):
     path = log(content)
     with pytest.raises(RecordingError, match=message) as fault:
         read(path)

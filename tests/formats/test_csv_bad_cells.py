@@ -1,4 +1,4 @@
-"""Cells and lines that cannot be read: the first bad one is named, with what to do; `info` keeps the column."""
+"""Cells and lines that cannot be read: the first one is named with a hint; `info` still reads the column."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ SECONDS = '[channels]\ntime = { column = 0, unit = "s" }\nspeed = { column = 1, 
 STAMPS = ["23:59:58.5", "23:59:59.0", "23:59:59.5"]
 
 
-def told(source, severity: str) -> list[Finding]:
-    return [found for found in source.findings if found.severity == severity]
+def findings_of(source, severity: str) -> list[Finding]:
+    return [finding for finding in source.findings if finding.severity == severity]
 
 
 @pytest.mark.parametrize("cell", ["n/a", "-", "#N/A", "OVL", "#WERT!"])
@@ -24,7 +24,7 @@ def test_a_word_in_a_column_of_numbers_is_a_loss_to_a_survey_and_an_error_with_a
     path = log("t;x\n" + "".join(f"{i};{cell if i == 4 else i}\n" for i in range(20)))
     source = Csv().columns(path)
     assert np.flatnonzero(np.isnan(source.columns["x"].values)).tolist() == [4]
-    (loss,) = told(source, "loss")
+    (loss,) = findings_of(source, "loss")
     assert loss == Finding(UnreadCells((6,), cell, CellAdvice("word", f'"{cell}"')), "x", "loss")
     with pytest.raises(RecordingError, match=r"line 6, column 'x': .* is not a number") as fault:
         read_recording(path, machine(SECONDS))
@@ -37,47 +37,47 @@ def test_a_column_with_many_words_is_left_out_with_a_warning(log):
     path = log("t;x\n" + "".join(f"{i};{'idle' if i % 5 == 0 else i}\n" for i in range(100)))
     source = Csv().columns(path)
     assert list(source.columns) == ["t"]
-    (warning,) = told(source, "warning")
+    (warning,) = findings_of(source, "warning")
     assert warning.fact == NotNumeric("x", 2, "idle", CellAdvice("word", '"idle"'))
 
 
 @pytest.mark.parametrize("cell", ["#N/A", "#DIV/0!", "#WERT!", "#####", "#error"])
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_a_row_that_begins_with_what_excel_writes_for_no_value_is_a_row(log, cell, separator):
+def test_a_row_that_starts_with_an_error_value_of_excel_is_a_row(log, cell, separator):
     lines = [f"{i}{separator}{i}.5" for i in range(9)]
     lines[4] = f"{cell}{separator}4.5"
     source = Csv().columns(log(f"t{separator}x\n" + "\n".join(lines) + "\n"))
     assert source.columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
-    assert len(told(source, "loss")) == 1 and not told(source, "note")
+    assert len(findings_of(source, "loss")) == 1 and not findings_of(source, "note")
 
 
 @pytest.mark.parametrize("comment", ["# paused, by hand", "#4,4.5", "# 4,4.5", "#paused"])
-def test_a_line_of_words_or_a_row_made_a_comment_is_a_comment(log, comment):
+def test_a_commented_line_of_words_or_row_is_a_comment(log, comment):
     lines = [f"{i},{i}.5" for i in range(9)]
     lines[4] = comment
     source = Csv().columns(log("t,x\n" + "\n".join(lines) + "\n"))
     assert len(source.columns["x"].values) == 8
-    assert told(source, "note") == [Finding(CommentLines((6,)), severity="note")]
+    assert findings_of(source, "note") == [Finding(CommentLines((6,)), severity="note")]
 
 
 @pytest.mark.parametrize("bad", ["24:00:00.0", "23:59:60", "12:61:00", "24:00"])
 @pytest.mark.parametrize("at", [0, 1, 3])
-def test_the_first_time_that_no_layout_fits_is_named_and_not_a_good_one(log, machine, bad, at):
+def test_the_first_time_that_matches_no_layout_is_named(log, machine, bad, at):
     stamps = [*STAMPS[:at], bad, *STAMPS[at:]]
     path = log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps))
     with pytest.raises(
-        RecordingError, match=rf"line {at + 2}, column 't': '{bad}' is no time written as %H:%M:%S\.%f"
+        RecordingError, match=rf"line {at + 2}, column 't': '{bad}' is not a time with the layout %H:%M:%S\.%f"
     ) as e:
         read_recording(path, machine(SECONDS))
     assert "time_format" in e.value.hint and "decimal mark" not in str(e.value)
     source = Csv().columns(path)
     assert np.flatnonzero(np.isnan(source.columns["t"].values)).tolist() == [at]
-    assert told(source, "loss") == [Finding(UnreadCells((at + 2,), bad, CellAdvice("time")), "t", "loss")]
+    assert findings_of(source, "loss") == [Finding(UnreadCells((at + 2,), bad, CellAdvice("time")), "t", "loss")]
 
 
-def test_dates_in_no_known_layout_are_named_with_time_format(log, machine):
+def test_dates_with_an_unknown_layout_are_named_with_time_format(log, machine):
     path = log("t;x\n" + "".join(f"04.13.2025 12:00:0{i};1\n" for i in range(5)))
-    with pytest.raises(RecordingError, match=r"line 2, .* nor a date or time in a layout that is known") as fault:
+    with pytest.raises(RecordingError, match=r"line 2, .* nor a date or time with a known layout") as fault:
         read_recording(path, machine(SECONDS))
     assert "time_format" in fault.value.hint
     layout = SECONDS + '[csv]\ntime_format = "%m.%d.%Y %H:%M:%S"\n'
@@ -85,22 +85,22 @@ def test_dates_in_no_known_layout_are_named_with_time_format(log, machine):
 
 
 @pytest.mark.parametrize("head", ["", "t;x;y\n"], ids=["no header", "header"])
-def test_a_first_row_of_empty_cells_is_no_header(log, head):
+def test_a_first_row_of_empty_cells_is_not_a_header(log, head):
     source = Csv().columns(log(head + ";;\n0;1;2\n1;2;3\n"))
     assert list(source.columns) == (["t", "x", "y"] if head else ["0", "1", "2"])
     assert source.columns[list(source.columns)[1]].values.tolist() == [1, 2]
-    assert len(told(source, "note")) == 1
+    assert len(findings_of(source, "note")) == 1
 
 
 def test_a_line_longer_than_the_sample_is_named(log):
     wide = "t;" + ";".join(f"c{i}" for i in range(60_000))
-    with pytest.raises(RecordingError, match="line 1 goes on beyond the 128 KB"):
+    with pytest.raises(RecordingError, match="line 1 continues after the first 128 KB"):
         Csv().columns(log(wide + "\n" + "0;" * 60_000 + "1\n"))
 
 
 def test_a_control_character_in_the_header_is_named(log):
     path = log("\x1b[31mt;x\n0;1\n1;2\n")
-    with pytest.raises(RecordingError, match=r"line 1 holds a control character \(byte 0x1b\)"):
+    with pytest.raises(RecordingError, match=r"line 1 contains a control character \(byte 0x1b\)"):
         choose_format(path).columns(path)
 
 

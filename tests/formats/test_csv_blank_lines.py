@@ -1,4 +1,4 @@
-"""Blank lines of tables: in one column a missing sample, which must not shorten the time."""
+"""Blank lines in tables: with one column each is a missing sample, so that the time is not shortened."""
 
 from __future__ import annotations
 
@@ -10,43 +10,43 @@ from hypothesis import strategies as st
 from cdtool.findings import Fact
 from cdtool.findings.tables import BlankLines, BlankRows
 from cdtool.formats.csv import Csv
-from cdtool.formats.pieces import joined
+from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 
 RATE = '[channels]\ntime = { rate_hz = 100.0 }\nspeed = { column = "x", unit = "rad/s" }\n'
 
 
-def told(source, severity: str) -> list[Fact]:
+def facts_of(source, severity: str) -> list[Fact]:
     return [finding.fact for finding in source.findings if finding.severity == severity]
 
 
-def test_a_blank_line_in_one_column_keeps_its_place_on_the_clock(log, machine):
+def test_a_blank_line_in_one_column_is_a_missing_sample_with_its_time(log, machine):
     recording = read_recording(log("x\n1.5\n2.5\n\n3.5\n4.5\n"), machine(RATE))
     assert recording["speed"].time.tolist() == [0.0, 0.01, 0.02, 0.03, 0.04]
     assert np.isnan(recording["speed"].values[:, 0]).tolist() == [False, False, True, False, False]
-    assert BlankRows((4,)) in told(recording, "warning")
-    assert told(recording, "loss") == []
+    assert BlankRows((4,)) in facts_of(recording, "warning")
+    assert facts_of(recording, "loss") == []
 
 
-def test_where_every_other_line_is_blank_it_is_the_spacing_of_the_rows(log):
+def test_if_every_other_line_is_blank_it_only_separates_the_rows(log):
     source = Csv().columns(log("x\n" + "".join(f"{i}.5\n\n" for i in range(9))))
     assert source.columns["x"].values.tolist() == [i + 0.5 for i in range(9)]
-    assert told(source, "note") == [BlankLines(tuple(range(3, 18, 2)))]
+    assert facts_of(source, "note") == [BlankLines(tuple(range(3, 18, 2)))]
 
 
-def test_in_several_columns_a_blank_line_is_no_row(log):
+def test_a_blank_line_in_several_columns_is_not_a_row(log):
     source = Csv().columns(log("t;x\n0;1.5\n\n1;2.5\n"))
-    assert source.columns["x"].values.tolist() == [1.5, 2.5] and told(source, "note") == [BlankLines((3,))]
+    assert source.columns["x"].values.tolist() == [1.5, 2.5] and facts_of(source, "note") == [BlankLines((3,))]
 
 
-def test_a_time_in_one_column_has_no_stamp_in_a_blank_line(log):
+def test_a_blank_line_in_a_column_of_times_is_a_missing_stamp(log):
     source = Csv().columns(log("t\n12:00:01\n\n12:00:03\n12:00:04\n"))
     assert np.array_equal(source.columns["t"].values, [43201, np.nan, 43203, 43204], equal_nan=True)
 
 
 @pytest.mark.parametrize("end", ["\n", "\n\n", "\n\n\n", "\n \t\n", "", "\n  "], ids=repr)
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
-def test_blank_lines_at_the_end_are_no_samples(log, end, encoding):
+def test_blank_lines_at_the_end_are_not_samples(log, end, encoding):
     source = Csv().columns(log(("x\n1.25\n\n2.25\n3.25" + end).encode(encoding)))
     assert np.array_equal(source.columns["x"].values, [1.25, np.nan, 2.25, 3.25], equal_nan=True)
 
@@ -63,6 +63,6 @@ def test_every_line_between_the_first_and_the_last_number_is_a_sample(tmp_path, 
     path.write_bytes(end.join(["x", *lines, ""]).encode())
     monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", blocks)
     truth = [float(line) if line.strip() else np.nan for line in lines]
-    for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
         assert np.array_equal(source.columns["x"].values, truth, equal_nan=True)
         assert source.first_row == 2

@@ -1,4 +1,4 @@
-"""Every awkward table is read right, to the bit, or refused in one line; what is skipped or lost is said."""
+"""Every unusual table is read exactly, or refused in one line; skipped and lost lines are reported."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NAMES = [case.name for case in cases(0)]
 
 
 def pinned(case: Case, names: list[str]) -> ChannelMap | None:
-    """A map that asks for all columns, as a machine file with these pins would."""
+    """Return a channel map of all columns with the pins of the case; None without pins."""
     if not case.pins:
         return None
     from cdtool.channels import ChannelSource
@@ -40,7 +40,7 @@ def check(case: Case, folder) -> None:
     if case.columns is None:
         with pytest.raises(RecordingError) as fault:
             read(case, folder)
-        assert case.said in str(fault.value)
+        assert case.words in str(fault.value)
         assert "\n" not in str(fault.value) and fault.value.message.startswith(str(folder / "log.csv"))
         return
     source = read(case, folder)
@@ -51,11 +51,11 @@ def check(case: Case, folder) -> None:
     assert not case.kind or kinds & set(case.kind.split(" or "))
 
 
-def test_there_are_at_least_eighty_cases_each_with_a_name_of_its_own():
+def test_there_are_at_least_eighty_cases_with_unique_names():
     assert len(set(NAMES)) == len(NAMES) >= 80
 
 
 @pytest.mark.parametrize("number", range(len(NAMES)), ids=NAMES)
-def test_a_case_is_read_as_a_careful_person_would_read_it(tmp_path, number):
+def test_a_case_is_read_as_expected_or_refused(tmp_path, number):
     for seed in SEEDS:
         check(cases(seed)[number], tmp_path)

@@ -1,4 +1,4 @@
-"""Clocks of tables that may be read in two ways, or that begin anew: never a time that is silently wrong."""
+"""Clocks of tables that can be read in two ways, or that start again: no time is silently wrong."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Fact
 from cdtool.findings.clocks import BackwardStamps, WrittenTimes
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.stamps import NS, unwrapped
-from cdtool.formats.pieces import joined
+from cdtool.formats.csv.stamps import NS, unwrap
+from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 from tests.formats.conftest import COLUMNS
 
@@ -36,7 +36,7 @@ def test_days_of_excel_are_refused_with_both_readings_whatever_their_rate_and_de
     assert "or 45231.541" in one.value.message and 'time_format = "excel" or "number"' in one.value.hint
 
 
-def test_days_of_excel_are_read_in_either_way_once_pinned(log, machine):
+def test_days_of_excel_are_read_by_either_pin(log, machine):
     path = log(table(f"{START + i / 86400:.9f}" for i in range(50)))
     days = read_recording(path, machine(SECONDS + '[csv]\ntime_format = "excel"\n'))
     assert days["speed"].time == pytest.approx(np.arange(50.0), abs=1e-4)
@@ -50,7 +50,7 @@ def test_days_of_excel_are_read_in_either_way_once_pinned(log, machine):
     [(45231.5, 1e-3, "s"), (45231.5, 1e-4, "s"), (45231.5, 0.1, "ms"), (45231.5, 1, "us"), (0.0, 1e-5, "s")],
     ids=["1 kHz", "10 kHz", "10 kHz in ms", "1 MHz in us", "100 kHz from 0"],
 )
-def test_a_clock_in_seconds_that_stands_where_days_of_excel_do_is_read(log, machine, first, step, unit):
+def test_a_clock_in_seconds_in_the_range_of_days_of_excel_is_read(log, machine, first, step, unit):
     path = log(table(f"{first + i * step:.6f}" for i in range(50)))
     factor = {"s": 1.0, "ms": 1e-3, "us": 1e-6}[unit]
     recording = read_recording(path, machine(COLUMNS.replace('"ms"', f'"{unit}"')))
@@ -61,30 +61,30 @@ def minutes(seconds: float) -> str:
     return f"{int(seconds // 60) % 60:02d}:{seconds % 60:06.3f}"
 
 
-@pytest.mark.parametrize("pin", ["", '[csv]\ntime_format = "%M:%S.%f"\n'], ids=["found", "pinned"])
-def test_minutes_and_seconds_go_on_past_the_full_hour(log, machine, pin):
-    times = 3590.0 + 0.5 * np.arange(15_000)  # two hours and five minutes: past three full hours
+@pytest.mark.parametrize("pin", ["", '[csv]\ntime_format = "%M:%S.%f"\n'], ids=["detected", "pinned"])
+def test_minutes_and_seconds_continue_after_the_full_hour(log, machine, pin):
+    times = 3590.0 + 0.5 * np.arange(15_000)  # two hours and five minutes, with three full hours
     recording = read_recording(log(table(map(minutes, times))), machine(SECONDS + pin))
     assert recording["speed"].time.tolist() == times.tolist()
     assert WrittenTimes("%M:%S.%f", "the full hour", wraps="the full hour", wrapped=3) in facts(recording)
-    assert not [found for found in recording.findings if found.channel == "time"]
+    assert not [finding for finding in recording.findings if finding.channel == "time"]
 
 
-def test_the_full_hour_is_passed_between_two_blocks_too(log, monkeypatch):
+def test_a_full_hour_between_two_blocks_is_detected(log, monkeypatch):
     monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 1 << 9)
     times = 3590.0 + 0.5 * np.arange(400)
-    source = joined(Csv().pieces(log(table(map(minutes, times)))), sort=False)
+    source = join_pieces(Csv().pieces(log(table(map(minutes, times)))), sort=False)
     assert source.columns["t"].values.tolist() == times.tolist()
 
 
-def test_a_stray_step_back_is_no_full_hour_and_is_told(log, machine):
+def test_a_single_backward_step_is_reported_and_not_a_full_hour(log, machine):
     times = [*np.arange(1800.0, 1810.0), 1801.5, *np.arange(1810.0, 1820.0)]
     recording = read_recording(log(table(map(minutes, times))), machine(SECONDS))
     assert recording["speed"].time.tolist() == [*np.arange(1800.0, 1820.0)]
     assert BackwardStamps(1, 21, (12,), "line") in facts(recording)
 
 
-def test_half_days_without_their_letters_go_on_past_noon(log, machine):
+def test_half_days_without_am_and_pm_continue_after_noon(log, machine):
     seconds = 43190 + np.arange(20)
     stamps = [f"{(s // 3600 - 1) % 12 + 1:02d}:{s // 60 % 60:02d}:{s % 60:02d}" for s in seconds.tolist()]
     pinned = machine(SECONDS + '[csv]\ntime_format = "%I:%M:%S"\n')
@@ -93,8 +93,8 @@ def test_half_days_without_their_letters_go_on_past_noon(log, machine):
 
 
 @pytest.mark.parametrize("period", [60, 3600, 43200, 86400])
-def test_stamps_that_begin_anew_are_counted_on_in_whole_periods(period):
+def test_stamps_that_start_again_continue_by_whole_periods(period):
     truth = period * NS // 3 * np.arange(20, dtype=np.int64)
     stamps = truth % (period * NS)
-    assert unwrapped(stamps, np.ones(20, dtype=bool), period * NS) == 6
+    assert unwrap(stamps, np.ones(20, dtype=bool), period * NS) == 6
     assert stamps.tolist() == truth.tolist()

@@ -1,4 +1,4 @@
-"""A line of sums below the rows is no sample: it is left out with its line. What only looks like one stays an error."""
+"""A line of sums below the rows is not a sample: it is left out and reported. Other words are still an error."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from cdtool.ingest.reading import read_recording
 
 FOOTERS = {
     "a sum": ["Sum,7"],
-    "a sum behind a blank line": ["", "Sum,7"],
+    "a sum after a blank line": ["", "Sum,7"],
     "statistics": ["Sum,7", "Mean,1.5", "Max,4", "", "Std. dev.,0.3"],
-    "words and figures": ["Statistics", "\u03a3,7", "\u2211 a,7", "exported by hand"],
+    "words and numbers": ["Statistics", "\u03a3,7", "\u2211 a,7", "exported by hand"],
     "words that fill the row": ["End of file,"],
-    "a drawn line and a sum": ["---------", "Sum,7"],
+    "a ruler and a sum": ["---------", "Sum,7"],
     "a quoted sum": ['"Sum, all",7'],
     "a name for the sum of words": ["Sum,none"],
 }
@@ -34,8 +34,8 @@ def written(lines: list[str], end: str = "\n", last: bool = True, encoding: str 
     return (end.join(["t,a", *lines]) + (end if last else "")).encode(encoding)
 
 
-def told(source) -> list[FooterSkipped]:
-    return [found.fact for found in source.findings if isinstance(found.fact, FooterSkipped)]
+def footers_of(source) -> list[FooterSkipped]:
+    return [finding.fact for finding in source.findings if isinstance(finding.fact, FooterSkipped)]
 
 
 def check(source, count: int) -> None:
@@ -46,13 +46,13 @@ def check(source, count: int) -> None:
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-32"])
 @pytest.mark.parametrize("last", [True, False], ids=["ended", "without a line end"])
 @pytest.mark.parametrize("footer", FOOTERS.values(), ids=FOOTERS.keys())
-def test_words_with_figures_below_the_rows_are_no_samples(log, footer, last, encoding):
+def test_lines_of_words_and_numbers_below_the_rows_are_not_samples(log, footer, last, encoding):
     source = Csv().columns(log(written(rows(9) + footer, last=last, encoding=encoding)))
     check(source, 9)
-    (fact,) = told(source)
+    (fact,) = footers_of(source)
     first = next(line for line in footer if line.strip("-"))
     assert fact.text == first
-    assert not [found for found in source.findings if found.severity == "loss"]
+    assert not [finding for finding in source.findings if finding.severity == "loss"]
 
 
 @pytest.mark.parametrize("end", ENDS.values(), ids=ENDS.keys())
@@ -65,20 +65,20 @@ def test_words_with_figures_below_the_rows_are_no_samples(log, footer, last, enc
     ],
     ids=["short", "two lines", "longer than the sample"],
 )
-def test_a_footer_is_told_with_its_lines(log, end, count, footer, lines):
+def test_a_footer_is_reported_with_its_lines(log, end, count, footer, lines):
     source = Csv().columns(log(written(rows(count) + footer, end)))
     check(source, count)
-    assert told(source) == [FooterSkipped(lines, "Sum,7")]
+    assert footers_of(source) == [FooterSkipped(lines, "Sum,7")]
 
 
-def test_a_footer_in_a_wide_encoding_behind_the_sample_is_found(log):
+def test_a_footer_in_a_wide_encoding_after_the_sample_is_detected(log):
     source = Csv().columns(log(written([*rows(50_000), "Sum,7"], encoding="utf-16")))
     check(source, 50_000)
-    assert told(source) == [FooterSkipped((50002,), "Sum,7")]
+    assert footers_of(source) == [FooterSkipped((50002,), "Sum,7")]
 
 
 @pytest.mark.parametrize("clock", ['column = "t", unit = "ms"', 'column = "t", unit = "s"'])
-def test_a_footer_is_left_out_with_a_machine_file_too(log, machine, clock):
+def test_a_footer_is_also_left_out_with_a_machine_file(log, machine, clock):
     lines = "t,i_motor,n_motor\n" + "".join(f"{10 * i},{i},{i + 1}\n" for i in range(20))
     channels = (
         f'[channels]\ntime = {{ {clock} }}\nspeed = {{ column = "n_motor", unit = "rad/s" }}\n'
@@ -88,20 +88,20 @@ def test_a_footer_is_left_out_with_a_machine_file_too(log, machine, clock):
     found = read_recording(log(lines + "Sum,190,210\n"), machine(channels))
     for channel in plain.channels:
         np.testing.assert_array_equal(found[channel].values, plain[channel].values)
-    assert told(found) == [FooterSkipped((22,), "Sum,190,210")]
+    assert footers_of(found) == [FooterSkipped((22,), "Sum,190,210")]
 
 
-def test_a_footer_below_dates_does_not_hide_that_they_are_dates(log):
+def test_dates_above_a_footer_are_recognised(log):
     lines = [f"2025-01-01 00:00:{i:02d},{i}" for i in range(30)]
     source = Csv().columns(log(written([*lines, "Sum,435"])))
     np.testing.assert_array_equal(source.columns["t"].values, np.arange(30.0))
-    assert told(source) == [FooterSkipped((32,), "Sum,435")]
+    assert footers_of(source) == [FooterSkipped((32,), "Sum,435")]
 
 
-def test_a_footer_without_a_header_and_with_a_separator_behind_each_row(log):
+def test_a_footer_is_detected_without_a_header_and_with_trailing_separators(log):
     source = Csv().columns(log("".join(f"{i};{i},5;\n" for i in range(12)) + "Summe;72,0;\n"))
     np.testing.assert_array_equal(source.columns["1"].values, np.arange(12) + 0.5)
-    assert told(source) == [FooterSkipped((13,), "Summe;72,0;")]
+    assert footers_of(source) == [FooterSkipped((13,), "Summe;72,0;")]
 
 
 @pytest.mark.parametrize(
@@ -117,46 +117,46 @@ def test_a_footer_without_a_header_and_with_a_separator_behind_each_row(log):
     ],
     ids=["repeated", "among the rows too", "among the rows", "not available", "overflow", "a slip", "many"],
 )
-def test_words_that_are_no_footer_are_still_an_error_with_a_machine_file(log, machine, lines, message):
+def test_words_other_than_a_footer_are_an_error_with_a_machine_file(log, machine, lines, message):
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "a", unit = "rad/s" }\n'
     with pytest.raises(RecordingError) as fault:
         read_recording(log(written(lines)), machine(channels))
     assert message in fault.value.message
     source = Csv().columns(log(written(lines)))
-    assert told(source) == [] and len(source.columns["a"].values) == len(lines)
-    assert any("line" in str(found) for found in source.findings)  # the words are told
+    assert footers_of(source) == [] and len(source.columns["a"].values) == len(lines)
+    assert any("line" in str(finding) for finding in source.findings)  # the words are reported
 
 
-def test_a_row_that_a_loss_of_power_ends_is_no_footer(log):
+def test_a_row_cut_by_a_power_failure_is_not_a_footer(log):
     source = Csv().columns(log(written([*rows(9), "Sum,7"]) + bytes(300)))
-    assert told(source) == []
-    assert any(found.fact == NulBytesAtEnd(300) for found in source.findings)
+    assert footers_of(source) == []
+    assert any(finding.fact == NulBytesAtEnd(300) for finding in source.findings)
 
 
-def test_the_header_at_the_end_is_the_header_again(log):
+def test_a_repeated_header_at_the_end_is_not_a_footer(log):
     source = Csv().columns(log(written([*rows(9), "t,a"])))
     check(source, 9)
     assert source.findings == (Finding(HeaderLines((11,)), severity="note"),)
 
 
-def test_a_column_of_words_in_front_has_no_footer(log):
+def test_a_table_with_words_in_its_first_column_has_no_footer(log):
     source = Csv().columns(log(written(["up,1", "down,2", "up,3", "Sum,6"])))
     np.testing.assert_array_equal(source.columns["a"].values, [1.0, 2.0, 3.0, 6.0])
-    assert told(source) == []
+    assert footers_of(source) == []
 
 
 @settings(max_examples=60, deadline=None)
 @given(
-    count=st.integers(13, 40),  # more rows than words: else the column is one of words
+    count=st.integers(13, 40),  # more rows than words, so that the column is numeric
     labels=st.lists(st.text("abcdefgijkmpqrtuvwxyz", min_size=2, max_size=9), min_size=1, max_size=12, unique=True),
     blank=st.integers(0, 3),
     last=st.booleans(),
     end=st.sampled_from(sorted(ENDS.values())),
 )
-def test_any_footer_is_cut_off_and_nothing_else(tmp_path_factory, count, labels, blank, last, end):
+def test_any_footer_and_nothing_else_is_removed(tmp_path_factory, count, labels, blank, last, end):
     path = tmp_path_factory.mktemp("footer") / "log.csv"
     footer = [f"{label.title()} of all,{i}" for i, label in enumerate(labels)]
     path.write_bytes(written(rows(count) + [""] * blank + footer, end, last))
     source = Csv().columns(path)
     check(source, count)
-    assert len(told(source)) == 1
+    assert len(footers_of(source)) == 1

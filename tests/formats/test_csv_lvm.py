@@ -1,4 +1,4 @@
-"""LabVIEW's measurement files: text with a head of keys, channels side by side."""
+"""LabVIEW's measurement files: text tables with a head of keys and values."""
 
 from __future__ import annotations
 
@@ -58,21 +58,21 @@ def test_a_measurement_file_is_read_by_its_suffix_with_names_units_and_times(log
     assert isinstance(source.findings[0].fact, WordsAboveRows)
 
 
-def test_a_comment_behind_a_row_is_named_and_left_out(log):
+def test_a_comment_after_a_row_is_named_and_left_out(log):
     rows = [f"{row}\t{'gate closed' if i == 3 else ''}\n" for i, row in enumerate(ROWS.splitlines())]
     source = survey(log(MEASUREMENT.replace(ROWS, "".join(rows))))
     assert list(source.columns) == ["X_Value", "Force", "Torque"]
-    assert NotNumeric("Comment", 27, "gate closed") in [found.fact for found in source.findings]
+    assert NotNumeric("Comment", 27, "gate closed") in [finding.fact for finding in source.findings]
 
 
-def test_a_second_heading_is_refused_with_its_line_rather_than_read_on(log):
+def test_a_second_heading_is_refused_with_its_line(log):
     path = log(HEAD.format(headings="Yes") + SEGMENT + ROWS + SEGMENT + ROWS, "two.lvm")
     with pytest.raises(RecordingError, match="line 64 has 2 cells, the header has 3"):
         survey(path)
 
 
-def test_a_clock_for_each_channel_is_kept(log, machine):
-    """`X_Columns Multi`: the keys of a channel stand above its values, between them the times."""
+def test_each_channel_has_its_own_clock(log, machine):
+    """`X_Columns Multi`: the keys of a channel are above its values, and each channel has a column of times."""
     lines = []
     for line in SEGMENT.splitlines():
         key, *values = line.split("\t")
@@ -84,13 +84,13 @@ def test_a_clock_for_each_channel_is_kept(log, machine):
     recording = read_recording(path, machine(channels + 'speed = { column = "speed", unit = "rad/s" }\n'))
     assert recording["force"].time.tolist() == [i / 1000 for i in range(40)]
     assert recording["speed"].time.tolist() == [i / 250 for i in range(40)]
-    with pytest.raises(RecordingError, match="column 'speed' stands beside the clock 'X_Value#2'"):
+    with pytest.raises(RecordingError, match="column 'speed' is beside the clock 'X_Value#2'"):
         read_recording(
             path, machine(channels.replace('"time"', "0") + 'speed = { column = "speed", unit = "rad/s" }\n')
         )
 
 
-def test_info_takes_its_first_column_for_the_clock(log):
+def test_info_uses_the_first_column_as_the_clock(log):
     info = cdtool.info(log(MEASUREMENT, "gate.lvm"))
     assert info.format == "csv"
     assert [channel.rate_hz for channel in info.channels] == pytest.approx([1000.0] * 3)

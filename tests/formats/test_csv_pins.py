@@ -1,4 +1,4 @@
-"""`[csv]` of the machine file: what it says replaces what is found, and is held against the file."""
+"""`[csv]` of the machine file: its pins replace detected properties, and are checked against the file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdtool.findings.clocks import SampleGaps
 from cdtool.findings.tables import UnreadCells
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
-from cdtool.formats.csv.table import is_whole
+from cdtool.formats.csv.table import is_complete
 from cdtool.ingest.reading import read_recording
 from cdtool.tables import Table
 from tests.formats.conftest import COLUMNS
@@ -36,15 +36,15 @@ def pinned(text: str) -> str:
         ('separator = "x"', "csv.separator: is 'x'.*comma"),
         ('decimal = ";"', "csv.decimal: is ';'"),
         ('thousands = "_"', "csv.thousands: is '_'"),
-        ('decimal = ","\nthousands = ","', "csv.thousands: is ',', as decimal is"),
+        ('decimal = ","\nthousands = ","', "csv.thousands: is ',', the same as decimal"),
         ('encoding = "klingon"', "csv.encoding: is 'klingon'.*utf-8"),
         ('encoding = "cp037"', "csv.encoding: is 'cp037'"),
         ("header = true", "csv.header: is true.*number of its line"),
         ("header = 0", "csv.header: is 0"),
-        ("header = false\nunits = 2", "csv.units: is 2 beside header = false"),
+        ("header = false\nunits = 2", "csv.units: is 2, but header is false"),
         ("skip_lines = -1", "csv.skip_lines: is -1"),
         ('missing = "ok"\ncomment = 3', "csv.comment: is 3"),
-        ('time_format = "%Q"', "csv.time_format: is '%Q'.*not known"),
+        ('time_format = "%Q"', "csv.time_format: is '%Q'.*not supported"),
         ('time_format = "%Y-%m"', "csv.time_format: .*%d is missing"),
         ('time_format = "days"', "csv.time_format: is 'days'"),
     ],
@@ -55,9 +55,9 @@ def test_a_wrong_pin_is_one_line_that_names_the_key(machine, text, words):
     assert "\n" not in str(fault.value)
 
 
-def test_a_pinned_mark_decides_what_the_file_leaves_open(log, machine):
+def test_a_pinned_mark_decides_if_the_file_is_ambiguous(log, machine):
     path = log(ROWS)
-    with pytest.raises(RecordingError, match=r"'1,025' is 1\.025 \(decimal comma\) or 1025 \(thousands\)"):
+    with pytest.raises(RecordingError, match=r"'1,025' may be 1\.025 \(decimal comma\) or 1025 \(thousands\)"):
         Csv().columns(path, machine().columns)
     decimal = Csv().columns(path, machine(pinned('decimal = ","')).columns)
     thousands = Csv().columns(path, machine(pinned('decimal = "."\nthousands = ","')).columns)
@@ -65,7 +65,7 @@ def test_a_pinned_mark_decides_what_the_file_leaves_open(log, machine):
     assert thousands.columns["i_motor"].values[3] == 4325.0
 
 
-def test_what_info_prints_can_be_pasted_and_reads_the_same(log, machine):
+def test_the_dialect_that_info_prints_can_be_pasted_and_reads_the_same(log, machine):
     path = log("rig 4\n\nt;i_motor;n_motor\nms;A;rad/s\n" + ROWS.partition("\n")[2].replace("25;", "5;"))
     found = cdtool.info(path)
     assert "header" not in tomllib.loads(found.dialect)["csv"] and "# header = 3  (in this file" in found.dialect
@@ -75,7 +75,7 @@ def test_what_info_prints_can_be_pasted_and_reads_the_same(log, machine):
 
 
 @pytest.mark.parametrize("case", READABLE, ids=[case.name for case in READABLE])
-def test_what_is_printed_for_any_table_reads_it_to_the_same_numbers(log, case):
+def test_the_printed_dialect_of_any_table_reads_the_same_numbers(log, case):
     path = log(case.content)
     found = Csv().columns(path)
     pins = read_pins(Table(tomllib.loads(found.dialect)["csv"], "machine.toml", "csv."))
@@ -84,9 +84,7 @@ def test_what_is_printed_for_any_table_reads_it_to_the_same_numbers(log, case):
         ChannelSource(f"c{i}", (i,)) for i in {*numbers, len(found.names) - 1} if found.names[i] in found.columns
     )
     wanted = ChannelMap(TimeSource(rate=1.0), sources, ("axis",), pins=pins)
-    if any(
-        isinstance(finding.fact, UnreadCells) for finding in found.findings
-    ):  # a survey forgives it, nothing else does
+    if any(isinstance(finding.fact, UnreadCells) for finding in found.findings):  # only accepted in a survey
         with pytest.raises(RecordingError, match=r"is not a number"):
             Csv().columns(path, wanted)
         return
@@ -96,7 +94,7 @@ def test_what_is_printed_for_any_table_reads_it_to_the_same_numbers(log, case):
 
 
 @pytest.mark.parametrize("above", ["# made by hand\n", "rig 4\n\n", "rig 4\nrun 7\n\n"])
-def test_the_block_of_one_log_reads_the_next_with_another_line_above(log, machine, above):
+def test_the_dialect_of_one_log_reads_a_log_with_another_preamble(log, machine, above):
     table = "t;i_motor;n_motor\nms;A;rad/s\n" + ROWS.partition("\n")[2].replace("25;", "5;")
     block = Csv().columns(log("rig 4\n\n" + table)).dialect
     assert (
@@ -105,7 +103,7 @@ def test_the_block_of_one_log_reads_the_next_with_another_line_above(log, machin
 
 
 @pytest.mark.parametrize("head", ["# t x", "%t,x", "// t x", "# t x\n# [s] [N]"])
-def test_the_block_of_a_table_with_its_names_in_a_comment_can_be_pasted(log, machine, head):
+def test_the_dialect_of_a_table_with_names_in_a_comment_can_be_pasted(log, machine, head):
     separator = "," if "," in head else " "
     path = log(head + "\n" + "".join(f"{i}{separator}{i}.5\n" for i in range(9)))
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n'
@@ -125,7 +123,7 @@ def test_a_counter_with_a_rate_is_a_clock_with_its_gaps(log, machine):
     assert any(isinstance(finding.fact, SampleGaps) and finding.fact.count == 1 for finding in recording.findings)
 
 
-def test_days_of_excel_are_refused_as_seconds_and_read_where_pinned(log, machine):
+def test_days_of_excel_are_refused_as_seconds_and_read_if_pinned(log, machine):
     rows = "t,i_motor,n_motor\n" + "".join(f"{45750.5 + i * 0.001 / 86400:.12f},1,{i}\n" for i in range(20))
     seconds = COLUMNS.replace('"ms"', '"s"')
     with pytest.raises(RecordingError, match=r"days of Excel \(2025-04-03 12:00:00, 1000 Hz\), or 45750\.5 s at 86"):
@@ -135,12 +133,12 @@ def test_days_of_excel_are_refused_as_seconds_and_read_where_pinned(log, machine
     assert np.datetime64(int(recording.origin), "s") == np.datetime64("2025-04-03T12:00:00")
 
 
-def test_dates_are_a_clock_in_seconds_whose_origin_is_kept(log, machine):
+def test_dates_are_a_clock_in_seconds_with_an_origin(log, machine):
     rows = "t,i_motor,n_motor\n" + "".join(f"2025-04-03T12:00:00.{i:03d}Z,1,{i}\n" for i in range(20))
     recording = read_recording(log(rows), machine(COLUMNS.replace('"ms"', '"s"')))
     assert recording["speed"].time.tolist() == [i / 1000 for i in range(20)]
     assert np.datetime64(int(recording.origin), "s") == np.datetime64("2025-04-03T12:00:00")
-    with pytest.raises(RecordingError, match="holds dates or times of day"):
+    with pytest.raises(RecordingError, match="has dates or times of day"):
         read_recording(log(rows), machine())
 
 
@@ -161,5 +159,5 @@ def test_dates_are_a_clock_in_seconds_whose_origin_is_kept(log, machine):
         ("1", [], (True, False)),
     ],
 )
-def test_a_last_number_is_believed_by_the_digits_of_those_above(cell, above, expected):
-    assert is_whole(cell, above) == expected
+def test_the_digits_of_the_cells_above_decide_whether_a_last_number_is_complete(cell, above, expected):
+    assert is_complete(cell, above) == expected

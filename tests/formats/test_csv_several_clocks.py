@@ -1,4 +1,4 @@
-"""Tables with a clock beside each channel: no channel is read on another one's clock."""
+"""Tables with a clock for each channel: no channel is read with the clock of another."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.csv import Csv
-from cdtool.formats.pieces import joined
+from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 
 OWN = """[channels]
@@ -33,7 +33,10 @@ def named(clock: str) -> str:
 
 
 def table(header: str, first, second, mark: str = ",") -> str:
-    """Two clocks, the shorter one ending in empty cells; force is its row, torque 10 times, speed 100 times its row."""
+    """Return a table with two clocks, the shorter one padded with empty cells.
+
+    Force is the number of the row, torque 10 times and speed 100 times the number.
+    """
     lines = [header.replace(",", mark)]
     for i in range(max(len(first), len(second))):
         a = f"{first[i]:.9f},{i}" if i < len(first) else ","
@@ -45,24 +48,24 @@ def table(header: str, first, second, mark: str = ",") -> str:
 CELL, DRIVE = np.arange(50) / 2000.0, np.arange(40) / 1000.0
 
 
-def said(source) -> list[Finding]:
-    return [found for found in source.findings if isinstance(found.fact, OtherClock)]
+def clock_warnings(source) -> list[Finding]:
+    return [finding for finding in source.findings if isinstance(finding.fact, OtherClock)]
 
 
 @pytest.mark.parametrize("header", HEADERS)
-def test_each_channel_gets_the_clock_before_it(log, machine, header):
+def test_each_channel_has_the_clock_before_it(log, machine, header):
     recording = read_recording(log(table(header, CELL, DRIVE)), machine(OWN))
     assert recording["force"].time.tolist() == CELL.tolist()
     assert recording["force"].values[:, 0].tolist() == list(range(50))
     for channel in ("torque", "speed"):
         assert recording[channel].time.tolist() == DRIVE.tolist()
-    assert not [found for found in recording.findings if found.severity != "note"]
-    assert [type(found.fact) for found in recording.findings if found.channel == "time"] == [OwnClocks]
+    assert not [finding for finding in recording.findings if finding.severity != "note"]
+    assert [type(finding.fact) for finding in recording.findings if finding.channel == "time"] == [OwnClocks]
 
 
-def test_clocks_in_ms_that_do_not_say_so_are_refused_rather_than_read_in_s(log, machine):
+def test_clocks_in_ms_without_a_unit_are_refused_rather_than_read_in_s(log, machine):
     path = log(table("time,force,time2,torque,speed", 1e3 * CELL, 1e3 * DRIVE))
-    with pytest.raises(RecordingError, match="stands beside the clock 'time2'") as fault:
+    with pytest.raises(RecordingError, match="is beside the clock 'time2'") as fault:
         read_recording(path, machine(OWN.replace('unit = "s"', 'unit = "ms"')))
     assert "in the unit of its header ('time2 [ms]')" in fault.value.hint
     path = log(table("time [ms],force,time2 [ms],torque,speed", 1e3 * CELL, 1e3 * DRIVE))
@@ -81,23 +84,23 @@ def test_clocks_in_ms_that_do_not_say_so_are_refused_rather_than_read_in_s(log, 
     ids=["other rate", "2 % slower", "drifting", "later"],
 )
 @pytest.mark.parametrize("clock", ["time1", "time2"])
-def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start, step, why, clock):
+def test_one_clock_for_all_channels_is_refused_if_the_times_differ(log, machine, start, step, why, clock):
     count = np.arange(4000)
     path = log(table(HEADERS[0], 0.0005 * count, start + step * count))
     wrong, other = ("torque", "time2") if clock == "time1" else ("force", "time1")
-    text = rf"column '{wrong}' stands beside the clock '{other}', the machine file says '{clock}': "
+    text = rf"column '{wrong}' is beside the clock '{other}', but the machine file names '{clock}': "
     if clock == "time1":
         text += why
     with pytest.raises(RecordingError, match=text) as fault:
         read_recording(path, machine(named(clock)))
     assert 'time = { column = "time", unit = "s" }' in fault.value.hint
     only = "\n".join(line for line in named(clock).splitlines() if wrong not in line and "speed" not in line)
-    kept = "force" if clock == "time1" else "torque"
-    assert len(read_recording(path, machine(only))[kept]) == 4000
-    for source in (Csv().columns(path), joined(Csv().pieces(path), sort=False)):
-        (told,) = said(source)
-        assert told.channel == "time2" and isinstance(told.fact, OtherClock)
-        assert (told.fact.first, told.fact.columns) == ("time1", ("torque", "speed"))
+    remaining = "force" if clock == "time1" else "torque"
+    assert len(read_recording(path, machine(only))[remaining]) == 4000
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        (warning,) = clock_warnings(source)
+        assert warning.channel == "time2" and isinstance(warning.fact, OtherClock)
+        assert (warning.fact.first, warning.fact.columns) == ("time1", ("torque", "speed"))
 
 
 @pytest.mark.parametrize(
@@ -111,27 +114,27 @@ def test_one_clock_for_all_is_refused_where_the_times_differ(log, machine, start
     ],
     ids=["same", "in ms", "since 1970", "in us", "a temperature"],
 )
-def test_a_second_clock_of_the_same_rows_is_no_other_clock(log, machine, header, second):
+def test_a_second_clock_with_the_same_times_is_not_reported(log, machine, header, second):
     path = log(table(header, CELL, second))
     recording = read_recording(path, machine(named("time1")))
     assert recording["torque"].time.tolist() == CELL.tolist()
-    assert not said(Csv().columns(path))
+    assert not clock_warnings(Csv().columns(path))
 
 
-def test_clocks_side_by_side_are_of_the_same_rows(log, machine):
+def test_adjacent_clocks_belong_to_the_same_rows(log, machine):
     rows = "".join(f"{i / 100},{i / 100 + (i % 7) * 0.002},{i},{10 * i},{100 * i}\n" for i in range(60))
     path = log("time,stamp_s,force,torque,speed\n".replace("stamp_s", "timestamp") + rows)
     assert read_recording(path, machine(named("time")))["torque"].time[-1] == 0.59
-    assert not said(Csv().columns(path))
+    assert not clock_warnings(Csv().columns(path))
 
 
-def test_clocks_behind_their_channels_are_known_by_the_last_column(log, machine):
+def test_clocks_after_their_channels_are_recognised_by_the_last_column(log, machine):
     rows = "".join(f"{i},{i / 2000},{10 * i},{100 * i},{i / 1000}\n" for i in range(50))
     recording = read_recording(log("force,time1,torque,speed,time2\n" + rows), machine(OWN))
     assert recording["force"].time[-1] == 49 / 2000 and recording["torque"].time[-1] == 49 / 1000
 
 
-def test_units_and_an_epoch_are_taken_from_each_clocks_header(log, machine):
+def test_units_and_epoch_are_read_from_each_clocks_header(log, machine):
     header = "time1 [ms],force,time2 [s],torque,speed"
     path = log(table(header, 1.7e12 + 1e3 * CELL, 1.7e9 + 0.125 + DRIVE))
     recording = read_recording(path, machine(OWN))
@@ -140,9 +143,9 @@ def test_units_and_an_epoch_are_taken_from_each_clocks_header(log, machine):
     assert recording["torque"].time == pytest.approx(0.125 + DRIVE, abs=1e-6)
 
 
-def test_a_channel_that_no_clock_is_beside_is_refused(log, machine):
+def test_a_channel_without_a_clock_is_refused(log, machine):
     rows = "".join(f"{i},{i / 2000},{10 * i},{i / 1000},{100 * i}\n" for i in range(50))
-    with pytest.raises(RecordingError, match="no clock stands before column 'force'"):
+    with pytest.raises(RecordingError, match="no clock is beside column 'force'"):
         read_recording(log("force,time1,torque,time2,speed\n" + rows), machine(OWN))
 
 
@@ -150,7 +153,7 @@ def test_values_without_a_time_are_a_loss(log, machine):
     rows = "".join(f"{i / 2000},{i},{'' if i == 7 else i / 1000},{10 * i},{100 * i}\n" for i in range(50))
     recording = read_recording(log(HEADERS[0] + "\n" + rows), machine(OWN))
     assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
-    lost = [found for found in recording.findings if found.severity == "loss"]
+    lost = [finding for finding in recording.findings if finding.severity == "loss"]
     assert lost == [Finding(ValuesWithoutTime(1), channel, "loss") for channel in ("torque", "speed")]
 
 
@@ -160,11 +163,11 @@ def test_values_without_a_time_are_a_loss(log, machine):
     counts=st.lists(st.integers(8, 60), min_size=2, max_size=2),
     mark=st.sampled_from([",", "\t", ";"]),
 )
-def test_no_channel_is_ever_on_another_ones_clock(log, machine, rates, counts, mark):
+def test_no_channel_is_read_with_the_clock_of_another(log, machine, rates, counts, mark):
     first, second = (np.arange(count) / rate for count, rate in zip(counts, rates, strict=True))
     path = log(table(HEADERS[0], first, second, mark))
     recording = read_recording(path, machine(OWN))
     assert recording["force"].time.tolist() == first.tolist()
     assert recording["torque"].time.tolist() == second.tolist()
-    with pytest.raises(RecordingError, match="stands beside the clock"):
+    with pytest.raises(RecordingError, match="is beside the clock"):
         read_recording(path, machine(named("time1")))

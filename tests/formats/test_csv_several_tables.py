@@ -1,4 +1,4 @@
-"""Several tables in one file: every line of numbers is a sample, a loss that is counted, or the file is refused."""
+"""Several tables in one file: every line of numbers is a sample or a counted loss, or the file is refused."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cdtool.findings.tables import NumbersAboveRows
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.find_dialect import find_dialect
 from cdtool.formats.csv.text import read_sample
-from cdtool.formats.pieces import Run
+from cdtool.formats.pieces import PieceRun
 
 PREAMBLE = ("Measurement of gate 7", "Operator: Jones", "Sample rate,1000", "Date;2024-03-01 12:00:00", "")
 BETWEEN = ("", "\n", "Second table\n", "\n[channels]\n", "# next\n", "Result;ok\n\n")
@@ -29,7 +29,7 @@ def table(rng: np.random.Generator, separator: str, width: int, rows: int, heade
 
 
 def several(seed: int) -> tuple[str, int]:
-    """A file of two or three tables, and how many rows of numbers it holds."""
+    """Return a file of two or three tables, and its number of rows of numbers."""
     rng = np.random.default_rng(seed)
     text = "".join(f"{line}\n" for line in rng.choice(PREAMBLE, rng.integers(0, 4)))
     total, same = 0, bool(rng.integers(2))
@@ -69,62 +69,62 @@ def rows(count: int, width: int, first: float = 0.0) -> str:
 
 def test_rows_above_a_second_header_of_another_width_are_refused_with_their_lines(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
-    with pytest.raises(RecordingError, match=r"lines 2 to 401 above the header in line 402 hold numbers") as fault:
+    with pytest.raises(RecordingError, match=r"lines 2 to 401 above the header in line 402 have numbers") as fault:
         Csv().columns(path)
     assert "skip_lines = 401" in fault.value.hint
 
 
 def test_a_thousand_rows_of_24_columns_below_which_another_table_follows_are_refused(tmp_path):
     path = log(tmp_path, ",".join("abcdefghijklmnopqrstuvwx") + "\n" + rows(700, 24) + "t,a\n" + rows(4000, 2))
-    with pytest.raises(RecordingError, match=r"hold numbers|has 2 cells"):
+    with pytest.raises(RecordingError, match=r"have numbers|has 2 cells"):
         Csv().columns(path)
 
 
 def test_a_text_preamble_above_two_tables_does_not_hide_the_rows_of_the_first(tmp_path):
     preamble = "Measurement of gate 7\nOperator: Jones\n\n"
     path = log(tmp_path, preamble + "t,a,b\n" + rows(400, 3) + "\nSecond table\nt,a,b,c,d\n" + rows(1600, 5))
-    with pytest.raises(RecordingError, match=r"lines 5 to 404 above the header in line 407 hold numbers"):
+    with pytest.raises(RecordingError, match=r"lines 5 to 404 above the header in line 407 have numbers"):
         Csv().columns(path)
 
 
-def test_rows_below_with_another_separator_are_no_footer_of_words(tmp_path):
+def test_rows_below_with_another_separator_are_not_a_footer(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(60, 3) + "t;a\n" + rows(20, 2).replace(",", ";"))
     with pytest.raises(RecordingError, match="line 62"):
         Csv().columns(path)
 
 
-def test_a_single_line_of_numbers_above_the_names_is_a_loss_and_no_note(tmp_path):
+def test_a_single_line_of_numbers_above_the_names_is_a_loss(tmp_path):
     source = Csv().columns(log(tmp_path, "12,500\nt,a,b\n" + rows(20, 3)))
     lost = [finding.fact for finding in source.findings if finding.severity == "loss"]
     assert lost == [NumbersAboveRows((1,))]
 
 
-def test_lines_that_csv_says_to_skip_are_no_loss(tmp_path):
+def test_lines_skipped_by_a_pin_are_not_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(skip_lines=401))
-    assert dialect.first_line == 403 and not [item for item in dialect.findings if item.severity == "loss"]
+    assert dialect.first_line == 403 and not [finding for finding in dialect.findings if finding.severity == "loss"]
 
 
-def test_above_a_pinned_header_rows_are_a_loss(tmp_path):
+def test_rows_above_a_pinned_header_are_a_loss(tmp_path):
     path = log(tmp_path, "t,a,b\n" + rows(400, 3) + "t,a,b,c,d\n" + rows(1600, 5))
     dialect = find_dialect(path, read_sample(path), TablePins(header=402))
-    lost = [item.fact for item in dialect.findings if item.severity == "loss"]
+    lost = [finding.fact for finding in dialect.findings if finding.severity == "loss"]
     assert lost == [NumbersAboveRows(tuple(range(2, 402)))]
 
 
 @pytest.mark.parametrize("tail", ["# end", "# x", "# end of the log, 12", "#"])
-def test_a_comment_without_line_end_below_the_rows_costs_no_row_and_no_warning(tmp_path, tail):
+def test_a_last_comment_without_line_end_causes_no_loss_and_no_warning(tmp_path, tail):
     path = log(tmp_path, "# log of gate 7\nt,a,b\n" + rows(50, 3) + tail)
     source = Csv().columns(path)
     assert len(source.columns["t"].values) == 50
     assert {finding.severity for finding in source.findings} == {"note"}
-    run = Run(Csv().pieces(path))
+    run = PieceRun(Csv().pieces(path))
     assert sum(piece.rows for piece in run) == 50 and run.source.findings == source.findings
 
 
 @pytest.mark.parametrize("below", ["s,Nm,m/s\nREAL,REAL,REAL\n", "REAL,REAL,REAL\ns,Nm,m/s\n"])
 @pytest.mark.parametrize("header", [None, 1])
-def test_a_row_of_types_above_or_below_that_of_units_is_no_row_of_names(tmp_path, below, header):
+def test_a_row_of_types_above_or_below_the_units_is_not_the_names(tmp_path, below, header):
     path = log(tmp_path, "t,a,b\n" + below + rows(50, 3))
     dialect = find_dialect(path, read_sample(path), TablePins(header=header))
     assert dialect.names == ("t", "a", "b")

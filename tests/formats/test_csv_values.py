@@ -31,7 +31,7 @@ def test_written_columns_keep_their_format_and_read_back(tmp_path):
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(st.lists(st.floats(allow_infinity=False), min_size=1, max_size=30))
 @example([5e-324, 1.7976931348623157e308, -0.0, 0.1, 2.2250738585072014e-308])
-def test_any_number_written_reads_back_to_the_bit(tmp_path, numbers):
+def test_any_written_number_is_read_back_exactly(tmp_path, numbers):
     path = tmp_path / "bits.csv"
     column = np.array(numbers)
     write_csv(path, {"a": column, "b": column}, {})
@@ -56,7 +56,7 @@ def test_seven_seconds_at_1_khz_are_written_and_read_back(tmp_path):
 @pytest.mark.parametrize(
     ("name", "rows", "width"), [("link4", 1896, 25), ("ur-static", 4259, 31), ("no_torque", 531, 31)]
 )
-def test_the_ur10e_files_without_header_are_read_whole(name, rows, width):
+def test_the_ur10e_files_without_header_are_read_completely(name, rows, width):
     path = data("ur10e") / f"{name}.csv"
     source = read(path)
     assert len(source.columns) == width
@@ -67,7 +67,7 @@ def test_the_ur10e_files_without_header_are_read_whole(name, rows, width):
 
 @needs_data("ur3e")
 @pytest.mark.parametrize("name", ["L0L1", "L1L2"])
-def test_the_ur3e_files_are_read_whatever_their_line_ends(name):
+def test_the_ur3e_files_are_read_with_any_line_ends(name):
     source = read(data("ur3e") / f"{name}.csv")
     assert len(source.names) == 175
     assert len(source.columns["target_q_0"].values) > 20

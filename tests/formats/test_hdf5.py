@@ -34,7 +34,7 @@ def two_groups(tmp_path):
     return path
 
 
-def test_datasets_are_columns_by_their_paths_each_with_the_clock_beside_it(two_groups):
+def test_datasets_are_columns_by_path_each_with_the_clock_of_its_group(two_groups):
     source = survey(two_groups)
     assert set(source.columns) == {"drive/t", "drive/q[0]", "drive/q[1]", "cell/time", "cell/force"}
     assert source.columns["drive/q[1]"].values.tolist() == list(range(1, 20, 2))
@@ -50,7 +50,7 @@ def test_channels_of_different_clocks_make_one_recording(two_groups, tmp_path):
     assert recording["position"].values.shape == (10, 2)
 
 
-def test_a_clock_column_of_the_machine_file_goes_before_the_files_own(two_groups, tmp_path):
+def test_a_clock_column_of_the_machine_file_takes_precedence_over_the_files_own(two_groups, tmp_path):
     text = MACHINE.replace('"time", unit = "s"', '"drive/t", unit = "s"').replace(
         'force = { column = "cell/force", unit = "N" }', ""
     )
@@ -71,7 +71,7 @@ def test_texts_compounds_scalars_and_matlabs_texts_are_named_and_left_out(tmp_pa
         file["z"] = np.ones(3) * 1j
     source = survey(path)
     assert list(source.columns) == ["v"]
-    left_out = {(found.fact.column, found.fact.what) for found in source.findings}
+    left_out = {(finding.fact.column, finding.fact.what) for finding in source.findings}
     assert left_out == {
         ("word", "of texts or references"),
         ("pair", "a compound"),
@@ -81,7 +81,7 @@ def test_texts_compounds_scalars_and_matlabs_texts_are_named_and_left_out(tmp_pa
     }
 
 
-def test_a_matrix_that_lies_as_matlab_writes_it_gives_its_rows(tmp_path):
+def test_the_rows_of_a_matrix_in_matlabs_order_are_columns(tmp_path):
     path = tmp_path / "matlab73.h5"
     with h5py.File(path, "w", userblock_size=512) as file:
         file["q"] = np.arange(20.0).reshape(2, 10)
@@ -92,7 +92,7 @@ def test_a_matrix_that_lies_as_matlab_writes_it_gives_its_rows(tmp_path):
     assert source.columns["q[1]"].values.tolist() == list(range(10, 20)) and len(source.columns["t"].values) == 10
 
 
-def test_links_out_of_the_file_and_in_circles_are_not_followed(tmp_path):
+def test_external_and_cyclic_links_are_not_followed(tmp_path):
     secret = tmp_path / "secret.bin"
     secret.write_bytes(bytes(range(64)))
     path = tmp_path / "log.h5"
@@ -106,10 +106,10 @@ def test_links_out_of_the_file_and_in_circles_are_not_followed(tmp_path):
         file.create_virtual_dataset("virtual", layout)
     source = survey(path)
     assert list(source.columns) == ["v"]
-    assert [found.fact.what for found in source.findings] == ["kept in other files"] * 2
+    assert [finding.fact.what for finding in source.findings] == ["stored in other files"] * 2
 
 
-def test_a_dataset_that_is_declared_but_not_there_is_refused_by_its_size(tmp_path):
+def test_a_declared_dataset_without_data_is_refused_by_its_size(tmp_path):
     path = tmp_path / "bomb.h5"
     with h5py.File(path, "w") as file:
         file.create_dataset("v", shape=(10**10,), dtype="f8", chunks=(2**16,))
@@ -117,7 +117,7 @@ def test_a_dataset_that_is_declared_but_not_there_is_refused_by_its_size(tmp_pat
         survey(path)
 
 
-def test_an_epoch_is_taken_off_the_times(tmp_path):
+def test_the_epoch_is_subtracted_from_the_times(tmp_path):
     path = tmp_path / "log.h5"
     with h5py.File(path, "w") as file:
         file.create_dataset("time", data=1.7e9 + np.arange(5.0)).attrs["unit"] = "s"
@@ -134,9 +134,9 @@ def test_damaged_files_are_one_line(two_groups):
         with pytest.raises(RecordingError) as caught:
             Hdf5().columns(two_groups)
         assert "\n" not in str(caught.value)
-    for place in random.integers(8, len(data), 150).tolist():
+    for at in random.integers(8, len(data), 150).tolist():
         wrong = bytearray(data)
-        wrong[place] ^= 1 << int(random.integers(8))
+        wrong[at] ^= 1 << int(random.integers(8))
         two_groups.write_bytes(wrong)
         try:
             Hdf5().columns(two_groups)

@@ -1,4 +1,4 @@
-"""HDF5's clocks and packed numbers: what an attribute says is done, or the dataset is left out."""
+"""HDF5's clocks and packed numbers: attributes are applied, or the dataset is left out."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ position = { column = "q", unit = "rad" }
 
 @pytest.fixture
 def saved(tmp_path):
-    """Write datasets with their attributes; the path."""
+    """Return a function that writes datasets with their attributes and returns the path."""
 
     def save(**datasets):
         path = tmp_path / "log.h5"
@@ -79,7 +79,7 @@ def test_stamps_before_the_first_one_keep_their_sign(saved):
         ("minutes since 2024-01-01 22:00:00 -0200", 0.0, 0.5),
     ],
 )
-def test_a_time_since_a_date_is_a_clock_from_1970_on(saved, tmp_path, unit, first, step):
+def test_a_time_since_a_date_is_a_clock_since_1970(saved, tmp_path, unit, first, step):
     factor = {"s": 1, "m": 1e-3, "u": 1e-6, "n": 1e-9, "d": 86_400, "h": 3600}[unit[0]] if unit[:3] != "min" else 60
     counts = first + step * np.arange(50)
     path = saved(time=(counts, {"units": unit}), q=(np.arange(50.0), {"units": "rad"}))
@@ -95,7 +95,7 @@ def test_a_time_since_a_date_is_a_clock_from_1970_on(saved, tmp_path, unit, firs
     st.integers(-14 * 60, 14 * 60),
     st.sampled_from(["T", " "]),
 )
-def test_any_date_is_the_one_of_the_calendar(date, minutes, gap):
+def test_any_date_is_converted_like_in_the_calendar(date, minutes, gap):
     zone = timezone(timedelta(minutes=minutes))
     text = date.replace(tzinfo=zone).isoformat(gap)
     _, base = times_since(f"seconds since {text}", "gregorian")
@@ -106,19 +106,19 @@ def test_any_date_is_the_one_of_the_calendar(date, minutes, gap):
 @pytest.mark.parametrize(
     ("attributes", "why"),
     [
-        ({"units": "seconds since the start"}, "the date of 'seconds since the start' is not understood"),
+        ({"units": "seconds since the start"}, "the date of 'seconds since the start' cannot be read"),
         ({"units": "seconds since 2024-01-01", "calendar": "360_day"}, "its calendar '360_day'"),
     ],
     ids=["date", "calendar"],
 )
-def test_a_time_since_what_is_not_understood_is_no_clock_and_told(saved, attributes, why):
+def test_a_time_since_an_unreadable_date_is_reported_and_not_used_as_a_clock(saved, attributes, why):
     source = survey(saved(time=(np.arange(9.0), attributes), q=(np.arange(9.0), {})))
-    (reason,) = [item.fact.reason for item in source.findings if isinstance(item.fact, UnusableClock)]
+    (reason,) = [finding.fact.reason for finding in source.findings if isinstance(finding.fact, UnusableClock)]
     assert source.columns["q"].time is None and why in reason
 
 
 @pytest.mark.parametrize("unit", ["N m", "seconds", "since 2024-01-01", "rad since 2024-01-01", "s"])
-def test_other_units_are_no_time_since_a_date(unit):
+def test_other_units_are_not_a_time_since_a_date(unit):
     assert times_since(unit, "") is None
 
 
@@ -144,7 +144,7 @@ def test_a_packed_number_is_raw_times_scale_plus_offset(raw, scale, offset, miss
     assert np.array_equal(numbers, truth, equal_nan=True)
 
 
-def test_a_fill_value_of_32_bits_is_found_among_32_bits(saved):
+def test_a_fill_value_of_32_bits_is_compared_in_32_bits(saved):
     values = np.array([0.5, 0.1, 2.0], dtype=np.float32)
     source = survey(saved(x=(values, {"_FillValue": np.float32(0.1)})))
     assert np.isnan(source.columns["x"].values).tolist() == [False, True, False]
@@ -155,22 +155,22 @@ def test_a_fill_value_of_32_bits_is_found_among_32_bits(saved):
     [{"scale_factor": "0.01"}, {"add_offset": np.nan}, {"_FillValue": "none"}],
     ids=["text", "nan", "fill"],
 )
-def test_a_dataset_that_is_packed_in_no_known_way_is_left_out(saved, attributes):
+def test_a_dataset_with_an_unknown_packing_is_left_out(saved, attributes):
     source = survey(saved(x=(np.arange(5), attributes), y=(np.arange(5.0), {})))
     assert list(source.columns) == ["y"]
-    why = f"packed, but its attribute {next(iter(attributes))} is no number"
+    why = f"packed, but its attribute {next(iter(attributes))} is not a number"
     assert facts(source) == [("", ColumnLeftOut("x", why))]
 
 
-def test_a_packed_clock_with_missing_stamps_is_one_too(saved):
+def test_a_packed_clock_may_have_missing_stamps(saved):
     counts = np.array([10, 20, -1, 40], dtype=np.int32)
     attributes = {"units": "s", "scale_factor": 0.001, "add_offset": 2.0, "_FillValue": np.int32(-1)}
     times = survey(saved(time=(counts, attributes), q=(np.arange(4.0), {}))).columns["q"].time
     assert np.allclose(times, [2.01, 2.02, np.nan, 2.04], rtol=1e-15, equal_nan=True)
 
 
-def test_an_epoch_is_taken_off_before_a_clock_is_scaled(saved):
-    """Ticks of 100 ns since 1970: scaled first, float64 would hold them to 240 ns."""
+def test_the_epoch_is_subtracted_before_a_clock_is_scaled(saved):
+    """If ticks of 100 ns since 1970 were scaled first, float64 would have a resolution of 240 ns."""
     ticks = 17_000_000_001_234_567 + np.cumsum(np.random.default_rng(7).integers(9_001, 11_000, 200))
     source = survey(saved(time=(ticks, {"units": "s", "scale_factor": 1e-7}), q=(np.arange(200.0), {})))
     assert np.allclose(source.columns["q"].time, (ticks - ticks[0]) / 1e7, rtol=4e-16, atol=0.0)
@@ -187,17 +187,17 @@ def test_info_shows_every_column_on_the_clock_of_its_group(saved):
     info = cdtool.info(path)
     rates = {channel.name: round(channel.rate_hz) for channel in info.channels}
     assert rates == {"drive/t": 100, "drive/q": 100, "cell/time": 1000, "cell/force": 1000}
-    assert not [found for found in info.findings if isinstance(found.fact, AssumedClock)]
+    assert not [finding for finding in info.findings if isinstance(finding.fact, AssumedClock)]
 
 
-def test_clocks_of_groups_without_a_unit_are_warned_of(saved):
+def test_clocks_of_groups_without_a_unit_are_a_warning(saved):
     clocks = {"drive__t": (np.arange(9.0), {}), "cell__time": (np.arange(9.0), {})}
     assert ("", ClocksWithoutUnit(("cell/time", "drive/t"))) in facts(survey(saved(**clocks)))
     alone = facts(survey(saved(t=clocks["drive__t"], q=clocks["drive__t"])))
     assert not [fact for _, fact in alone if isinstance(fact, ClocksWithoutUnit)]
 
 
-def test_an_epoch_is_taken_off_where_every_clock_has_one():
+def test_the_epoch_is_subtracted_if_every_clock_has_one():
     clocks = [
         EpochClock(lambda a, b, x=x: np.array([x, x + 1])[a:b], 1e-3) for x in (1_700_000_000_250, 1_700_000_000_000)
     ]

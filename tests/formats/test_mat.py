@@ -21,19 +21,19 @@ def saved(tmp_path):
 
 
 @pytest.mark.parametrize("shape", [(5, 1), (1, 5)])
-def test_a_vector_is_a_column_standing_or_lying(saved, shape):
+def test_a_row_or_column_vector_is_one_column(saved, shape):
     source = Mat().columns(saved({"t": np.arange(5.0).reshape(shape)}))
     assert source.columns["t"].values.tolist() == [0, 1, 2, 3, 4]
 
 
-def test_a_matrix_is_a_column_for_each_of_its_own(saved):
+def test_each_column_of_a_matrix_is_a_column(saved):
     table = np.arange(12.0).reshape(4, 3)
     source = Mat().columns(saved({"q": table}))
     assert list(source.columns) == ["q[0]", "q[1]", "q[2]"]
     assert source.columns["q[2]"].values.tolist() == table[:, 2].tolist()
 
 
-def test_a_lying_matrix_is_turned_with_a_note(saved):
+def test_a_matrix_with_more_columns_than_rows_is_transposed_with_a_note(saved):
     source = Mat().columns(saved({"q": np.arange(12.0).reshape(3, 4)}))
     assert source.columns["q[0]"].values.tolist() == [0, 1, 2, 3]
     assert isinstance(source.findings[0].fact, RowsAsColumns)
@@ -48,13 +48,13 @@ def test_scalars_are_details_and_integers_become_float64(saved):
 def test_structs_cells_and_texts_are_named_and_left_out(saved):
     cells = np.array([["a"], [2.0]], dtype=object)
     source = Mat().columns(saved({"t": np.arange(3.0), "s": {"a": 1}, "c": cells, "w": "words", "z": np.ones(3) * 1j}))
-    left_out = {(found.fact.variable, found.fact.what) for found in source.findings}
+    left_out = {(finding.fact.variable, finding.fact.what) for finding in source.findings}
     assert left_out == {("s", "a struct"), ("c", "a cell"), ("w", "a char"), ("z", "complex")}
     assert list(source.columns) == ["t"]
 
 
-def test_a_damaged_kind_of_numbers_is_an_error_not_the_end_of_the_process(saved):
-    """scipy's reader crashes the interpreter here."""
+def test_a_damaged_number_type_is_an_error_and_does_not_crash_the_process(saved):
+    """scipy's reader would crash the interpreter."""
     path = saved({"q": np.arange(50.0)})
     whole = path.read_bytes()
     at = whole.index(b"\x09\0\0\0\x90\x01\0\0")  # miDOUBLE, 400 bytes
@@ -64,10 +64,10 @@ def test_a_damaged_kind_of_numbers_is_an_error_not_the_end_of_the_process(saved)
 
 
 @pytest.mark.parametrize("compressed", [True, False])
-@pytest.mark.parametrize("kept", [60, 130, 200, 900, -1])
-def test_a_cut_file_is_one_clear_error(saved, kept, compressed):
+@pytest.mark.parametrize("size", [60, 130, 200, 900, -1])
+def test_a_cut_file_is_one_clear_error(saved, size, compressed):
     path = saved({"t": np.arange(500.0), "q": np.random.default_rng(0).random(500)}, do_compression=compressed)
-    path.write_bytes(path.read_bytes()[:kept])
+    path.write_bytes(path.read_bytes()[:size])
     with pytest.raises(RecordingError, match=r"log\.mat: (damaged at byte|is not a MATLAB file)"):
         Mat().columns(path)
 

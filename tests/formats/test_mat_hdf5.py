@@ -1,4 +1,4 @@
-"""MATLAB 7.3 files, which are HDF5 inside, give what a file of version 7 gives."""
+"""MATLAB 7.3 files, which are HDF5 files, have the same columns as files of version 7."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _COMPLEX = np.dtype([("real", "f8"), ("imag", "f8")])
 
 
 def save_v73(path: Path, variables: dict[str, object], **options) -> Path:
-    """As MATLAB writes them: dimensions in reverse, the class as an attribute, texts as numbers, cells by reference."""
+    """Write variables like MATLAB: reverse dimensions, class as an attribute, texts as numbers, cells as references."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, value in variables.items():
             _put(file, name, value, options)
@@ -38,8 +38,8 @@ def _put(file, name: str, value: object, options: dict) -> None:
         for key, part in value.items():
             _put(group, key, part, options)
     elif isinstance(value, list):
-        kept = file.require_group("#refs#").create_dataset(f"{name}_0", data=np.zeros((1, 3)))
-        cells = file.create_dataset(name, data=np.array([[kept.ref]], dtype=h5py.ref_dtype))
+        target = file.require_group("#refs#").create_dataset(f"{name}_0", data=np.zeros((1, 3)))
+        cells = file.create_dataset(name, data=np.array([[target.ref]], dtype=h5py.ref_dtype))
         cells.attrs["MATLAB_class"] = np.bytes_("cell")
     elif isinstance(value, str):
         codes = np.array([[ord(letter)] for letter in value], dtype=np.uint16)
@@ -76,7 +76,7 @@ def same(found, expected) -> None:
     packed=st.booleans(),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_any_matrix_gives_the_columns_that_version_7_gives(tmp_path_factory, shapes, kinds, packed, seed):
+def test_any_matrix_has_the_same_columns_as_in_version_7(tmp_path_factory, shapes, kinds, packed, seed):
     folder = tmp_path_factory.mktemp("mat")
     random = np.random.default_rng(seed)
     variables = {"time": np.arange(9.0)}
@@ -88,7 +88,7 @@ def test_any_matrix_gives_the_columns_that_version_7_gives(tmp_path_factory, sha
     same(Mat().columns(new), Mat().columns(folder / "old.mat"))
 
 
-def test_what_is_no_vector_or_matrix_of_numbers_is_named_and_left_out(tmp_path):
+def test_variables_other_than_vectors_and_matrices_of_numbers_are_named_and_left_out(tmp_path):
     path = save_v73(
         tmp_path / "a.mat",
         {"t": np.arange(3.0), "s": {"a": 1.0}, "c": [1], "w": "words", "z": np.ones(3) * 1j, "e": np.empty((0, 3))}
@@ -105,7 +105,7 @@ def test_what_is_no_vector_or_matrix_of_numbers_is_named_and_left_out(tmp_path):
         file["f"].attrs["MATLAB_class"] = np.bytes_("function_handle")
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
-    left_out = {found.fact.variable: found.fact.what for found in source.findings}
+    left_out = {finding.fact.variable: finding.fact.what for finding in source.findings}
     assert left_out == {
         "c": "a cell",
         "cube": "a 2 x 3 x 4 array",
@@ -121,7 +121,7 @@ def test_what_is_no_vector_or_matrix_of_numbers_is_named_and_left_out(tmp_path):
     }
 
 
-def test_a_recording_is_read_by_the_names_of_version_7(tmp_path):
+def test_a_recording_is_read_with_the_names_of_version_7(tmp_path):
     time = np.arange(50) * 0.01
     q = np.column_stack((time, 2.0 * time))
     path = save_v73(tmp_path / "run.mat", {"t": time, "q": q, "tau": 0.5 * q}, compression="gzip", shuffle=True)
@@ -136,7 +136,7 @@ def test_a_recording_is_read_by_the_names_of_version_7(tmp_path):
     np.testing.assert_array_equal(recording["torque"].values, 0.5 * q)
 
 
-def test_a_complex_column_that_is_asked_for_is_an_error(tmp_path):
+def test_a_requested_complex_column_is_an_error(tmp_path):
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(3.0), "z": np.ones(3) * 1j})
     (tmp_path / "machine.toml").write_text(
         '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\n'
@@ -146,8 +146,8 @@ def test_a_complex_column_that_is_asked_for_is_an_error(tmp_path):
         read_recording(path, read_machine_file(tmp_path / "machine.toml"))
 
 
-def test_a_file_without_a_vector_says_so(tmp_path):
-    with pytest.raises(RecordingError, match="holds no vector or matrix of numbers"):
+def test_a_file_without_a_vector_is_refused(tmp_path):
+    with pytest.raises(RecordingError, match="has no vector or matrix of numbers"):
         Mat().columns(save_v73(tmp_path / "a.mat", {"s": {"a": 1.0}}))
 
 
@@ -160,7 +160,7 @@ def test_a_file_that_matlab_wrote_is_read():
     np.testing.assert_allclose(source.columns["testdouble"].values, np.arange(9) * np.pi / 4, rtol=0.0, atol=1e-12)
 
 
-def test_without_h5py_the_error_says_what_to_install_or_how_to_save(tmp_path, monkeypatch):
+def test_without_h5py_the_error_states_what_to_install_or_how_to_save(tmp_path, monkeypatch):
     def absent(module: str) -> None:
         raise ImportError(module)
 
@@ -169,7 +169,7 @@ def test_without_h5py_the_error_says_what_to_install_or_how_to_save(tmp_path, mo
     with pytest.raises(RecordingError) as fault:
         Mat().columns(path)
     assert fault.value.message == f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed"
-    assert fault.value.hint == "pip install 'cdtool[hdf5]'; or save it with: save(name, ..., '-v7')"
+    assert fault.value.hint == "pip install 'cdtool[hdf5]'; or save it in MATLAB with save(name, ..., '-v7')"
 
 
 def test_a_dataset_in_other_files_is_not_followed(tmp_path):
@@ -182,19 +182,19 @@ def test_a_dataset_in_other_files_is_not_followed(tmp_path):
         file.create_virtual_dataset("v", layout)
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
-    assert [found.fact.what for found in source.findings] == ["a array kept in other files"] * 2
+    assert [finding.fact.what for finding in source.findings] == ["an array stored in other files"] * 2
 
 
-@pytest.mark.parametrize("kept", [400, 520, 700, 1500, -1])
-def test_a_cut_file_is_one_clear_error(tmp_path, kept):
+@pytest.mark.parametrize("size", [400, 520, 700, 1500, -1])
+def test_a_cut_file_is_one_clear_error(tmp_path, size):
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(500.0), "q": np.arange(500.0)})
-    path.write_bytes(path.read_bytes()[:kept])
+    path.write_bytes(path.read_bytes()[:size])
     with pytest.raises(RecordingError, match=r"a\.mat: (damaged or not a MATLAB 7\.3 file|is not a )") as fault:
         survey(path)
     assert "\n" not in str(fault.value)
 
 
-def test_damaged_bytes_are_one_line_or_the_values_that_are_there(tmp_path):
+def test_damaged_bytes_are_one_line_or_the_remaining_values(tmp_path):
     path = save_v73(tmp_path / "a.mat", {"t": np.arange(50.0), "q": np.ones((50, 3))}, compression="gzip")
     whole, random = path.read_bytes(), np.random.default_rng(8)
     for _ in range(150):

@@ -21,7 +21,7 @@ __all__ = ["by_hand", "written"]
 
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_what_is_written_reads_back_to_the_bit(written, encoding, compression):
+def test_written_values_are_read_back_exactly(written, encoding, compression):
     source = Mcap().columns(written(encoding=encoding, compression=compression))
     for name, expected in {
         "/joint_states position[:]": JOINTS,
@@ -49,8 +49,10 @@ def test_the_same_streams_give_the_same_bytes(written, encoding):
 def test_a_field_is_a_number_an_element_an_array_or_a_joint(written, encoding):
     fields = ["position[1]", "position[:]", "position[shoulder_joint]", "position[elbow.joint]", "effort[0]"]
     path = written(encoding=encoding)
-    asked = wanted(*(("/joint_states", field) for field in fields), joints=("base", "shoulder_joint", "elbow.joint"))
-    columns = Mcap().columns(path, asked).columns
+    requested = wanted(
+        *(("/joint_states", field) for field in fields), joints=("base", "shoulder_joint", "elbow.joint")
+    )
+    columns = Mcap().columns(path, requested).columns
     found = [columns[f"/joint_states {field}"].values for field in fields]
     for values, expected in zip(found, [JOINTS[:, 1], JOINTS, JOINTS[:, 1], JOINTS[:, 2], JOINTS[:, 2]], strict=True):
         assert np.array_equal(values, expected)
@@ -58,7 +60,7 @@ def test_a_field_is_a_number_an_element_an_array_or_a_joint(written, encoding):
 
 
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
-def test_a_whole_array_comes_in_the_machines_order_by_the_messages_names(written, encoding):
+def test_a_whole_array_is_ordered_by_the_machines_joints_with_the_messages_names(written, encoding):
     path = written(encoding=encoding)
     order = ("elbow.joint", "base", "shoulder_joint")
     column = Mcap().columns(path, wanted(("/joint_states", "position[:]"), joints=order)).columns
@@ -67,10 +69,10 @@ def test_a_whole_array_comes_in_the_machines_order_by_the_messages_names(written
     assert np.array_equal(two["/joint_states position[:]"].values, JOINTS[:, [2, 0]])
 
 
-def test_names_that_the_messages_do_not_have_are_an_error_and_never_a_silent_permutation(written):
-    asked = wanted(("/joint_states", "position[:]"), joints=("base", "shoulder", "elbow.joint"))
+def test_joint_names_missing_from_the_messages_are_an_error_and_never_a_silent_permutation(written):
+    requested = wanted(("/joint_states", "position[:]"), joints=("base", "shoulder", "elbow.joint"))
     with pytest.raises(RecordingError, match=r"name base, shoulder_joint, elbow.joint, not 'shoulder'.*joint_map"):
-        Mcap().columns(written(), asked)
+        Mcap().columns(written(), requested)
 
 
 def test_a_name_array_whose_order_changes_between_messages_is_followed(by_hand):
@@ -109,7 +111,7 @@ def test_a_header_clock_without_a_header_is_a_clear_error(by_hand):
         Mcap().columns(by_hand([(1, 1, {"x": 1})]), wanted(("/a", "x"), clock="header"))
 
 
-def test_a_survey_tells_how_late_messages_were_logged(by_hand):
+def test_a_survey_reports_the_delay_of_logged_messages(by_hand):
     messages = [
         (10**9 + i * 10**6 + 3 * 10**6, 0, {"header": {"stamp": {"sec": 1, "nanosec": i * 10**6}}}) for i in range(5)
     ]
@@ -139,7 +141,7 @@ def test_a_missing_topic_is_named_with_its_channel_and_the_nearest(written):
         ("/force", "data.x", "there is no 'x'"),
     ],
 )
-def test_a_wrong_field_is_an_error_that_names_what_there_is(written, topic, field, message):
+def test_a_wrong_field_is_an_error_that_names_the_existing_fields(written, topic, field, message):
     with pytest.raises(RecordingError, match=message) as fault:
         Mcap().columns(written(), wanted((topic, field)))
     assert topic in str(fault.value)
@@ -160,7 +162,7 @@ def test_an_array_of_varying_length_is_a_clear_error(by_hand):
     assert Mcap().columns(path).findings[0].fact == ArrayLengthsDiffer((2, 3))
 
 
-def test_messages_about_other_joints_are_left_out(by_hand):
+def test_messages_of_other_joints_are_left_out(by_hand):
     messages = [(i, i, {"name": ["a" if i % 2 else "b"], "position": [i]}) for i in range(6)]
     source = Mcap().columns(by_hand(messages), wanted(("/a", "position[a]")))
     assert source.columns["/a position[a]"].values.tolist() == [1, 3, 5]
@@ -174,7 +176,7 @@ def test_json_null_is_nan_and_a_text_is_refused(by_hand):
         Mcap().columns(path, wanted(("/a", "s")))
 
 
-def test_writing_refuses_what_a_message_cannot_hold(written):
+def test_writing_refuses_fields_that_the_message_type_does_not_have(written):
     def stream(schema="sensor_msgs/msg/Imu", **fields):
         return Stream("/a", schema, TIME, fields)
 
@@ -186,12 +188,12 @@ def test_writing_refuses_what_a_message_cannot_hold(written):
         written([stream("std_msgs/msg/Float64", data=np.zeros(3))])
     with pytest.raises(UsageError, match="number them from 0"):
         written([Stream("/a", "sensor_msgs/msg/JointState", TIME, {"position[1]": TIME})])
-    with pytest.raises(UsageError, match="written twice"):
+    with pytest.raises(UsageError, match="several streams have the same topic"):
         written([STREAMS[3], STREAMS[3]])
 
 
 @pytest.mark.parametrize("text", ["a b.c", "x[0].y", "a[b.c].d"])
-def test_a_field_may_step_through_arrays_of_objects(text):
+def test_a_field_may_select_elements_of_arrays_of_objects(text):
     assert parse_field(text, "here").text == text
     message = {"a b": {"c": 1}, "x": [{"y": 2}], "a": [{"d": 3}], "name": ["b.c"]}
     assert parse_field(text, "here").of(message) in (1.0, 2.0, 3.0)
@@ -205,7 +207,7 @@ def test_real_files_of_other_writers_survey_without_an_error(name):
     source = Mcap().columns(data("mcap_samples") / name)
     assert source.topics
     if "wrong_rmw" in name:
-        reasons = {item.fact.reason for item in source.findings if isinstance(item.fact, UndecodableMessages)}
+        reasons = {finding.fact.reason for finding in source.findings if isinstance(finding.fact, UndecodableMessages)}
         assert any("'wrong_format'" in reason for reason in reasons)
         with pytest.raises(RecordingError, match="wrong_format"):
             Mcap().columns(data("mcap_samples") / name, wanted(("/test_topic", "int32_value")))
@@ -219,7 +221,7 @@ def test_real_joint_states_are_read(name, rows, joints):
 
 
 @needs_data("mcap_conformance")
-def test_every_conformance_file_gives_the_messages_of_its_json():
+def test_every_conformance_file_has_the_messages_of_its_json():
     files = sorted((data("mcap_conformance")).glob("*/*.mcap"))
     assert len(files) == 416
     for path in files:

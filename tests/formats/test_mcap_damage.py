@@ -54,7 +54,7 @@ def test_an_unknown_encoding_is_a_finding_of_a_survey_and_an_error_where_it_is_w
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_a_cut_file_gives_what_lies_whole_before_the_cut(written, compression):
+def test_a_cut_file_yields_the_complete_messages_before_the_cut(written, compression):
     streams = [
         Stream("/force", "std_msgs/msg/Float64", np.arange(400_000 / 8) / 1000, {"data": np.arange(400_000 / 8)})
     ]
@@ -73,7 +73,7 @@ def test_a_cut_file_gives_what_lies_whole_before_the_cut(written, compression):
         assert isinstance(fact, DamagedAt) and fact.read_before == len(values)
 
 
-def test_an_unchunked_file_gives_every_whole_message_before_the_cut(by_hand):
+def test_an_unchunked_file_yields_every_complete_message_before_the_cut(by_hand):
     path = by_hand([(i, i, {"x": i}) for i in range(50)], use_chunking=False)
     whole = path.read_bytes()
     cut = whole.index(b'{"x": 30}') + 5  # in the middle of a message
@@ -84,8 +84,8 @@ def test_an_unchunked_file_gives_every_whole_message_before_the_cut(by_hand):
     assert damage.read_before == 30 and isinstance(unverified, Unverified)
 
 
-def test_no_flipped_byte_ever_gives_a_wrong_value(written):
-    """Chunks carry a CRC: whatever byte is flipped, the values that come back are the true ones, or an error."""
+def test_no_flipped_byte_leads_to_a_wrong_value(written):
+    """Chunks have a CRC: for any flipped byte, the values are correct, or there is an error."""
     path = written([STREAMS[3]], compression="none")
     whole = path.read_bytes()
     true = dict(zip(TIME.tolist(), JOINTS[:, 2].tolist(), strict=True))
@@ -109,28 +109,28 @@ def test_a_wrong_checksum_of_unchunked_data_is_an_error(by_hand):
     whole = path.read_bytes()
     assert not Mcap().columns(path).findings
     path.write_bytes(whole.replace(b'{"x": 5}', b'{"x": 6}'))
-    with pytest.raises(RecordingError, match="checksum of the data does not fit"):
+    with pytest.raises(RecordingError, match="checksum of the data does not match"):
         Mcap().columns(path)
 
 
-def test_an_unknown_compression_is_not_taken_for_none(written):
+def test_an_unknown_compression_is_not_treated_as_uncompressed(written):
     path = written([STREAMS[3]], compression="lz4")
     path.write_bytes(path.read_bytes().replace(struct.pack("<I", 3) + b"lz4", struct.pack("<I", 3) + b"lz5"))
     with pytest.raises(RecordingError, match="unknown compression 'lz5'"):
         Mcap().columns(path)
 
 
-def test_a_record_that_claims_more_than_the_file_holds_is_refused_without_reading_it(tmp_path):
-    path = tmp_path / "lie.mcap"
+def test_a_record_that_declares_more_than_the_file_contains_is_refused_without_reading_it(tmp_path):
+    path = tmp_path / "oversized.mcap"
     path.write_bytes(b"\x89MCAP0\r\n\x01" + struct.pack("<Q", 2**40) + b"abc")
     with pytest.raises(
-        RecordingError, match="damaged at byte 8, before its first message: a record claims 1099511627776"
+        RecordingError, match="damaged at byte 8, before its first message: a record declares 1099511627776"
     ):
         Mcap().columns(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP", b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" * 3, bytes(100)])
-def test_a_file_with_nothing_in_it_is_one_clear_error(tmp_path, content):
+def test_a_file_without_records_is_one_clear_error(tmp_path, content):
     path = tmp_path / "none.mcap"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match="before its first message"):

@@ -1,4 +1,4 @@
-"""2,000 damaged files, each held against the truth that a careful person would read; and bombs, one process each.
+"""2,000 damaged files, each compared with its expected messages and findings; and bombs, each in its own process.
 
 Other seeds: `python -m tests.formats.mcap_damage SEED COUNT`.
 """
@@ -18,82 +18,82 @@ from mcap.reader import NonSeekingReader
 
 from tests.formats.mcap_damage import logs, messages
 from tests.formats.mcap_damage.assembly import assemble, blocks_of
+from tests.formats.mcap_damage.assessment import faults, faults_in, warm_up
 from tests.formats.mcap_damage.bomb_probe import measurable
 from tests.formats.mcap_damage.bombs import bombs
 from tests.formats.mcap_damage.generator import KINDS, cases, kind_of
-from tests.formats.mcap_damage.judge import faults, judged, warm_up
+from tests.formats.mcap_damage.readers import Reading, value_key
 from tests.formats.mcap_damage.truth import Message, Truth
-from tests.formats.mcap_damage.ways import Reading, value_key
 from tests.noted_times import note
 
 SEED, COUNT, STEP = 1, 2000, 100
-SECONDS = 5.0  # of a processor, for a bomb: held by benchmarks/time_bounds.py
+SECONDS = 5.0  # processor time per bomb; checked by benchmarks/time_bounds.py
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("first", range(0, COUNT, STEP))
-def test_of_a_damaged_file_all_is_given_that_can_be_had_and_nothing_else_and_every_loss_is_said(tmp_path, first):
+def test_a_damaged_file_yields_all_readable_messages_and_nothing_else_and_reports_every_loss(tmp_path, first):
     warm_up(tmp_path / "case.mcap")
-    found = {
-        f"{number} {case.name}": wrong
+    failures = {
+        f"{number} {case.name}": problems
         for number, case in enumerate(cases(SEED, STEP, first), start=first)
-        if (wrong := faults(case, tmp_path / "case.mcap"))
+        if (problems := faults(case, tmp_path / "case.mcap"))
     }
-    assert not found
+    assert not failures
 
 
 @pytest.mark.parametrize("number", [1126, 1133], ids=["a data end before the data's end", "an index beyond any file"])
-def test_cases_of_another_seed_that_once_went_wrong(tmp_path, number):
+def test_cases_of_another_seed_that_have_failed_before(tmp_path, number):
     warm_up(tmp_path / "case.mcap")
     (case,) = cases(22, 1, number)
     assert not faults(case, tmp_path / "case.mcap")
 
 
 def test_every_kind_of_damage_is_among_the_cases():
-    drawn = Counter(kind_of(SEED, number)[0] for number in range(COUNT))
-    assert set(drawn) == set(KINDS)
+    counts = Counter(kind_of(SEED, number)[0] for number in range(COUNT))
+    assert set(counts) == set(KINDS)
 
 
-def test_a_case_depends_on_its_seed_and_number_alone():
+def test_a_case_depends_only_on_its_seed_and_number():
     (alone,) = cases(3, 1, 7)
     assert alone == list(cases(3, 8))[7]
     assert alone != next(cases(4, 1, 7))
 
 
 @pytest.mark.parametrize("compression", ["", "lz4", "zstd"])
-def test_undamaged_the_generators_files_read_through_the_mcap_package(compression):
+def test_the_mcap_package_reads_the_undamaged_files_of_the_generator(compression):
     rng = np.random.default_rng(0)
     written = messages.ordinary(rng, 64)
     log = logs.write(rng, logs.Style(compression))
     for data, known in ((assemble(blocks_of(written, 8, compression)), written), (log.data, log.messages)):
         reader = NonSeekingReader(BytesIO(data), validate_crcs=True)
         read = reader.iter_messages(log_time_order=False)
-        given = [(channel.topic, message.log_time, message.data) for _, channel, message in read]
-        assert given == [(message.topic, message.time, message.payload) for message in known]
+        messages_read = [(channel.topic, message.log_time, message.data) for _, channel, message in read]
+        assert messages_read == [(message.topic, message.time, message.payload) for message in known]
 
 
-def test_the_judge_sees_what_it_is_there_for():
+def test_the_assessment_detects_each_kind_of_fault():
     one, two = Message("/force", 10**9, b"a", 1.0), Message("/force", 2 * 10**9, b"b", 2.0)
     both = tuple((value_key(message), message.time / 1e9) for message in (one, two))
     truth = Truth((one, two), (one,), loss=True)
-    for reading, said in (
-        (Reading(both), "a loss is not said"),
-        (Reading(both[1:]), "1 of 1 messages are not given"),
-        (Reading(both[:1]), "1 messages are missing without a word"),
-        (Reading((*both, both[0])), "1 values that the file does not hold"),
-        (Reading(((both[0][0], 1.5),)), "1 values that the file does not hold"),
+    for reading, words in (
+        (Reading(both), "a loss is not reported"),
+        (Reading(both[1:]), "1 of 1 readable messages were not read"),
+        (Reading(both[:1]), "1 messages are missing without a finding"),
+        (Reading((*both, both[0])), "1 values that the file does not contain"),
+        (Reading(((both[0][0], 1.5),)), "1 values that the file does not contain"),
     ):
-        assert any(said in fault for fault in judged(truth, reading, value_key)), said
-    assert not list(judged(Truth((one, two), (one, two), loss=False), Reading(both), value_key))
+        assert any(words in fault for fault in faults_in(truth, reading, value_key)), words
+    assert not list(faults_in(Truth((one, two), (one, two), loss=False), Reading(both), value_key))
 
 
-@pytest.mark.skipif(not measurable(), reason="memory is measured as Linux has it")
-def test_bombs_are_refused_in_300_mb_and_the_messages_beside_them_are_given(tmp_path):
+@pytest.mark.skipif(not measurable(), reason="the peak memory is only measured on Linux")
+def test_bombs_are_refused_within_300_mb_and_the_other_messages_are_read(tmp_path):
     command = [sys.executable, "-m", "tests.formats.mcap_damage.bomb_probe", str(tmp_path)]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600)
     assert ran.returncode == 0, ran.stderr
-    taken = [json.loads(line) for line in ran.stdout.splitlines()]
-    assert len(taken) == 2 * len(bombs())
-    for took in taken:
-        note(took["seconds"], SECONDS)
-    assert not [took for took in taken if took["faults"] or took["bytes"] >= 300e6]
+    measured = [json.loads(line) for line in ran.stdout.splitlines()]
+    assert len(measured) == 2 * len(bombs())
+    for bomb in measured:
+        note(bomb["seconds"], SECONDS)
+    assert not [bomb for bomb in measured if bomb["faults"] or bomb["bytes"] >= 300e6]

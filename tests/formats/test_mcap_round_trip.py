@@ -1,4 +1,4 @@
-"""Random messages through whole files: written by the `mcap` packages and by rosbags, read back equal to the bit."""
+"""Random messages in files written by the `mcap` packages and by rosbags are read back exactly."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ RARELY = settings(max_examples=40, deadline=None, derandomize=True, suppress_hea
 
 
 def numbers(message, prefix=""):
-    """Every numeric field of a message: a float, or a list of them."""
-    found = {}
+    """Return every numeric field of a message: a float, or a list of floats."""
+    fields = {}
     for name, value in message.items():
         if isinstance(value, dict):
-            found |= numbers(value, f"{prefix}{name}.")
+            fields |= numbers(value, f"{prefix}{name}.")
         elif isinstance(value, list) and all(isinstance(item, int | float) for item in value):
-            found[f"{prefix}{name}[:]"] = [float(item) for item in value]
+            fields[f"{prefix}{name}[:]"] = [float(item) for item in value]
         elif isinstance(value, int | float):
-            found[f"{prefix}{name}"] = float(value)
-    return found
+            fields[f"{prefix}{name}"] = float(value)
+    return fields
 
 
 def expected_columns(messages):
-    """Field -> values, as a survey gives them: arrays of one length only; where they are empty, NaN."""
+    """Return the values per field as in a survey: only arrays of one length, and NaN for empty arrays."""
     rows = [numbers(message) for message in messages]
     columns = {}
     for name in rows[0]:
@@ -51,14 +51,14 @@ def expected_columns(messages):
 
 
 def check(path, messages, times):
-    """Surveyed and asked for by name, every number and every time is what was written."""
+    """Check that all numbers and times are those that were written, in a survey and by name."""
     expected = expected_columns(messages)
     survey = Mcap().columns(path)
     assert set(survey.columns) == {f"{TOPIC} {name}" for name in expected}
     assert not [finding for finding in survey.findings if finding.severity == "loss"]
     sources = tuple(ChannelSource("speed", topic=TOPIC, field=name) for name in expected)
-    asked = Mcap().columns(path, ChannelMap(TimeSource(), sources, (), topics=True)) if expected else survey
-    for source in (survey, asked):
+    requested = Mcap().columns(path, ChannelMap(TimeSource(), sources, (), topics=True)) if expected else survey
+    for source in (survey, requested):
         for name, values in expected.items():
             column = source.columns[f"{TOPIC} {name}"]
             assert np.array_equal(bits(column.values), bits(values)), name
@@ -66,13 +66,13 @@ def check(path, messages, times):
 
 
 def bits(values):
-    """The bytes of float64 numbers; one NaN is as good as another."""
+    """Return float64 numbers as bytes; all NaN are equal."""
     return np.where(np.isnan(values), np.nan, np.ascontiguousarray(values, dtype=np.float64)).view(np.int64)
 
 
 @st.composite
 def recordings(draw):
-    """A definition, messages of it, and their times [ns], which do not decrease."""
+    """Return a definition, messages of it, and their times [ns], which do not decrease."""
     text, values = draw(definitions())
     messages = draw(st.lists(values, min_size=1, max_size=5)) * draw(st.sampled_from([1, 1, 40]))
     steps = draw(st.lists(st.integers(0, 10**7), min_size=len(messages), max_size=len(messages)))
@@ -81,7 +81,7 @@ def recordings(draw):
 
 @RARELY
 @given(recordings(), st.sampled_from(list(CompressionType)), st.sampled_from([100, 5000]))
-def test_what_mcap_ros2_support_writes_reads_back_to_the_bit(recording, compression, chunk_size):
+def test_files_of_mcap_ros2_support_are_read_exactly(recording, compression, chunk_size):
     text, messages, times = recording
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.mcap"
@@ -96,7 +96,7 @@ def test_what_mcap_ros2_support_writes_reads_back_to_the_bit(recording, compress
 
 @RARELY
 @given(recordings(), st.booleans())
-def test_what_rosbags_writes_reads_back_to_the_bit(recording, compressed):
+def test_files_of_rosbags_are_read_exactly(recording, compressed):
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     text, messages, times = recording
     store = typestore(text)
@@ -113,7 +113,7 @@ def test_what_rosbags_writes_reads_back_to_the_bit(recording, compressed):
 
 
 def typestore(text):
-    """rosbags' types of a definition."""
+    """Return rosbags' types of a definition."""
     from rosbags import typesys
 
     store = typesys.get_typestore(typesys.Stores.EMPTY)
@@ -122,13 +122,13 @@ def typestore(text):
 
 
 def as_class(store, name, message):
-    """A dict as an object of rosbags' class."""
+    """Return a dict as an object of rosbags' class."""
     kinds = dict(store.fielddefs[name][1])
     return store.types[name](**{field: as_value(store, kinds[field], value) for field, value in message.items()})
 
 
 def as_value(store, kind, value):
-    """One field: `kind` is rosbags' (node, detail): 1 a base type, 2 a message, 3 and 4 arrays."""
+    """Return one field; `kind` is rosbags' (node, detail): 1 for a base type, 2 for a message, 3 and 4 for arrays."""
     node, detail = kind
     if node == 2:
         return as_class(store, detail, value)

@@ -29,7 +29,7 @@ def signal(name, samples, step, **options):
 
 
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
-def test_each_group_has_its_masters_clock_and_units_and_conversions_hold(saved, version):
+def test_each_group_has_its_masters_clock_with_units_and_conversions_applied(saved, version):
     path = saved(
         [signal("i", np.sin(np.arange(100.0)), 0.01, unit="A")],
         [signal("n", np.arange(30, dtype=np.uint16), 0.003, unit="rpm", conversion={"a": 0.5, "b": -3.0})],
@@ -59,17 +59,17 @@ def test_only_plain_arithmetic_is_evaluated_in_a_formula(saved):
     path = saved([good, signal("evil", np.arange(4, dtype=np.uint8), 1.0, conversion={"formula": "where(X1, X1, X1)"})])
     source = survey(path)
     assert list(source.columns) == ["good"]
-    what = "given by the formula 'where(X1, X1, X1)', which is not evaluated"
+    what = "defined by the formula 'where(X1, X1, X1)', which is not evaluated"
     assert source.findings[0].fact == ColumnLeftOut("evil", what)
 
 
-def test_names_of_two_groups_are_told_apart(saved):
+def test_equal_names_in_two_groups_are_distinguished(saved):
     path = saved([signal("v", [1.0, 2.0], 0.1)], [signal("v", [3.0, 4.0, 5.0], 0.1)])
     columns = survey(path).columns
     assert columns["0/v"].values.tolist() == [1, 2] and columns["1/v"].values.tolist() == [3, 4, 5]
 
 
-def test_damaged_files_are_one_line_without_a_sound_from_the_library(saved, capfd):
+def test_damaged_files_are_one_line_without_output_from_the_library(saved, capfd):
     path = saved([signal("v", np.random.default_rng(1).normal(size=500), 0.001, unit="A")])
     whole = path.read_bytes()
     random = np.random.default_rng(3)

@@ -49,7 +49,7 @@ def test_numbers_of_every_kind_become_float64_and_others_are_named(saved):
     assert (other.column, other.what[:5]) == ("list", "list<")
 
 
-def test_a_fields_unit_is_told_and_a_time_stamp_is_seconds_from_the_first(saved):
+def test_a_fields_unit_is_read_and_time_stamps_are_seconds_after_the_first(saved):
     stamps = pa.array(np.datetime64("2025-03-04T05:06:07", "ns") + np.arange(3) * np.timedelta64(1_000_001, "ns"))
     fields = [pa.field("when", stamps.type), pa.field("i", pa.float64(), metadata={"unit": "A"})]
     source = survey(saved(pa.Table.from_arrays([stamps, pa.array([1.0, 2.0, 3.0])], schema=pa.schema(fields))))
@@ -58,7 +58,7 @@ def test_a_fields_unit_is_told_and_a_time_stamp_is_seconds_from_the_first(saved)
     assert source.findings[0].fact.start.startswith("2025-03-04T05:06:07")
 
 
-def test_integers_that_float64_cannot_hold_are_told(saved):
+def test_integers_that_float64_cannot_represent_are_reported(saved):
     assert survey(saved({"t": [1, 2], "big": [2**53 + 1, 5]})).findings[0] == Finding(RoundedColumn(), "big")
 
 
@@ -75,7 +75,7 @@ def test_a_file_cut_off_anywhere_is_one_line_or_a_counted_loss(saved):
             assert any(finding.severity == "loss" for finding in source.findings)
 
 
-def test_whole_record_batches_before_the_cut_are_read(tmp_path):
+def test_complete_record_batches_before_the_cut_are_read(tmp_path):
     table = pa.table({"v": np.arange(100_000.0)})
     path = tmp_path / "log.feather"
     feather.write_feather(table, str(path), chunksize=10_000, compression="uncompressed")
@@ -86,13 +86,13 @@ def test_whole_record_batches_before_the_cut_are_read(tmp_path):
     assert source.findings[0] == Finding(CutBehindRow(50000), severity="loss")
 
 
-def test_flipped_bytes_end_in_one_line_or_in_a_table(saved):
+def test_flipped_bytes_are_one_line_or_a_table(saved):
     path = saved({"t": np.arange(500.0), "v": np.random.default_rng(1).normal(size=500)}, compression="zstd")
     data = bytearray(path.read_bytes())
     random = np.random.default_rng(5)
-    for place in random.integers(8, len(data), 150).tolist():
+    for at in random.integers(8, len(data), 150).tolist():
         wrong = bytearray(data)
-        wrong[place] ^= 1 << int(random.integers(8))
+        wrong[at] ^= 1 << int(random.integers(8))
         path.write_bytes(wrong)
         try:
             Parquet().columns(path)
@@ -100,7 +100,7 @@ def test_flipped_bytes_end_in_one_line_or_in_a_table(saved):
             assert "\n" not in str(fault)
 
 
-def test_a_small_file_that_unpacks_to_far_more_is_refused(tmp_path):
+def test_a_small_file_that_decompresses_to_far_more_is_refused(tmp_path):
     path = tmp_path / "bomb.parquet"
     parquet.write_table(pa.table({"v": np.zeros(40_000_000)}), path, compression="zstd")
     assert path.stat().st_size < 1_000_000
@@ -108,7 +108,7 @@ def test_a_small_file_that_unpacks_to_far_more_is_refused(tmp_path):
         survey(path)
 
 
-def test_where_the_library_is_absent_the_extra_is_named(saved, monkeypatch):
+def test_without_the_library_the_error_names_the_extra(saved, monkeypatch):
     path = saved({"v": [1.0, 2.0]})
     monkeypatch.setattr("cdtool.formats.container_checks.import_module", _absent)
     with pytest.raises(RecordingError, match=r"pyarrow is not installed.*pip install 'cdtool\[parquet\]'"):

@@ -1,4 +1,4 @@
-"""Files that are read piece by piece: the same numbers as at once, in the order of the times, in bounded memory."""
+"""Files that are read piece by piece have the same numbers as read at once, in time order and bounded memory."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings.clocks import WrittenTimes
 from cdtool.formats import slices
 from cdtool.formats.csv import text
-from cdtool.formats.pieces import Pieces, Run, as_pieces, joined, read_pieces
+from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces, split_by_clock
 from cdtool.formats.source import Source
 from cdtool.formats.time_order import Lateness, by_time
 from cdtool.ingest.log_statistics import LogStatistics
@@ -28,17 +28,17 @@ from tests.workflows.convert.kinds import needs
 
 
 def pieces_of(path: Path) -> list[Piece]:
-    return list(Run(read_pieces(choose_format(path), path)))
+    return list(PieceRun(read_pieces(choose_format(path), path)))
 
 
 def same(one: Source, other: Source) -> bool:
-    """All that a source tells, the numbers to the bit."""
+    """Return whether two sources are equal, including the bits of their numbers."""
     columns = [(one.columns[name], other.columns[name]) for name in one.columns]
-    told = [
+    details = [
         [s.findings, dict(s.details), dict(s.topics), s.names, s.origin, s.first_row, list(s.columns)]
         for s in (one, other)
     ]
-    return told[0] == told[1] and all(
+    return details[0] == details[1] and all(
         a.values.tobytes() == b.values.tobytes()
         and (a.time is None) == (b.time is None)
         and (a.time is None or b.time is None or a.time.tobytes() == b.time.tobytes())
@@ -48,23 +48,23 @@ def same(one: Source, other: Source) -> bool:
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".mf4", ".tdms"])
-def test_a_container_in_many_pieces_holds_what_it_holds_in_one(suffix, tmp_path, monkeypatch):
+def test_a_container_read_in_many_pieces_has_the_same_columns(suffix, tmp_path, monkeypatch):
     needs(suffix)
     path = Path(convert(two_clocks(tmp_path / "run.mcap"), tmp_path / f"run{suffix}").files[0])
     found = choose_format(path)
     at_once = found.columns(path)
     assert len({piece.clock for piece in pieces_of(path)}) == len(pieces_of(path))
-    monkeypatch.setattr(slices, "VALUES_A_PIECE", 100)
+    monkeypatch.setattr(slices, "VALUES_PER_PIECE", 100)
     pieces = pieces_of(path)
     assert len(pieces) > 20
-    # Clocks that run side by side come side by side.
+    # Clocks that run in parallel are yielded in parallel.
     starts = np.array([float(piece.time[0]) for piece in pieces if piece.time is not None and piece.rows])
-    assert np.max(np.maximum.accumulate(starts) - starts) < 0.06  # the accelerometer ends that much before the drive
-    assert same(at_once, joined(read_pieces(found, path), sort=False))
+    assert np.max(np.maximum.accumulate(starts) - starts) < 0.06  # the accelerometer ends 0.06 s before the drive
+    assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
 
 @pytest.mark.parametrize("end", ["\n", "", "\n# the end\n"])
-def test_a_table_in_many_blocks_holds_what_it_holds_at_once(end, tmp_path, monkeypatch):
+def test_a_table_read_in_many_blocks_has_the_same_columns(end, tmp_path, monkeypatch):
     lines = [f"2025-03-01,23:59:{k // 100:02d}.{k % 100:02d},{k},{k / 7!r}" for k in range(5000)]
     lines[1200] = "# a comment"
     lines[2300] = ""
@@ -76,21 +76,21 @@ def test_a_table_in_many_blocks_holds_what_it_holds_at_once(end, tmp_path, monke
     at_once = found.columns(path)
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
     assert len(pieces_of(path)) > 20
-    assert same(at_once, joined(read_pieces(found, path), sort=False))
+    assert same(at_once, join_pieces(read_pieces(found, path), sort=False))
 
 
-def test_midnight_is_passed_between_two_blocks_too(tmp_path, monkeypatch):
+def test_midnight_between_two_blocks_is_detected(tmp_path, monkeypatch):
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
     seconds = np.arange(0, 200_000, 20) + 80_000
     path = tmp_path / "a.csv"
     path.write_text("clock,v\n" + "".join(f"{s // 3600 % 24:02d}:{s // 60 % 60:02d}:{s % 60:02d},1\n" for s in seconds))
-    source = joined(read_pieces(choose_format(path), path), sort=False)
+    source = join_pieces(read_pieces(choose_format(path), path), sort=False)
     assert np.array_equal(source.columns["clock"].values, seconds)
-    assert any(isinstance(item.fact, WrittenTimes) and item.fact.wrapped == 3 for item in source.findings)
+    assert any(isinstance(finding.fact, WrittenTimes) and finding.fact.wrapped == 3 for finding in source.findings)
 
 
 @pytest.mark.parametrize(("row", "fault"), [(4000, None), (100, "line 102 has 1 cell")])
-def test_words_are_a_footer_only_where_no_row_follows_in_any_block(row, fault, tmp_path, monkeypatch):
+def test_words_are_a_footer_only_if_no_row_follows_in_any_block(row, fault, tmp_path, monkeypatch):
     monkeypatch.setattr(text, "BLOCK_BYTES", 1 << 12)
     lines = [f"{k},{k}" for k in range(4000)]
     lines.insert(row, "end of the measurement")
@@ -104,7 +104,7 @@ def test_words_are_a_footer_only_where_no_row_follows_in_any_block(row, fault, t
 
 
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=60), st.integers(1, 7), st.integers(0, 2**32))
-def test_rows_come_in_the_order_of_their_times_however_late_the_file_has_them(times, length, seed):
+def test_rows_are_in_the_order_of_their_times_however_late_the_file_stores_them(times, length, seed):
     late = np.sort(times) / 8.0
     order = np.argsort(np.arange(len(late)) + np.random.default_rng(seed).uniform(0, 9, len(late)))
     pieces = [
@@ -121,13 +121,13 @@ def test_rows_come_in_the_order_of_their_times_however_late_the_file_has_them(ti
     for name, shift in (("a", 0.5), ("b", 0.25)):
         found = np.concatenate([part[name].values[name] for part in ready if name in part])
         assert np.array_equal(found, late + shift)
-    # Both have the same times: they come together.
+    # Both clocks have the same times and are yielded together.
     assert all(set(part) == {"a", "b"} for part in ready)
     ends = [part["a"].time for part in ready]
     assert all(one[-1] < other[0] for one, other in pairwise(ends))
 
 
-def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
+def test_the_memory_for_the_statistics_of_a_log_does_not_grow_with_its_length():
     def read(count: int) -> Pieces:
         def pieces() -> Iterator[Piece]:
             for k in range(count):
@@ -148,11 +148,11 @@ def test_figures_of_a_log_take_no_more_memory_the_longer_it_is():
     assert peaks[200] < 1.2 * peaks[20]
 
 
-def test_columns_in_memory_are_one_piece_a_clock():
+def test_columns_in_memory_are_one_piece_per_clock():
     time = np.arange(3.0)
     columns = [Column("a", time, time), Column("b", time, time), Column("c", np.arange(4.0))]
     source = Source(Path("a"), "mat", {column.name: column for column in columns})
-    run = Run(as_pieces(source))
+    run = PieceRun(split_by_clock(source))
     assert [sorted(piece.values) for piece in run] == [["a", "b"], ["c"]]
-    assert same(source, joined(as_pieces(source), sort=False))
+    assert same(source, join_pieces(split_by_clock(source), sort=False))
     assert all(len(column.values) == 0 for column in run.source.columns.values())

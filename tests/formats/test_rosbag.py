@@ -46,7 +46,7 @@ def messages(ros1: bool):
 
 @pytest.fixture(params=["bag", "db3"])
 def bag(request, tmp_path):
-    """A ROS 1 bag, or the folder of a ROS 2 bag."""
+    """Write a ROS 1 bag or a ROS 2 bag; return the file or the folder."""
     ros1 = request.param == "bag"
     path = tmp_path / ("log.bag" if ros1 else "log")
     with Writer1(path) if ros1 else Writer2(path, version=8) as writer:
@@ -61,7 +61,7 @@ def the_file(bag):
     return bag if bag.suffix == ".bag" else next(bag.glob("*.db3"))
 
 
-def test_a_bag_is_mapped_as_an_mcap_file_is_with_joints_by_their_names(bag, tmp_path):
+def test_a_bag_is_mapped_like_an_mcap_file_with_joints_by_name(bag, tmp_path):
     (tmp_path / "machine.toml").write_text(MACHINE)
     recording = read_recording(bag, read_machine_file(tmp_path / "machine.toml"))
     assert recording.origin == START / 1e9
@@ -85,7 +85,7 @@ def test_another_clock_of_a_message_can_be_chosen(bag, tmp_path, clock):
     np.testing.assert_allclose(recording["speed"].time, np.arange(60) * 0.01, atol=1e-12)
 
 
-def test_a_topic_or_field_that_is_not_there_is_named_with_the_nearest(bag, tmp_path):
+def test_a_missing_topic_or_field_is_named_with_the_nearest(bag, tmp_path):
     (tmp_path / "machine.toml").write_text(MACHINE.replace("/joint_states", "/joint_state"))
     with pytest.raises(RecordingError, match=r"no message of topic '/joint_state'.*did you mean /joint_states"):
         read_recording(bag, read_machine_file(tmp_path / "machine.toml"))
@@ -115,7 +115,7 @@ def test_damaged_bags_are_one_line_or_a_counted_loss(bag):
                 assert any(finding.severity in ("loss", "warning") for finding in source.findings)
 
 
-def test_an_sqlite_database_that_is_no_bag_is_refused(tmp_path):
+def test_an_sqlite_database_other_than_a_bag_is_refused(tmp_path):
     import sqlite3
 
     path = tmp_path / "other.db3"

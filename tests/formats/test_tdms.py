@@ -9,7 +9,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import NoStartTime
 from cdtool.findings.containers import ColumnLeftOut, LibraryMessage, RoundedIntegers
-from cdtool.formats.tdms import Tdms, collected_lines
+from cdtool.formats.tdms import Tdms, collect_warnings
 from cdtool.ingest.reading import survey
 
 nptdms = pytest.importorskip("nptdms")
@@ -31,7 +31,7 @@ def saved(tmp_path):
     return save
 
 
-def test_a_waveforms_increment_is_its_clock_and_its_unit_is_told(saved):
+def test_a_waveforms_increment_is_its_clock_and_its_unit_is_read(saved):
     start = np.datetime64("2025-03-04T05:06:07.5", "us")
     path = saved(
         [
@@ -48,7 +48,7 @@ def test_a_waveforms_increment_is_its_clock_and_its_unit_is_told(saved):
     assert source.origin == (start - np.datetime64(0, "s")) / np.timedelta64(1, "s")
 
 
-def test_segments_are_joined_and_names_of_two_groups_are_told_apart(saved):
+def test_segments_are_joined_and_equal_names_in_two_groups_are_distinguished(saved):
     parts = [[channel("a", "v", np.arange(3.0) + 3 * k), channel("b", "v", np.arange(2))] for k in range(3)]
     source = survey(saved(*parts))
     assert source.columns["a/v"].values.tolist() == list(range(9)) and len(source.columns["b/v"].values) == 6
@@ -60,11 +60,11 @@ def test_texts_and_time_stamps_are_named_and_left_out(saved):
         saved([channel("m", "word", ["a", "b"]), channel("m", "when", stamps), channel("m", "v", np.ones(3))])
     )
     assert list(source.columns) == ["v"]
-    told = {finding.fact for finding in source.findings}
-    assert {ColumnLeftOut("word", "no number"), ColumnLeftOut("when", "of time stamps")} <= told
+    facts = {finding.fact for finding in source.findings}
+    assert {ColumnLeftOut("word", "not numeric"), ColumnLeftOut("when", "of time stamps")} <= facts
 
 
-def test_of_a_file_that_is_cut_off_the_whole_part_is_read_and_the_loss_told(saved):
+def test_the_complete_part_of_a_cut_file_is_read_and_the_loss_is_reported(saved):
     data = np.random.default_rng(1).normal(size=1000)
     path = saved(*[[channel("m", "v", data[k : k + 100])] for k in range(0, 1000, 100)])
     whole = path.read_bytes()
@@ -97,7 +97,7 @@ def later(seconds: float) -> np.datetime64:
     return START + np.timedelta64(int(seconds * 1e6), "us")
 
 
-def test_of_waveforms_of_which_only_some_tell_their_start_the_others_keep_their_distance(saved):
+def test_waveforms_without_a_start_keep_their_offset_from_the_common_origin(saved):
     path = saved(
         [
             channel("m", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=later(0.0)),
@@ -109,11 +109,11 @@ def test_of_waveforms_of_which_only_some_tell_their_start_the_others_keep_their_
     starts = {key: float(column.time[0]) for key, column in source.columns.items()}
     assert starts == {"i": 0.0, "F": 3600.25, "n": 0.5}
     assert source.origin == (START - np.datetime64(0, "us")) / np.timedelta64(1, "s")
-    (told,) = [finding for finding in source.findings if finding.severity == "warning"]
-    assert told.fact == NoStartTime(("n",))
+    (warning,) = [finding for finding in source.findings if finding.severity == "warning"]
+    assert warning.fact == NoStartTime(("n",))
 
 
-def test_a_start_in_1904_is_an_empty_stamp_and_none(saved):
+def test_a_start_in_1904_is_an_empty_stamp(saved):
     empty = np.datetime64("1904-01-01T00:00:00", "us")
     rows = [channel("m", name, np.arange(5.0), wf_increment=0.01, wf_start_time=empty) for name in "ab"]
     source = survey(saved(rows))
@@ -122,12 +122,12 @@ def test_a_start_in_1904_is_an_empty_stamp_and_none(saved):
     assert source.findings[0].fact == NoStartTime(("a", "b"))
 
 
-def test_an_increment_that_is_a_whole_number_is_a_clock_too(saved):
+def test_an_integer_increment_is_a_clock(saved):
     source = survey(saved([channel("m", "i", np.arange(5.0), wf_increment=2)]))
     assert source.columns["i"].time.tolist() == [0, 2, 4, 6, 8]
 
 
-def test_stamps_in_nanoseconds_since_1970_are_exact_beside_waveforms(saved):
+def test_stamps_in_nanoseconds_since_1970_are_exact_next_to_waveforms(saved):
     first = int(START.astype("datetime64[ns]").astype(np.int64)) + 123_456_789
     stamps = first + np.cumsum(np.random.default_rng(5).integers(900_001, 1_100_000, 200))
     path = saved(
@@ -144,7 +144,7 @@ def test_stamps_in_nanoseconds_since_1970_are_exact_beside_waveforms(saved):
     assert Finding(RoundedIntegers(200), "time") in source.findings
 
 
-def test_a_clock_that_counts_from_its_own_start_stays_there_and_is_told(saved):
+def test_a_clock_with_its_own_start_is_not_shifted_and_is_reported(saved):
     path = saved(
         [
             channel("a", "i", np.arange(5.0), wf_increment=0.01, wf_start_time=START),
@@ -157,7 +157,7 @@ def test_a_clock_that_counts_from_its_own_start_stays_there_and_is_told(saved):
     assert NoStartTime(("F",)) in [finding.fact for finding in source.findings]
 
 
-def test_what_the_library_would_print_is_told_and_not_printed(saved, capfd, caplog):
+def test_warnings_of_the_library_are_reported_and_not_printed(saved, capfd, caplog):
     path = saved([channel("m", "v", np.arange(100.0))])
     path.write_bytes(path.read_bytes()[:-30])
     handlers = list(logging.getLogger("nptdms.reader").handlers)
@@ -169,12 +169,12 @@ def test_what_the_library_would_print_is_told_and_not_printed(saved, capfd, capl
     assert logging.getLogger("nptdms.reader").handlers == handlers
 
 
-def test_only_the_lines_of_the_library_are_collected(caplog):
+def test_only_the_warnings_of_the_library_are_collected(caplog):
     ours, other = logging.getLogger("nptdms.reader"), logging.getLogger("another")
-    with collected_lines("nptdms") as lines:
-        ours.warning("odd %d", 3)
-        ours.debug("not worth a word")
+    with collect_warnings("nptdms") as lines:
+        ours.warning("number %d", 3)
+        ours.debug("not collected")
         other.warning("of another one")
     ours.warning("later")
-    assert lines == ["odd 3"]
+    assert lines == ["number 3"]
     assert [record.getMessage() for record in caplog.records] == ["of another one", "later"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cdtool.findings import Finding
 from cdtool.findings.containers import RoundedIntegers
 from cdtool.formats.csv import Csv
-from cdtool.formats.pieces import joined
+from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
 from cdtool.large_integers import rounded_integers
 from tests.formats.conftest import COLUMNS
@@ -96,7 +96,7 @@ def test_any_stamps_are_exact_to_the_nanosecond(log, machine, first, steps, unit
 
 def test_without_a_machine_file_rounded_stamps_are_counted(log):
     text = "stamp,x\n" + "".join(f"{EPOCH + i},{i}\n" for i in range(30))
-    for source in (Csv().columns(log(text)), joined(Csv().pieces(log(text)), sort=False)):
+    for source in (Csv().columns(log(text)), join_pieces(Csv().pieces(log(text)), sort=False)):
         assert rounding_findings(source) == [Finding(RoundedIntegers(30), "stamp")]
 
 

@@ -36,14 +36,14 @@ def test_the_first_bytes_determine_the_format_if_the_suffix_is_wrong(log, tmp_pa
         (b'{"a": 1}', "a.json", "it is JSON"),
         (b"\x89MCAP", "a.mcap", "is not a recording, nor a complete MCAP file"),
         (bytes(200), "a.dat", "is not a recording"),
-        ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.csv", "holds no row of numbers"),
+        ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.csv", "contains no row of numbers"),
         ("<p>1,2</p>".encode("utf-16"), "a.csv", "is not a recording: it is HTML or XML"),
         (b"\xfe\xff" + '{"a": 1}'.encode("utf-16-be"), "a.json", "it is JSON"),
         ("<p>1,2</p>".encode("utf-32"), "a.csv", "it is HTML or XML"),
         (b"\xff\xfe" + bytes(30), "a.csv", "is not a recording"),
         ("a sentence.\nAnd another one.\n".encode("utf-16"), "a.mcap", "nor a complete MCAP file"),
         (b"", "a.csv", "is empty"),
-        (b"a sentence.\nAnd another one.\n", "a.txt", "holds no row of numbers"),
+        (b"a sentence.\nAnd another one.\n", "a.txt", "contains no row of numbers"),
     ],
 )
 def test_a_file_that_is_not_a_recording_is_refused_in_one_line_with_its_name(log, content, name, message):

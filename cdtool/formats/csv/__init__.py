@@ -1,7 +1,7 @@
-"""CSV and its kin: text tables, one row a sample, with or without a header line.
+"""CSV and similar text tables, one row per sample, with or without a header line.
 
-`find_dialect.py` finds how a table is written (text, lines, separator, head, marks, stamps: a file each),
-`table.py` and `rows.py` read it.
+`find_dialect.py` detects the dialect of a table (text, lines, separator, head, marks, stamps: one module each);
+`table.py` and `rows.py` read the table.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:
     from cdtool.formats.csv.dialect import Dialect
-    from cdtool.formats.csv.table import Table
+    from cdtool.formats.csv.table import TextTable
 import math
 from itertools import takewhile
 
@@ -31,20 +31,20 @@ from cdtool.formats.groups import PREFIX
 
 _MARK = b"# " + PREFIX.encode()
 _KEY = _MARK + b"origin_s: "
-# A long list of parts, or of what was lost, may follow it.
+# Bytes that are searched for it: the provenance may contain a long list of parts, or of losses.
 _HEAD = 1 << 16
 
 
 @dataclass(frozen=True)
 class Csv:
-    """Tables of text: separator, header, decimal mark and encoding are found from the first lines, or pinned."""
+    """Text tables: separator, header, decimal mark and encoding are detected from the first lines, or pinned."""
 
     name: ClassVar[str] = "csv"
     suffixes: ClassVar[tuple[str, ...]] = (".csv", ".txt", ".tsv", ".dat", ".lvm")
     sniffs_any_text: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
-        """True if the file starts as text that is no markup."""
+        """Return whether the file starts with text other than markup."""
         from cdtool.formats.csv.encoding import looks_like_text
         from cdtool.formats.csv.text import read_sample
 
@@ -52,18 +52,18 @@ class Csv:
         return bool(sample.strip()) and looks_like_text(sample)
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The columns that `wanted` names, or all numeric ones; raises RecordingError with the line number."""
+        """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line."""
         dialect = _dialect(path, TablePins() if wanted is None else wanted.pins)
-        return _survey(path, dialect) if wanted is None else _wanted(path, dialect, wanted)
+        return _read_all(path, dialect) if wanted is None else _read_wanted(path, dialect, wanted)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
-        """All numeric columns, or those of `keys`, a MiB of the file at a time; raises RecordingError."""
+        """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
         from cdtool.formats.csv.table import table_pieces
 
         dialect = _dialect(path, TablePins())
-        # The last column, too: it shows whether the file's end is whole.
-        asked = dialect.names if keys is None else {*keys, dialect.names[-1]}
-        table = yield from table_pieces(path, dialect, asked)
+        # The last column is always read: it shows whether the file's end is complete.
+        read = dialect.names if keys is None else {*keys, dialect.names[-1]}
+        table = yield from table_pieces(path, dialect, read)
         return _source(path, dialect, table)
 
 
@@ -73,11 +73,11 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
 
     sample = read_sample(path)
     if not sample.strip():
-        raise RecordingError(f"{path}: is empty", "was the recording stopped at once, or the copy cut off?")
+        raise RecordingError(f"{path}: is empty", "was the recording stopped immediately, or the copy cut off?")
     return find_dialect(path, sample, pins)
 
 
-def _survey(path: Path, dialect: Dialect) -> Source:
+def _read_all(path: Path, dialect: Dialect) -> Source:
     from cdtool.formats.csv.several_clocks import Clocks, clock_findings
     from cdtool.formats.csv.table import read_table
 
@@ -86,8 +86,8 @@ def _survey(path: Path, dialect: Dialect) -> Source:
     return _source(path, dialect, table)
 
 
-def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
-    from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clock, own_clocks
+def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, columns_by_own_clock, describe_other_clock
     from cdtool.formats.csv.table import read_table
 
     names, time = dialect.names, wanted.time
@@ -98,26 +98,26 @@ def _wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
         return _source(path, dialect, read_table(path, dialect, wanted_keys(path, wanted, names), clock, wanted))
     keys = wanted_keys(path, wanted if clock is not None else replace(wanted, time=TimeSource()), names)
     table = read_table(path, dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
-    other = other_clock(dialect, clocks, clock, keys, table.values) if clock is not None else ""
+    other = describe_other_clock(dialect, clocks, clock, keys, table.values) if clock is not None else ""
     if other and not own:
         raise RecordingError(f"{path}: {other}", HINT)
     if clock is not None and not other:
         table.values = {key: values for key, values in table.values.items() if key in keys}
         return _source(path, dialect, table)
-    if clock is not None:  # as it stands in the file, beside the others
+    if clock is not None:  # back to the file's values, which can be compared with the other clocks
         table.values[clock] = table.values[clock] + table.origin
-    asked = [key for key in keys if key != clock]
-    columns, origin, told = own_clocks(path, dialect, clocks, asked, table.values)
-    table.values, table.findings = {}, [*table.findings, *told]
+    channels = [key for key in keys if key != clock]
+    columns, origin, findings = columns_by_own_clock(path, dialect, clocks, channels, table.values)
+    table.values, table.findings = {}, [*table.findings, *findings]
     origin = origin or written_origin(path)
     return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
 
 
-def _source(path: Path, dialect: Dialect, table: Table) -> Source:
-    from cdtool.formats.csv.several_clocks import told_unit
+def _source(path: Path, dialect: Dialect, table: TextTable) -> Source:
+    from cdtool.formats.csv.several_clocks import unit_from_header
 
     columns = {
-        key: Column(key, values, unit="s" if key in table.stamped else told_unit(dialect, key))
+        key: Column(key, values, unit="s" if key in table.stamped else unit_from_header(dialect, key))
         for key, values in table.values.items()
     }
     return Source(
@@ -134,10 +134,10 @@ def _source(path: Path, dialect: Dialect, table: Table) -> Source:
 
 
 def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[str, str]) -> None:
-    """Write columns of equal length, each by its printf format (default %.17g, which reads back to the bit)."""
+    """Write columns of equal length, each with its printf format (default %.17g, which reads back exactly)."""
     lengths = {len(values) for values in columns.values()}
     if len(lengths) != 1:
-        raise UsageError(f"{path}: columns of lengths {sorted(lengths)}", "all columns of a table are equally long")
+        raise UsageError(f"{path}: columns of lengths {sorted(lengths)}", "columns of a table have the same length")
     row = ",".join(formats.get(name, "%.17g") for name in columns) + "\n"
     values = np.column_stack(list(columns.values()))
     body = (row * len(values)) % tuple(values.ravel().tolist())
@@ -145,13 +145,13 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
 
 
 def written_origin(path: Path) -> float:
-    """Return the origin [s] that a text table's own head gives; 0 where it gives no origin."""
+    """Return the origin [s] that the head of a text table states; 0 if it does not state one."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
     lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())
     written = next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0")
     try:
         origin = float(written)
-    except ValueError:  # somebody has edited it
+    except ValueError:  # edited by hand
         return 0.0
     return origin if math.isfinite(origin) else 0.0

@@ -1,4 +1,4 @@
-"""A line's cells, and what one cell is: a number, a stamp of time, a missing value, or words."""
+"""Split a line into cells and classify them: number, time stamp, missing value or words."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import re
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "pipe", ",": "comma", " ": "blanks"}
 MISSING = ("", "nan", "NaN", "NAN")
 MINUS_SIGN = "\u2212"
-# Blanks that do not break a line: what French and Swiss tables set between thousands.
+# Non-breaking spaces, which French and Swiss tables use as thousands separators.
 NARROW_BLANKS = ("\u00a0", "\u202f")
 
 _TAIL = r"(?:[eE][+-]?[0-9]+)?"
@@ -17,7 +17,7 @@ _WORDS = re.compile(r"[+-]?(?:nan|inf|infinity|true|false)", re.IGNORECASE)
 _PLAIN = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+){_TAIL}") for mark in ".,"
 }
-# As the run-time library of Microsoft's C writes what is no number: 1.#QNAN, -1.#IND, 1.#INF.
+# NaN and infinity as written by Microsoft's C run-time library: 1.#QNAN, -1.#IND, 1.#INF.
 _MICROSOFT = re.compile(r"[+-]?1[.,]#(?P<kind>QNAN|SNAN|IND|INF)[0-9]*|[+-]?nan\((?:ind|snan)\)", re.IGNORECASE)
 _QUICK = re.compile(r"-?[0-9]+(?:[.,][0-9]+)?")
 _NUMBER_LIKE = re.compile(
@@ -30,7 +30,7 @@ STAMP_LIKE = re.compile(
 
 
 def split_line(line: str, separator: str) -> list[str]:
-    """Cells without their outer blanks and quotes."""
+    """Return the cells of a line without outer blanks and quotes."""
     if separator == " " and '"' not in line:
         return _words(line)
     if '"' not in line:
@@ -39,18 +39,18 @@ def split_line(line: str, separator: str) -> list[str]:
         line = " ".join(_words(line))
     try:
         cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    except csv.Error:  # stray quotes: told with their line when the rows are read
+    except csv.Error:  # stray quotes: reported with their line when the rows are read
         cells = line.split(separator)
     return [cell.strip(" \t\r\n") for cell in cells]
 
 
 def _words(line: str) -> list[str]:
-    """A line cut at its blanks and tabs: a blank that does not break is within a number."""
+    """Return a line split at blanks and tabs; non-breaking spaces do not split, as they are parts of numbers."""
     return [word for word in line.strip(" \t\r\n").replace("\t", " ").split(" ") if word]
 
 
 def kind(cell: str) -> str:
-    """N a number in any notation or said to be none (nan), T a stamp, M nothing, X words."""
+    """Return the kind of a cell: N number in any notation or NaN, T time stamp, M missing (empty), X words."""
     if _QUICK.fullmatch(cell):
         return "N"
     if not cell:
@@ -68,7 +68,7 @@ def _grouped(text: str) -> bool:
 
 
 def number(text: str, decimal: str, thousands: str = "") -> float | None:
-    """The value of a cell as Python's float() has it, NaN for a missing one, or None if it is no number."""
+    """Return the value of a cell, equal to Python's float(); NaN for a missing value, None if it is not a number."""
     text = text.strip(" \t\r").replace(MINUS_SIGN, "-")
     if text in MISSING:
         return math.nan
@@ -92,8 +92,8 @@ def number(text: str, decimal: str, thousands: str = "") -> float | None:
     return float(text.replace(",", "."))
 
 
-def holds_numbers(line: str) -> bool:
-    """True for a line of numbers, stamps beside them or not, whichever mark separates them: words hold no sample."""
+def has_numbers(line: str) -> bool:
+    """Return whether a line has numbers, with or without time stamps, but no words, for any separator."""
     for separator in SEPARATORS:
         cells = [cell for cell in split_line(line, separator) if cell]
         if any(_is_plain_number(cell) for cell in cells) and all(kind(cell) in "NT" for cell in cells):
@@ -102,5 +102,5 @@ def holds_numbers(line: str) -> bool:
 
 
 def _is_plain_number(cell: str) -> bool:
-    """A number, and neither a stamp nor an address such as 192.168.0.1."""
+    """Return whether a cell is a number, and neither a time stamp nor an address such as 192.168.0.1."""
     return kind(cell) == "N" and (cell.count(".") < 2 or _grouped(cell))

@@ -1,4 +1,4 @@
-"""How a text table is written, as a value; and as `[csv]` of a machine file, to be pasted."""
+"""The dialect of a text table, and its form as `[csv]` of a machine file."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from cdtool.channels import TablePins
 from cdtool.findings import Finding
 from cdtool.formats.csv.cells import SEPARATORS
-from cdtool.formats.csv.marks import Marks, Seen
-from cdtool.formats.csv.stamps import Stamped
+from cdtool.formats.csv.marks import Marks, SampleCell
+from cdtool.formats.csv.stamps import StampLayouts
 from cdtool.formats.csv.text import Text
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """The rows begin in line `first_line` (from 1), at byte `offset` of the stream; each is `width` cells wide.
+    """The dialect of a text table: rows of `width` cells start in line `first_line` (from 1), at byte `offset`.
 
-    `kinds` has one letter a cell: N numbers, T stamps, X words, M nothing in the sample. `trailing`: each row ends
-    with a separator, so that its last cell is none. `stamped` and `words` are of the columns T and X, by their number.
-    `commented`: the sample has comments that are no rows; `sampled` counts its rows; `preamble`: lines above them.
-    `blank_is_missing`: a blank line is a row whose only cell is empty.
+    `kinds` has one letter per cell: N numbers, T time stamps, X words, M missing in the whole sample. `trailing`: each
+    row ends with a separator, which is not followed by another cell. `stamped` and `words` describe the columns T and
+    X, by number. `commented`: the sample has comments other than commented rows; `sampled` is the number of its rows;
+    `preamble` are the lines above them. `blank_is_missing`: a blank line is a row whose only cell is empty.
     """
 
     text: Text
@@ -43,18 +43,18 @@ class Dialect:
     kinds: str
     trailing: bool
     blank_is_missing: bool
-    stamped: dict[int, Stamped]
-    words: dict[int, Seen]
+    stamped: dict[int, StampLayouts]
+    words: dict[int, SampleCell]
     findings: tuple[Finding, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The columns' names; without a header their numbers from 0."""
+        """Return the names of the columns; without a header their numbers from 0."""
         return self.header or tuple(str(i) for i in range(self.width - self.trailing))
 
     @property
     def details(self) -> dict[str, str]:
-        """The dialect in words."""
+        """Return the dialect as texts to be displayed."""
         shown = {
             "separator": SEPARATORS.get(self.separator, self.separator) if self.width > 1 else "none (one column)",
             "header": f"line {self.header_line}" if self.header else "none: columns by number",
@@ -71,14 +71,15 @@ class Dialect:
 
     @property
     def as_pins(self) -> str:
-        """The dialect as `[csv]` of a machine file, to be pasted."""
+        """Return the dialect as `[csv]` of a machine file."""
         return _pins_text(self)
 
 
 def _pins_text(dialect: Dialect) -> str:
-    """Lines of TOML. Where names and units stand is found again in each file, so that line is shown as a comment.
+    """Return the dialect as TOML.
 
-    The next log may have another line above them; only what was pinned stays pinned.
+    Lines of names and units that were detected are written as comments, because the next log may have more or fewer
+    lines above them; only pinned lines are written as keys.
     """
     pins = dialect.pins
     lines = ["[csv]"]
@@ -98,7 +99,7 @@ def _pins_text(dialect: Dialect) -> str:
         lines.append(f"comment = {quoted(pins.comment)}")
     if pins.missing:
         lines.append(f"missing = [{', '.join(map(quoted, pins.missing))}]")
-    layouts = {item.layout.pattern for item in dialect.stamped.values() if item.layout}
+    layouts = {each.layout.pattern for each in dialect.stamped.values() if each.layout}
     if len(layouts) == 1:
         lines.append(f"time_format = {quoted(layouts.pop())}")
     elif pins.time_format:
@@ -107,7 +108,7 @@ def _pins_text(dialect: Dialect) -> str:
 
 
 def quoted(text: str) -> str:
-    """A TOML string."""
+    """Return a text as a TOML string."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t")
     return f'"{escaped}"'
 
@@ -115,4 +116,4 @@ def quoted(text: str) -> str:
 def _line(key: str, pinned: int | bool | None, number: int) -> str:
     if pinned is not None:
         return f"{key} = {number or 'false'}"
-    return f"# {key} = {number}  (in this file; looked for again in each)"
+    return f"# {key} = {number}  (in this file; detected again in each file)"

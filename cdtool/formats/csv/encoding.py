@@ -1,4 +1,4 @@
-"""The encoding and the line ends of a text file, by its first bytes; and whether it is text at all."""
+"""Detect from a file's first bytes whether it is text, its encoding and its line ends."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.text import UNIT_BYTES, Text
 
-# UTF-32 first: its mark begins with that of UTF-16.
+# UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
     (codecs.BOM_UTF32_LE, "utf-32-le"),
@@ -18,13 +18,16 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
 _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]")
-# A text may hold so many of them by a slip, or this share of its bytes: it is refused with their line.
+# A text may contain this many control characters by mistake, or this share of its bytes: the error names their line.
 _FEW, _SHARE = 3, 0.02
 _OTHER_KINDS = (b"%PDF", b"\x89", b"GIF8", b"\xff\xd8", b"PK\x03\x04", b"\x1f\x8b", b"SQLite format", b"#ROSBAG")
 
 
 def looks_like_text(sample: bytes) -> bool:
-    """False for what cannot be a table of numbers: NUL bytes that are of no wide character, markup, a known binary."""
+    """Return whether the bytes may be a table of numbers.
+
+    They are not if they are markup or a known binary format, or have NUL bytes that are not parts of wide characters.
+    """
     head = sample[:4096]
     if head.startswith(_OTHER_KINDS):
         return False
@@ -38,8 +41,8 @@ def looks_like_text(sample: bytes) -> bool:
         except UnicodeError:
             return False
     else:
-        text = head[mark:].rstrip(b"\0")  # a file system pads the end of a file that was cut by a loss of power
-    # NUL bytes between lines are what a loss of power leaves; a binary file has other control characters too.
+        text = head[mark:].rstrip(b"\0")  # after a power failure a file system may pad the end of a file
+    # NUL bytes between lines result from a power failure; a binary file has other control characters, too.
     first_line = text.lstrip(b"\r\n").partition(b"\n")[0].partition(b"\r")[0]
     if not text or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"[")):
         return False
@@ -55,15 +58,15 @@ def _has_few_controls(text: bytes) -> bool:
     return b"\0" not in text and count <= max(_FEW, _SHARE * len(text))
 
 
-def find_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]:
-    """Encoding and line ends, and the sample as the stream has it; raises RecordingError."""
+def detect_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]:
+    """Return encoding and line ends, and the sample as part of the stream; raises RecordingError."""
     if not looks_like_text(sample):
-        raise RecordingError(f"{path}: is not a table of numbers: binary or markup", "give a CSV, MCAP or MAT file")
-    found, mark = _by_mark(sample)
-    encoding = pinned or found or _wide_without_mark(sample) or _narrow(sample)
-    if pinned and found and codecs.lookup(pinned).name != found:
+        raise RecordingError(f"{path}: is not a table of numbers: binary or markup", "name a CSV, MCAP or MAT file")
+    marked, mark = _by_mark(sample)
+    encoding = pinned or marked or _wide_without_mark(sample) or _narrow(sample)
+    if pinned and marked and codecs.lookup(pinned).name != marked:
         raise RecordingError(
-            f"{path}: line 1 begins with the byte order mark of {found.upper()}, [csv] encoding is '{pinned}'",
+            f"{path}: line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
         )
     size, padding = _without_padding(path, UNIT_BYTES.get(encoding, 1))
@@ -72,17 +75,17 @@ def find_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]
         try:
             stream = codecs.getincrementaldecoder(encoding)().decode(stream).encode()
         except UnicodeError as fault:
-            raise RecordingError(f"{path}: is damaged: no {encoding.upper()}", "save it again as UTF-8") from fault
+            raise RecordingError(f"{path}: damaged: not valid {encoding.upper()}", "save it again as UTF-8") from fault
     elif pinned:
         _check_pinned(path, stream, encoding)
     control = _CONTROL.search(stream[:4096])
     if control is not None:
         line = stream.count(b"\n", 0, control.start()) + 1
         raise RecordingError(
-            f"{path}: line {line} holds a control character (byte 0x{control[0][0]:02x})",
-            "save the table as plain text, without the colours of a terminal",
+            f"{path}: line {line} contains a control character (byte 0x{control[0][0]:02x})",
+            "save the table as plain text, without terminal colours",
         )
-    # One line feed at the very end does not make a file of carriage returns one of line feeds.
+    # A single line feed at the end of a file with carriage returns does not count as its line end.
     inner = stream.rstrip(b"\r\n")
     line_end = b"\n" if b"\n" in inner or b"\r" not in inner else b"\r"
     if b"\r" not in inner and b"\n" not in stream and b"\r" in stream:
@@ -95,7 +98,7 @@ def _by_mark(sample: bytes) -> tuple[str | None, int]:
 
 
 def _wide_without_mark(sample: bytes) -> str | None:
-    """UTF-16 without its mark: of a table nearly every second byte is NUL, and hardly any of the others."""
+    """Return UTF-16 without a byte order mark: nearly every second byte of a table is NUL, and few of the others."""
     head = sample[:4096].rstrip(b"\0")
     head += b"\0" * (len(head) % 2)
     if len(head) < 4:
@@ -122,21 +125,21 @@ def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
         at = getattr(fault, "start", 0)
         line = stream.count(b"\n", 0, at) + 1
         raise RecordingError(
-            f"{path}: line {line} is not valid {encoding}, which [csv] encoding says", "correct or remove encoding"
+            f"{path}: line {line} is not valid {encoding}, as [csv] encoding states", "correct or remove encoding"
         ) from fault
 
 
 def _without_padding(path: Path, unit: int) -> tuple[int, int]:
-    """Where the text ends, and how many NUL bytes follow."""
+    """Return the byte where the text ends, and the number of NUL bytes after it."""
     total = path.stat().st_size
     end = total
     with path.open("rb") as file:
         while end > 0:
             start = max(0, end - (1 << 16))
             file.seek(start)
-            kept = len(file.read(end - start).rstrip(b"\0"))
-            end = start + kept
-            if kept:
+            content = len(file.read(end - start).rstrip(b"\0"))
+            end = start + content
+            if content:
                 break
     if unit > 1:  # the upper bytes of the last character are NUL too
         mark = total % unit

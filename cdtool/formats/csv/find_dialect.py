@@ -1,6 +1,6 @@
-"""Find how a text table is written: from its first lines by evidence, or pinned by `[csv]` of the machine file.
+"""Detect the dialect of a text table from its first lines, with the pins of `[csv]` in the machine file.
 
-A sample is cut into cells: which of its lines are names and rows, where they part, where rows begin.
+The sample is split into lines and cells, to find the separator, the lines of names and the first row.
 """
 
 from __future__ import annotations
@@ -25,37 +25,37 @@ from cdtool.findings.tables import (
     PinnedLinesSkipped,
     WordsAboveRows,
 )
-from cdtool.formats.csv.blank_lines import are_missing, without_blank_end
-from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
-from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.doubtful_marks import (
+from cdtool.formats.csv.ambiguous_marks import (
     refuse_commas_that_may_be_decimal,
     refuse_one_column_of_decimals,
-    settled_marks,
+    resolve_marks,
 )
-from cdtool.formats.csv.encoding import find_text
+from cdtool.formats.csv.blank_lines import are_missing_samples, strip_blank_end
+from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
+from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv.head_words import column_kinds
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
-from cdtool.formats.csv.marks import Marks, Seen, find_marks
+from cdtool.formats.csv.marks import Marks, SampleCell, find_marks
 from cdtool.formats.csv.row_kernel import count_lines
-from cdtool.formats.csv.stamps import Stamped, find_layout
+from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
 
 _SCORED = 150
-# A separator that stands in this share of the lines, as often in each, is one whatever else the cells hold.
+# A strong separator that occurs equally often in this share of the lines is preferred, even with fewer numbers.
 _CONSISTENT = 0.9
 _STRONG = "\t;|"
 _SHOWN_ENCODINGS = {"cp1252": "Windows-1252", "latin-1": "Latin-1"}
 _LOOKED = 200
 _MOST = 12
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
-_NO_VALUES = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
+_MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
 
 @dataclass(frozen=True)
 class Split:
-    """What a separator makes of the lines: cells a line, the share of lines so wide, the share of numbers in them."""
+    """The result of splitting lines at a separator: cells per line, share of such lines, share of numbers in them."""
 
     separator: str
     width: int
@@ -64,10 +64,10 @@ class Split:
 
 
 def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal: str = "") -> Split:
-    """Return the separator that cuts the lines into equally many cells, most of them numbers.
+    """Return the separator that splits the lines into equal numbers of cells, most of which are numbers.
 
-    Raises RecordingError where a pinned one cuts none of them. Beside a pinned decimal comma it may cut none: the table
-    has one column.
+    Raises RecordingError if a pinned separator splits no line but another one does. With a pinned decimal comma a table
+    may have a single column.
     """
     body = lines[len(lines) // 3 :] if len(lines) >= 6 else lines[1:] or lines
     texts = [line.text for line in body]
@@ -78,7 +78,7 @@ def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal:
             _split(scored, other).width > 1 for other in SEPARATORS if other not in (pinned, decimal)
         ):
             raise RecordingError(
-                f"{path}: line {body[0].number} has one cell by the separator {pinned!r}: {body[0].text[:40]!r}",
+                f"{path}: line {body[0].number} has one cell with the separator {pinned!r}: {body[0].text[:40]!r}",
                 "correct or remove separator in [csv], or the line sep= of the file",
             )
         return split
@@ -104,7 +104,7 @@ def _split(texts: Sequence[str], separator: str) -> Split:
         rows = [_no_blank_separator(text, row) for text, row in zip(texts, rows, strict=True)]
     widths = Counter(map(len, rows))
     width, count = widths.most_common(1)[0]
-    if width < 2 and len(widths) > 1:  # a preamble of single words does not decide
+    if width < 2 and len(widths) > 1:  # a preamble of single words must not decide
         wider, seen = next(item for item in widths.most_common(2) if item[0] > 1)
         if 2 * seen >= count:
             width, count = wider, seen
@@ -117,24 +117,24 @@ def _split(texts: Sequence[str], separator: str) -> Split:
 
 
 def _no_blank_separator(text: str, row: list[str]) -> list[str]:
-    """Blanks beside another separator are only blanks: `0, 1.5` is cut by its comma."""
+    """Return the line as one cell if another separator is next to its blanks: `0, 1.5` is separated by the comma."""
     if any(cell[-1:] in ",;|" or cell[:1] in ",;|" for cell in row) or "\t" in text.strip():
         return [text]
     return row
 
 
 def _is_number(cell: str, separator: str) -> bool:
-    # `1,500 200,5` is no row of `500 200` between commas, though that may be written so between semicolons.
-    found = kind(cell)
-    return found == "T" or (found == "N" and not (separator == "," and " " in cell))
+    # `1,500 200,5` is not a row with the cell `500 200` between commas; between semicolons that would be a number.
+    letter = kind(cell)
+    return letter == "T" or (letter == "N" and not (separator == "," and " " in cell))
 
 
 @dataclass(frozen=True)
 class SampleLines:
-    """The lines of a sample by what they are: `table` has names and rows, `mark` begins the `comments`.
+    """The lines of a sample by kind: `table` are names and rows, `comments` are the lines that start with `mark`.
 
-    `separator` is a line that only names the separator (sep=;), `skipped` are the numbers of those that the machine
-    file says to skip.
+    `separator` is a line that only names the separator (sep=;); `skipped` are the numbers of the lines that the machine
+    file skips.
     """
 
     every: Sequence[Line]
@@ -145,8 +145,8 @@ class SampleLines:
     skipped: Sequence[int]
 
 
-def sort_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> SampleLines:
-    """Sort the lines of the sample; raises RecordingError where none is left for a table."""
+def classify_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> SampleLines:
+    """Sort the lines of the sample by kind; raises RecordingError if no line of a table is left."""
     every = sample_lines(text, stream)
     filled = [line for line in every if not line.blank]
     lines = [line for line in filled if line.number > pins.skip_lines]
@@ -155,7 +155,7 @@ def sort_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Sample
     mark = comment_mark(lines, pins.comment)
     table = [line for line in lines if not line.is_comment(mark)]
     if not table:
-        raise RecordingError(f"{path}: holds no row of numbers", "a header line and rows of numbers are needed")
+        raise RecordingError(f"{path}: contains no row of numbers", "a header line and rows of numbers are needed")
     comments = [line for line in lines if line.is_comment(mark)]
     return SampleLines(
         every, table, comments, mark, separator, [line.number for line in filled if line.number <= pins.skip_lines]
@@ -164,7 +164,7 @@ def sort_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Sample
 
 @dataclass(frozen=True)
 class CellGrid:
-    """The sample's lines cut into cells: `rows` are all of them, `data` those below the `head`, `width` cells wide."""
+    """The sample's lines as cells: `rows` are all lines, `data` the lines of `width` cells below the `head`."""
 
     separator: str
     width: int
@@ -175,53 +175,54 @@ class CellGrid:
 
     @property
     def not_numbers(self) -> list[int]:
-        """The columns of stamps and words."""
+        """Return the columns of time stamps and words."""
         return [i for i, letter in enumerate(self.kinds) if letter in "TX"]
 
 
-def cut_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
-    """Find separator, width and head; raises RecordingError where there is no table, or one of two readings."""
+def split_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
+    """Find separator, width and head; raises RecordingError if there is no table, or one that is ambiguous."""
     named = lines.separator.separator or "" if lines.separator else ""
-    straight = [line for line in lines.table if not is_ruler(line.text)] or lines.table
-    cut = find_separator(path, straight, pins.separator or named, pins.decimal)
-    rows = [(line, split_line(line.text, cut.separator)) for line in lines.table]
-    wide = [(line, cells) for line, cells in rows if len(cells) == cut.width]
+    without_rulers = [line for line in lines.table if not is_ruler(line.text)] or lines.table
+    split = find_separator(path, without_rulers, pins.separator or named, pins.decimal)
+    rows = [(line, split_line(line.text, split.separator)) for line in lines.table]
+    wide = [(line, cells) for line, cells in rows if len(cells) == split.width]
     lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
-    kinds = column_kinds([cells for _, cells in _spread(lower)], cut.width)
-    head = HeadFinder(path, cut.separator, cut.width, kinds, pins).find(lines.table, lines.comments)
+    kinds = column_kinds([cells for _, cells in _sample_evenly(lower)], split.width)
+    head = HeadFinder(path, split.separator, split.width, kinds, pins).find(lines.table, lines.comments)
     data = [(line, cells) for line, cells in wide if line.number >= head.first.number]
-    kinds = column_kinds([cells for _, cells in _spread(data)], cut.width)
-    return CellGrid(cut.separator, cut.width, rows, data, head, kinds)
+    kinds = column_kinds([cells for _, cells in _sample_evenly(data)], split.width)
+    return CellGrid(split.separator, split.width, rows, data, head, kinds)
 
 
-def _spread(rows: Sequence[Any]) -> Sequence[Any]:
-    """At most some hundred rows, over all of the sample."""
+def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
+    """Return at most some hundred rows, evenly distributed over the sample."""
     return rows[:: max(1, len(rows) // (2 * _LOOKED))]
 
 
 def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
-    """The dialect of a text file by its first bytes; raises RecordingError for no table, or one of two readings.
+    """Return the dialect of a text file from its first bytes.
 
-    Its text ends where the rows do: a footer with figures is none of it, and is told.
+    The text of the dialect ends with the last row: a footer is excluded and reported as a warning. Raises
+    RecordingError if the file is not a table, or is ambiguous.
     """
-    text, stream = find_text(path, sample, pins.encoding)
+    text, stream = detect_text(path, sample, pins.encoding)
     dialect = _dialect(path, text, stream, pins)
     footer = find_footer(dialect)
     findings: list[Finding] = []
     if footer is not None:
-        dialect = _dialect(path, *footer.without(text, stream), pins)
+        dialect = _dialect(path, *footer.removed_from(text, stream), pins)
         findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset, count_lines)))
-    marks = dialect.marks if dialect.marks.sure else settled_marks(dialect)
+    marks = dialect.marks if dialect.marks.sure else resolve_marks(dialect)
     if marks.doubt:
         findings.append(Finding(DoubtfulPoint(marks.doubt.text, marks.doubt.line)))
-    text = without_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
+    text = strip_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
     return replace(dialect, text=text, marks=marks, findings=(*dialect.findings, *findings))
 
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     refuse_long_line(text, stream)
-    lines = sort_lines(path, text, stream, pins)
-    grid = cut_rows(path, lines, pins)
+    lines = classify_lines(path, text, stream, pins)
+    grid = split_rows(path, lines, pins)
     head = grid.head
     marks = _marks(path, grid.data, grid.kinds, grid.separator, pins)
     _refuse_other_readings(path, lines, grid, pins)
@@ -248,7 +249,7 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
         width=grid.width,
         kinds=grid.kinds,
         trailing=trailing,
-        blank_is_missing=are_missing(lines.every, head.first.number, grid.width),
+        blank_is_missing=are_missing_samples(lines.every, head.first.number, grid.width),
         stamped=_stamped_columns(grid, pins),
         words={i: _first_words(grid.data, i) for i in grid.not_numbers},
         findings=tuple(_findings(text, lines, head)),
@@ -256,7 +257,7 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
 
 
 def _refuse_other_readings(path: Path, lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
-    """Raise RecordingError where the lines may be another table: its commas decimal marks, or a table above it."""
+    """Raise RecordingError if the commas may be decimal marks, or if another table is above this one."""
     head = grid.head
     if head.names is None and not pins.separator and not lines.separator:
         above = [line for line in lines.comments if line.number < head.first.number]
@@ -264,51 +265,51 @@ def _refuse_other_readings(path: Path, lines: SampleLines, grid: CellGrid, pins:
         refuse_commas_that_may_be_decimal(path, grid.data, grid.kinds, grid.separator, named)
     if grid.width == 2 and grid.separator == "," and not pins.separator:
         refuse_one_column_of_decimals(path, grid.rows, head, grid.data)
-    if pins.header is None:  # a pinned header says which table is meant: what stands above is a loss
+    if pins.header is None:  # a pinned header selects the table, and rows above it are reported as a loss
         refuse_table_above(path, head, grid.width)
 
 
 def _has_comments(lines: SampleLines, grid: CellGrid) -> bool:
-    """Whether the sample has comments that are no rows made comments: above the rows, or of another width."""
+    """Return whether the sample has comments other than commented rows: above the rows, or of another width."""
     first = grid.head.first.number
     return any(
         line.number <= first or len(split_line(line.text, grid.separator)) != grid.width for line in lines.comments
     )
 
 
-def _stamped_columns(grid: CellGrid, pins: TablePins) -> dict[int, Stamped]:
-    """The columns of dates and times by their number; a time beside a day belongs to it."""
+def _stamped_columns(grid: CellGrid, pins: TablePins) -> dict[int, StampLayouts]:
+    """Return the columns of dates and times by number; a time next to a column of days is a time of day."""
     layout = pins.time_format if "%" in pins.time_format else ""
-    stamped: dict[int, Stamped] = {}
+    stamped: dict[int, StampLayouts] = {}
     for i in grid.not_numbers:
-        found = _stamped([cells[i] for _, cells in grid.data if cells[i] not in pins.missing], layout)
-        if found.layouts:
-            stamped[i] = found
-    days = [i for i, found in stamped.items() if found.layouts[0].dated]
-    return stamped | {i: stamped[i].beside_days() for day in days for i in (day - 1, day + 1) if i in stamped}
+        layouts = _find_layouts([cells[i] for _, cells in grid.data if cells[i] not in pins.missing], layout)
+        if layouts.layouts:
+            stamped[i] = layouts
+    days = [i for i, layouts in stamped.items() if layouts.layouts[0].dated]
+    return stamped | {i: stamped[i].next_to_days() for day in days for i in (day - 1, day + 1) if i in stamped}
 
 
-def _stamped(cells: list[str], layout: str) -> Stamped:
-    """A pinned layout counts for the columns that it fits; the others are looked at as ever."""
-    pinned = find_layout(cells, layout) if layout else Stamped(())
+def _find_layouts(cells: list[str], layout: str) -> StampLayouts:
+    """Return the pinned layout if it matches the cells, otherwise the detected ones."""
+    pinned = find_layout(cells, layout) if layout else StampLayouts(())
     return pinned if pinned.layouts else find_layout(cells)
 
 
-def _first_words(data: Sequence[tuple[Line, list[str]]], column: int) -> Seen:
-    """The first cell of a column that is neither a number nor missing."""
+def _first_words(data: Sequence[tuple[Line, list[str]]], column: int) -> SampleCell:
+    """Return the first cell of a column that is neither a number nor missing."""
     cells = [(cells[column], line.number) for line, cells in data if cells[column] not in MISSING]
-    return Seen(*next((item for item in cells if kind(item[0]) in "TX"), cells[0]))
+    return SampleCell(*next((cell for cell in cells if kind(cell[0]) in "TX"), cells[0]))
 
 
 def _marks(path: Path, data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, pins: TablePins) -> Marks:
     if pins.decimal and pins.thousands is not None:
         return Marks(pins.decimal, pins.thousands)
-    # A line without any of these letters shows a decimal point or none: some of them are enough.
-    telling = re.compile(rf"[{'' if separator == ',' else ','}\"'\u00a0\u202f]|[0-9] [0-9]{{3}}|\.[0-9]{{3}}\.")
-    looked = [item for i, item in enumerate(data) if i < _LOOKED or telling.search(item[0].text)]
+    # Lines without any of these marks have decimal points or whole numbers: a limited number of them is sufficient.
+    mark = re.compile(rf"[{'' if separator == ',' else ','}\"'\u00a0\u202f]|[0-9] [0-9]{{3}}|\.[0-9]{{3}}\.")
+    rows = [row for i, row in enumerate(data) if i < _LOOKED or mark.search(row[0].text)]
     cells = [
         (cell, line.number)
-        for line, row in looked
+        for line, row in rows
         for i, cell in enumerate(row)
         if kinds[i] == "N" and cell and (cell[0].isdigit() or cell[0] in "+-.,\u2212")
     ]
@@ -316,104 +317,104 @@ def _marks(path: Path, data: Sequence[tuple[Line, list[str]]], kinds: str, separ
 
 
 def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) -> bool:
-    """True if the last cell of every row is empty and has no name: each row ends with a separator."""
+    """Return whether each row ends with a separator: the last cell of every row is empty and has no name."""
     if len(kinds) < 2 or kinds[-1] != "M" or any(cells[-1] for _, cells in data):
         return False
     return head.names is None or not head.names[-1]
 
 
 def _findings(text: Text, lines: SampleLines, head: Head) -> list[Finding]:
-    found = []
+    findings = []
     if lines.skipped:
-        found.append(Finding(PinnedLinesSkipped(tuple(lines.skipped)), severity="note"))
-    shown = _SHOWN_ENCODINGS.get(text.encoding)
-    if shown:
-        found.append(Finding(OtherEncoding(shown), severity="note"))
+        findings.append(Finding(PinnedLinesSkipped(tuple(lines.skipped)), severity="note"))
+    encoding = _SHOWN_ENCODINGS.get(text.encoding)
+    if encoding:
+        findings.append(Finding(OtherEncoding(encoding), severity="note"))
     if lines.separator:
         line = lines.separator
-        found.append(Finding(NamedSeparator(line.number, line.text.strip()[:12]), severity="note"))
+        findings.append(Finding(NamedSeparator(line.number, line.text.strip()[:12]), severity="note"))
     if head.numbers:
-        found.append(Finding(NumbersAboveRows(tuple(head.numbers)), severity="loss"))
+        findings.append(Finding(NumbersAboveRows(tuple(head.numbers)), severity="loss"))
     if words := [line for line in head.preamble if line not in head.numbers]:
-        found.append(Finding(WordsAboveRows(tuple(words)), severity="note"))
+        findings.append(Finding(WordsAboveRows(tuple(words)), severity="note"))
     if head.from_comment:
-        found.append(Finding(NamesFromComment(head.header_line), severity="note"))
-    return found
+        findings.append(Finding(NamesFromComment(head.header_line), severity="note"))
+    return findings
 
 
 def _unique(cells: Sequence[str]) -> list[str]:
-    # A name that is there twice can be asked for by its number only: each bears it.
+    # A repeated name is ambiguous: the column's number is appended, and the column is requested by that number.
     counts = Counter(cells)
     return [str(i) if not cell else f"{cell}#{i}" if counts[cell] > 1 else cell for i, cell in enumerate(cells)]
 
 
 @dataclass(frozen=True)
 class Footer:
-    """`lines` are counted from 0 at the first of them; `shown` is that one, `cut` all of the stream from there on."""
+    """A footer: `lines` are its lines, counted from its first line (0); `first` is that line, `content` the bytes."""
 
     lines: tuple[int, ...]
-    shown: str
-    cut: bytes
+    first: str
+    content: bytes
 
     def finding(self, first_line: int) -> Finding:
-        """What is said of a footer that begins in that line of the file."""
-        return Finding(FooterSkipped(tuple(first_line + line for line in self.lines), self.shown))
+        """Return the warning on a footer that starts in that line of the file."""
+        return Finding(FooterSkipped(tuple(first_line + line for line in self.lines), self.first))
 
-    def without(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
-        """The text, and the sample of its stream, up to the footer."""
-        size = len(self.cut.decode().encode(text.encoding) if text.recoded else self.cut)
-        return replace(text, size=text.size - size), stream.removesuffix(self.cut)
+    def removed_from(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
+        """Return the text, and the sample of its stream, without the footer."""
+        size = len(self.content.decode().encode(text.encoding) if text.recoded else self.content)
+        return replace(text, size=text.size - size), stream.removesuffix(self.content)
 
 
 def find_footer(dialect: Dialect) -> Footer | None:
-    """Return the footer of a table whose first column holds numbers or times; None where it has no footer.
+    """Return the footer of a table whose first column has numbers or times; None if the table has no footer.
 
-    Its lines are no samples though they are as wide: `Sum;7.5`, `Mean;0.3`, `End of file;`. Such a line begins with a
-    word where every row begins with a number or a time. A word that comes among the rows too, or again and again, or
-    that marks a missing value, does not begin a footer: the column holds words, or a row is damaged.
+    The lines of a footer may be as wide as rows but are not samples: `Sum;7.5`, `Mean;0.3`, `End of file;`. Such a line
+    starts with a word where each row starts with a number or a time. A word that also occurs in rows above, that is
+    repeated, or that marks a missing value does not start a footer: the column has words, or a row is damaged.
     """
-    if dialect.kinds[0] not in "NT" or dialect.text.padding:  # where the power was lost nobody wrote a sum
+    if dialect.kinds[0] not in "NT" or dialect.text.padding:  # a file that ends with a power failure has no footer
         return None
     raw = _last_lines(dialect)
     words: list[tuple[int, list[str]]] = []
-    for i in range(len(raw) - 1, -1, -1):  # mostly the last line is a row, and the others are not looked at
+    for i in range(len(raw) - 1, -1, -1):  # usually the last line is a row, which ends the loop
         cells = _cells(dialect, raw[i])
         if cells and not _is_words(dialect, cells):
             break
         if cells:
             words.insert(0, (i, cells))
     labels = [cells[0].lower() for _, cells in words if len(cells) == dialect.width]
-    if not 0 < len(labels) == len(set(labels)) <= _MOST or not set(labels).isdisjoint(_no_values(dialect)):
+    if not 0 < len(labels) == len(set(labels)) <= _MOST or not set(labels).isdisjoint(_missing_words(dialect)):
         return None
     first = words[0][0]
     above = [cells for line in raw[:first] if len(cells := _cells(dialect, line)) == dialect.width]
     if not above or any(kind(cells[0]) == "X" for cells in above):
         return None
-    shown = dialect.text.decode(raw[first]).strip()
-    return Footer(tuple(i - first for i, _ in words), shown, dialect.text.line_end.join(raw[first:]))
+    first_text = dialect.text.decode(raw[first]).strip()
+    return Footer(tuple(i - first for i, _ in words), first_text, dialect.text.line_end.join(raw[first:]))
 
 
 def _cells(dialect: Dialect, line: bytes) -> list[str]:
-    """A line's cells; none of a line that is blank, drawn, a comment or the header again."""
+    """Return a line's cells; empty for a blank line, a ruler, a comment or a repeated header."""
     text = dialect.text.decode(line).strip()
     if not text or is_ruler(text) or (dialect.comment and text.startswith(dialect.comment)):
         return []
-    if text in {told.strip() for told in dialect.header_text}:
+    if text in {line.strip() for line in dialect.header_text}:
         return []
     return split_line(text, dialect.separator)
 
 
 def _is_words(dialect: Dialect, cells: list[str]) -> bool:
-    """True for a line that begins with a label, and is as wide as the rows or words only."""
+    """Return whether a line starts with a label, and has one cell or as many as the rows."""
     return len(cells) in (1, dialect.width) and _LABEL.fullmatch(cells[0]) is not None and kind(cells[0]) == "X"
 
 
-def _no_values(dialect: Dialect) -> set[str]:
-    return {*_NO_VALUES, *(text.lower() for text in dialect.missing)}
+def _missing_words(dialect: Dialect) -> set[str]:
+    return {*_MISSING_WORDS, *(text.lower() for text in dialect.missing)}
 
 
 def _last_lines(dialect: Dialect) -> list[bytes]:
-    """The last whole lines of the rows, as the stream has them."""
+    """Return the last complete lines of the rows, as bytes of the stream."""
     text = dialect.text
     most = SAMPLE_BYTES if text.recoded else TAIL_BYTES
     start = text.mark if text.recoded else text.mark + dialect.offset

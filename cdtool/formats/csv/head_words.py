@@ -1,4 +1,4 @@
-"""Words above the rows of a table: units, types, numbered names; and what the cells of a column mostly are."""
+"""Classify words above the rows of a table (units, types, numbered names) and the columns by most of their cells."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from cdtool.formats.csv.cells import kind
 from cdtool.units import find_unit
 
-# Units that have no factor to SI here, and words that stand for one.
+# Units without a factor to SI in cdtool, and words for units.
 _UNIT_WORDS = frozenset(
     (
         *("volt", "volts", "ampere", "amperes", "amp", "amps", "second", "seconds", "msec", "newton", "newtons"),
@@ -26,17 +26,17 @@ _TYPES = frozenset(
 
 
 def column_kinds(rows: Sequence[Sequence[str]], width: int) -> str:
-    """One letter a column, what most of its cells are: N, T, X, or M if all are missing."""
-    seen = [Counter(kind(row[i]) for row in rows) for i in range(width)]
+    """Return one letter per column, the kind of most of its cells: N, T, X, or M if all are missing."""
+    kind_counts = [Counter(kind(row[i]) for row in rows) for i in range(width)]
     letters = []
-    for counts in seen:
+    for counts in kind_counts:
         present = {letter: counts[letter] for letter in "NTX" if counts[letter]}
         letters.append(max(present, key=lambda letter: present[letter]) if present else "M")
     return "".join(letters)
 
 
 def are_numbered(cells: Sequence[str]) -> bool:
-    """`t,1,2,3`: a word, and then numbers counted up by one."""
+    """Return whether the cells are a word and then consecutive numbers from 0 or 1: `t,1,2,3`."""
     rest = list(cells[1:])
     if not cells or kind(cells[0]) not in "XM" or not rest or not all(cell.isdigit() for cell in rest):
         return False
@@ -44,13 +44,13 @@ def are_numbered(cells: Sequence[str]) -> bool:
 
 
 def are_types(cells: Sequence[str]) -> bool:
-    """True for a row of types, as PLCs write it below the names: `REAL;INT`."""
+    """Return whether the cells are data types, which PLCs write below the names: `REAL;INT`."""
     words = [cell.lower().strip("[]()") for cell in cells if cell]
     return bool(words) and all(word in _TYPES for word in words)
 
 
 def is_unit(cell: str) -> bool:
-    """True for a unit: a known one, one of the words for units, or anything in brackets."""
+    """Return whether a cell is a unit: a known unit, a word for one, or any text in brackets."""
     if cell[:1] in ("[", "(") and cell[-1:] in ("]", ")"):
         bare = cell[1:-1].strip()
         return kind(bare) == "X" or bare in ("", "1")

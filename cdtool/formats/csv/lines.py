@@ -1,4 +1,4 @@
-"""The lines of the sample: numbered, without their ends, and told apart: blank, comment, ruler, cells."""
+"""The lines of the sample: numbered, without line ends, and distinguished as blank, comment, ruler or cells."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 
 COMMENTS = ("#", "%", "//")
 _RULER, _DRAWN = re.compile(r"[-=+|\s:]*"), re.compile(r"[-=]{2}")
-# What Excel writes where a formula has no value: no comment, though it begins with the mark of one.
+# Excel's error values of formulas, which are not comments although they start with #.
 _ERROR_VALUE = re.compile(r'#(?:(?:N/A|N/D|NV|DIV/0!)(?=[\s,;|"]|$)|[^\s,;|"#]{2,12}[!?](?=[\t,;|"]|$)|#+(?=[\t,;|"]))')
 _EXCEL = re.compile(r'"?sep=(?P<separator>.|\\t)?"?[,;\t ]*', re.IGNORECASE)
 _HEAD_LINES, _MOST_JOINED = 100, 6
@@ -18,7 +18,7 @@ _HEAD_LINES, _MOST_JOINED = 100, 6
 
 @dataclass(frozen=True)
 class Line:
-    """A line of the file: its number from 1, its text, the byte of the stream where it starts."""
+    """A line of the file: its number (from 1), its text, and the byte of the stream where it starts."""
 
     number: int
     text: str
@@ -26,40 +26,40 @@ class Line:
 
     @property
     def blank(self) -> bool:
-        """True for a line that holds nothing."""
+        """Return whether the line is empty or has only blanks."""
         return not self.text.strip()
 
     @property
     def separator(self) -> str | None:
-        """What a line `sep=;`, as Excel reads and writes it, says; None for any other line."""
-        found = _EXCEL.fullmatch(self.text.strip("\r\n ")) if self.number < 3 else None
-        if found is None:
+        """Return the separator that a line `sep=;` of Excel names; None for any other line."""
+        match = _EXCEL.fullmatch(self.text.strip("\r\n ")) if self.number < 3 else None
+        if match is None:
             return None
-        mark = found["separator"] or "\t"
+        mark = match["separator"] or "\t"
         return "\t" if mark == "\\t" else mark
 
     def is_comment(self, mark: str) -> bool:
-        """True for a line that starts with the mark."""
+        """Return whether the line is a comment that starts with the mark."""
         return begins_comment(self.text, mark)
 
 
 def begins_comment(text: str, mark: str) -> bool:
-    """True for a line that starts with the mark ("": none does) and not with `#N/A` or `#DIV/0!`."""
+    """Return whether a line starts with the mark ("": none does) and not with `#N/A` or `#DIV/0!`."""
     text = text.lstrip()
     return bool(mark) and text.startswith(mark) and _ERROR_VALUE.match(text) is None
 
 
 def is_ruler(text: str) -> bool:
-    """True for a line that only draws: `---+---` or `====`."""
+    """Return whether a line is only drawn: `---+---` or `====`."""
     return _DRAWN.search(text) is not None and _RULER.fullmatch(text) is not None
 
 
 def sample_lines(text: Text, stream: bytes) -> list[Line]:
-    """The whole lines of the sample. A quoted name of a header may run over several: they are one."""
+    """Return the complete lines of the sample; lines that a quoted name in the header spans are joined into one."""
     raw = stream.split(text.line_end)
     whole = text.mark + len(stream) < SAMPLE_BYTES and not text.recoded
     if not whole and text.size > SAMPLE_BYTES and len(raw) > 1:
-        raw.pop()  # cut by the sample, not by the file
+        raw.pop()  # incomplete in the sample, not in the file
     lines: list[Line] = []
     number, start = 1, 0
     while number <= len(raw):
@@ -73,18 +73,18 @@ def sample_lines(text: Text, stream: bytes) -> list[Line]:
 
 
 def refuse_long_line(text: Text, stream: bytes) -> None:
-    """Raise RecordingError for a line that fills half of the sample and goes on behind it: no row may be seen."""
+    """Raise RecordingError if a line fills half of the sample and continues after it: the sample may have no row."""
     left = len(stream) - stream.rfind(text.line_end) - 1
     if text.size > SAMPLE_BYTES and 2 * left > SAMPLE_BYTES:
         raise RecordingError(
-            f"{text.path}: line {stream.count(text.line_end) + 1} goes on beyond the {SAMPLE_BYTES >> 10} KB in which "
-            "the head of a table is looked for",
-            "is it a table? one of fewer columns can be read",
+            f"{text.path}: line {stream.count(text.line_end) + 1} continues after the first {SAMPLE_BYTES >> 10} KB, "
+            "which are searched for the head of a table",
+            "is it a table? a table with fewer columns can be read",
         )
 
 
 def comment_mark(lines: list[Line], pinned: str | None) -> str:
-    """The mark that begins comment lines; the first of the usual ones that begins a line."""
+    """Return the mark that starts comments: the pinned one, or the first usual mark that starts a line."""
     if pinned is not None:
         return pinned
     for line in lines:
@@ -95,7 +95,7 @@ def comment_mark(lines: list[Line], pinned: str | None) -> str:
 
 
 def _joined(raw: list[bytes], first: int) -> int:
-    """How many lines an open quote joins, 1 if it is closed or never closed."""
+    """Return the number of lines that a quoted name joins; 1 if the quote is closed in its line, or never closed."""
     if raw[first].count(b'"') % 2 == 0:
         return 1
     for more in range(1, min(_MOST_JOINED, len(raw) - first)):

@@ -1,7 +1,7 @@
-"""Decimal mark and thousands separator, by the evidence of every number of the sample.
+"""Determine decimal mark and thousands separator from all numbers of the sample.
 
-`1,5`, `0,250` and `1234,567` can only have a decimal comma; `1.234,5` and `1,234,567` show both marks or the groups.
-`1,234` alone says nothing, and is refused; so is `1.234` among whole numbers (doubtful_marks.py).
+`1,5`, `0,250` and `1234,567` can only have a decimal comma; `1.234,5` shows both marks, `1,234,567` the groups. `1,234`
+without other evidence is ambiguous and refused, and so is `1.234` among whole numbers (ambiguous_marks.py).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ _GROUPS = re.compile(r"[1-9][0-9]{0,2}(?P<mark>[.,'\u00a0\u202f ])[0-9]{3}(?:(?P
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A cell that is evidence, and its line."""
+class SampleCell:
+    """The text of a cell, and its line."""
 
     text: str
     line: int
@@ -31,27 +31,27 @@ class Seen:
 
 @dataclass(frozen=True)
 class Marks:
-    """The decimal mark, the thousands separator ("" for none), and the number that might be read otherwise.
+    """The decimal mark, the thousands separator ("" for none), and a number that may have another meaning (`doubt`).
 
-    Not `sure`: no number showed a decimal mark, and a point is taken for one.
+    `sure` is False if no number has a decimal mark; then a point is assumed.
     """
 
     decimal: str
     thousands: str = ""
-    doubt: Seen | None = None
+    doubt: SampleCell | None = None
     sure: bool = True
 
 
 class _Evidence:
-    """The first cell for each reading, and those that fit two."""
+    """For each mark the first cell in which it is a decimal mark, a thousands separator, or either of them."""
 
     def __init__(self) -> None:
-        self.decimal: dict[str, Seen] = {}
-        self.thousands: dict[str, Seen] = {}
-        self.either: dict[str, Seen] = {}
+        self.decimal: dict[str, SampleCell] = {}
+        self.thousands: dict[str, SampleCell] = {}
+        self.either: dict[str, SampleCell] = {}
         self.blank_groups = 0
 
-    def take(self, text: str, line: int) -> None:
+    def add(self, text: str, line: int) -> None:
         bare = text.lstrip("+-" + MINUS_SIGN)
         digits = _DIGITS.match(bare)
         body = digits[0] if digits else ""
@@ -59,64 +59,66 @@ class _Evidence:
         marks = [letter for letter in body if not letter.isdigit()]
         if not marks or (rest and rest[0] not in "eE"):
             return
-        seen = Seen(text, line)
+        cell = SampleCell(text, line)
         last = marks[-1]
         if len(set(marks)) > 1:
             whole, _, _ = body.rpartition(last)
             if last in ".," and marks.count(last) == 1 and _GROUPS.fullmatch(whole):
-                self.decimal.setdefault(last, seen)
-                self._grouped(marks[0], seen)
+                self.decimal.setdefault(last, cell)
+                self._grouped(marks[0], cell)
             return
         if not _GROUPS.fullmatch(body):
             if len(marks) == 1 and last in ".,":
-                self.decimal.setdefault(last, seen)
+                self.decimal.setdefault(last, cell)
             return
         if last not in ".," or (len(marks) > 1 and not rest):
-            self._grouped(last, seen)
+            self._grouped(last, cell)
         elif rest:
-            self.decimal.setdefault(last, seen)
+            self.decimal.setdefault(last, cell)
         else:
-            self.either.setdefault(last, seen)
+            self.either.setdefault(last, cell)
 
-    def _grouped(self, mark: str, seen: Seen) -> None:
+    def _grouped(self, mark: str, cell: SampleCell) -> None:
         self.blank_groups += mark == " "
-        self.thousands.setdefault(mark, seen)
+        self.thousands.setdefault(mark, cell)
 
 
 def find_marks(
     path: Path, cells: Iterable[tuple[str, int]], separator: str, decimal: str = "", thousands: str | None = None
 ) -> Marks:
-    """The marks of (cell, line) pairs; `decimal` and `thousands` are pinned ones. Raises RecordingError if two fit."""
+    """Return the marks of (cell, line) pairs; `decimal` and `thousands` are pinned marks.
+
+    Raises RecordingError if the cells can be read in two ways.
+    """
     evidence = _Evidence()
     for text, line in cells:
-        evidence.take(text, line)
-    # One cell with a blank in it may be two cells that ran together.
+        evidence.add(text, line)
+    # A single cell with a blank may be two cells without a separator.
     if evidence.blank_groups < 2 or separator == " ":
         evidence.thousands.pop(" ", None)
-    found = decimal or {",": ".", ".": ","}.get(thousands or "") or _decimal(path, evidence)
+    mark = decimal or {",": ".", ".": ","}.get(thousands or "") or _decimal(path, evidence)
     if thousands is not None:
-        return Marks(found, thousands)
-    other = "." if found == "," else ","
-    # A comma that is between thousands beside decimal points is usual where commas part the cells, in quotes.
-    believed = evidence.either.get(other) if decimal or (separator == "," and found == ".") else None
-    groups = {mark: seen for mark, seen in evidence.thousands.items() if mark != found}
-    if believed and other not in groups:
-        groups[other] = believed
-    doubtful = evidence.either.get(other)
-    if doubtful and other not in groups:
-        sure = evidence.decimal.get(found)
+        return Marks(mark, thousands)
+    other = "." if mark == "," else ","
+    # Numbers in quotes, in a table separated by commas, usually have a comma as thousands separator.
+    assumed = evidence.either.get(other) if decimal or (separator == "," and mark == ".") else None
+    groups = {group: cell for group, cell in evidence.thousands.items() if group != mark}
+    if assumed and other not in groups:
+        groups[other] = assumed
+    ambiguous = evidence.either.get(other)
+    if ambiguous and other not in groups:
+        sure = evidence.decimal.get(mark)
         raise RecordingError(
-            f"{path}: {doubtful} beside {sure}: the '{other}' parts thousands, or is a decimal mark too",
+            f"{path}: {ambiguous} next to {sure}: '{other}' may separate thousands, or be a decimal mark, too",
             "pin decimal and thousands in [csv] of the machine file",
         )
     if len(groups) > 1:
-        shown = " and ".join(str(seen) for seen in groups.values())
-        raise RecordingError(f"{path}: thousands are parted in two ways: {shown}", "pin thousands in [csv]")
-    parted = next(iter(groups), "")
-    alone = evidence.either.get(found)
+        shown = " and ".join(str(cell) for cell in groups.values())
+        raise RecordingError(f"{path}: two thousands separators: {shown}", "pin thousands in [csv]")
+    group_mark = next(iter(groups), "")
     certain = bool(decimal or evidence.decimal or groups)
-    is_doubtful = separator != "," and found == "." and not certain
-    return Marks(found, parted, alone if is_doubtful else None, certain)
+    is_ambiguous = separator != "," and mark == "." and not certain
+    return Marks(mark, group_mark, evidence.either.get(mark) if is_ambiguous else None, certain)
 
 
 def _decimal(path: Path, evidence: _Evidence) -> str:
@@ -124,28 +126,28 @@ def _decimal(path: Path, evidence: _Evidence) -> str:
     if comma and point:
         raise RecordingError(
             f"{path}: {comma} has a decimal comma, {point} a decimal point",
-            "pin decimal in [csv], and repair the lines that hold the other",
+            "pin decimal in [csv], and repair the lines with the other mark",
         )
     if comma or point:
         return "," if comma else "."
     if "," in evidence.thousands and "." in evidence.thousands:
         raise RecordingError(
-            f"{path}: thousands are parted in two ways: {evidence.thousands[',']} and {evidence.thousands['.']}",
+            f"{path}: two thousands separators: {evidence.thousands[',']} and {evidence.thousands['.']}",
             "pin thousands in [csv]",
         )
     if "." in evidence.thousands:
         return ","
     if "," in evidence.thousands:
         return "."
-    doubtful = evidence.either.get(",")
-    if doubtful and "." in evidence.either:
+    ambiguous = evidence.either.get(",")
+    if ambiguous and "." in evidence.either:
         raise RecordingError(
-            f"{path}: {doubtful} and {evidence.either['.']}: which is the decimal mark?", "pin decimal in [csv]"
+            f"{path}: {ambiguous} and {evidence.either['.']}: which is the decimal mark?", "pin decimal in [csv]"
         )
-    if doubtful:
-        text = doubtful.text
+    if ambiguous:
+        text = ambiguous.text
         raise RecordingError(
-            f"{path}: line {doubtful.line}: '{text}' is {text.replace(',', '.')} (decimal comma) or "
+            f"{path}: line {ambiguous.line}: '{text}' may be {text.replace(',', '.')} (decimal comma) or "
             f"{text.replace(',', '')} (thousands)",
             'pin decimal = "," or thousands = "," in [csv] of the machine file',
         )
@@ -153,8 +155,8 @@ def _decimal(path: Path, evidence: _Evidence) -> str:
 
 
 def thousands_byte(mark: str) -> int:
-    """The byte that stands for a thousands separator in the stream; -1 for none.
+    """Return the byte of the thousands separator in the stream; -1 if there is no such separator.
 
-    A blank that does not break is more than one byte, or none of ASCII: it becomes an apostrophe before it is read.
+    A non-breaking space has several bytes, or one that is not ASCII; it is replaced by an apostrophe before reading.
     """
     return -1 if not mark else ord("'") if mark in NARROW_BLANKS else ord(mark)

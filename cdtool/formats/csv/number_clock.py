@@ -1,8 +1,8 @@
-"""A clock of numbers: one in days, as Excel counts them, and one whose stamps have more digits than float64.
+"""Clocks of numbers: days as counted by Excel, and stamps with more digits than float64 can represent.
 
 45231.5417 days since 1899-12-30 are 2023-11-01 13:00. Stamps such as 1700000000123456789 ns or 1700000000.123456789 s
-count from 1970. They are read a second time, as whole nanoseconds, and the first is taken off before
-anything is rounded: float64 holds them to 0.24 us only, their differences exactly.
+count from 1970. They are read a second time, as whole nanoseconds, and the first stamp is subtracted before anything is
+rounded: float64 represents the stamps with a resolution of 0.24 us only, but their differences exactly.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from cdtool.clock.stamps import EPOCH, count_leading_strays
-from cdtool.formats.csv.blank_lines import filled
+from cdtool.formats.csv.blank_lines import fill_blank_lines
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import Integers
@@ -21,27 +21,27 @@ from cdtool.formats.csv.text import Bytes
 from cdtool.plain_text import digits
 from cdtool.recording import BoolArray, FloatArray
 
-# Days since 1899-12-30, as Excel counts them, of 1970; and of the years 2000 to 2100.
+# Days since 1899-12-30, as counted by Excel, of 1970-01-01, and of the start of the years 2000 and 2100.
 _DAY_1970, _FIRST_DAY, _LAST_DAY = 25569.0, 36526.0, 73051.0
 DAY_S = 86400.0
-# A log steps by less than this in days (10 s); and by less than this in seconds it samples above 20 kHz.
+# A clock in days steps by less than 10 s [days]; a clock that steps by less than this in seconds samples above 20 kHz.
 _DAYS_STEP, _SECONDS_STEP = 10.0 / DAY_S, 5e-5
-# A unit's factor to s -> how many decimals it has down to 1 ns.
+# A unit's factor to s -> its decimals down to 1 ns.
 _DECIMALS = {1.0: 9, 1e-3: 6, 1e-6: 3, 1e-9: 0}
-# From here on [s] float64 does not hold nanoseconds; up to here 64 bits do.
+# Above _FIRST [s] float64 cannot represent nanoseconds; up to _LAST [s] 64-bit integers can.
 _FIRST, _LAST = 2.0**53 / NS, 2.0**63 / NS
 # Bytes of the longest stamp: digits, a point, a sign.
 _WIDEST = 24
-# What may stand behind a number: blank, tab, line ends, separators.
+# Bytes that may follow a number: blank, tab, line ends, separators.
 _AFTER_CELL = np.frombuffer(b" \t\r\n,;|", dtype=np.uint8)
 
 
 def two_readings(stamps: FloatArray, factor: float) -> str:
-    """Both readings of a clock that may be in days or in the unit of `factor` [s]; empty where only that one is likely.
+    """Return both readings of a clock that may be in days or in the unit of `factor` [s]; empty if it is not in days.
 
-    `stamps` (n,) are all of the column; those that are missing are passed over. The step is the mean of the middle
-    half: stamps with four decimals repeat, and one at an edge may be wild. A clock above 20 kHz that has run for so
-    long that it looks like a date of 2000 to 2100 cannot be distinguished from one in days.
+    `stamps` (n,) are all stamps of the column; missing ones are ignored. The step is the mean over the middle half:
+    stamps with four decimals repeat, and the first or last stamp may be an outlier. A clock above 20 kHz whose stamps
+    are in the range of the days from 2000 to 2100 cannot be distinguished from a clock in days.
     """
     known = stamps[np.isfinite(stamps)]
     if len(known) < 2 or not _FIRST_DAY < np.median(known) < _LAST_DAY:
@@ -58,17 +58,18 @@ def two_readings(stamps: FloatArray, factor: float) -> str:
 
 
 def since_1970(days: float) -> float:
-    """Seconds since 1970 of a day as Excel counts it."""
+    """Return the seconds since 1970 of a day as counted by Excel."""
     return (days - _DAY_1970) * DAY_S
 
 
 def exact_differences(
     dialect: Dialect, rows: Rows, column: int, stamps: FloatArray, factor: float
 ) -> tuple[FloatArray, float] | None:
-    """Stamps (n,) less the first of them, in the column's own unit, and that one [s]; None where float64 holds them.
+    """Return the stamps (n,) minus the first one, in the column's unit, and the first stamp [s].
 
-    A wild stamp is not the first. `factor` leads to s. A stamp that is written in another way than as plain digits (in
-    quotes, with an exponent) is taken as float64 has it; a missing one is NaN.
+    The result is None if float64 can represent the stamps. `factor` is the factor from the unit to s. Outliers are not
+    used as the first stamp. Stamps that are not plain digits (in quotes, with an exponent) are rounded to float64;
+    missing stamps are NaN.
     """
     known = np.isfinite(stamps)
     decimals = _DECIMALS.get(factor)
@@ -82,11 +83,11 @@ def exact_differences(
     exact = np.zeros(len(stamps), dtype=np.int64)
     exact[known] = whole.astype(np.int64) * scale + np.rint((stamps[known] - whole) * scale).astype(np.int64)
     for first, ticks, read in _cells(dialect, rows, column, decimals):
-        place = slice(first, first + len(ticks))
-        # What is far from the number that stands there was another cell: a separator in quotes came before it.
-        same = read & known[place]
-        same[same] = np.abs(ticks[same] / scale - stamps[place][same]) <= 4.0 * np.spacing(stamps[place][same])
-        exact[place][same] = ticks[same]
+        part = slice(first, first + len(ticks))
+        # A number that differs from the stamp is from another cell: the line has a separator in quotes before it.
+        same = read & known[part]
+        same[same] = np.abs(ticks[same] / scale - stamps[part][same]) <= 4.0 * np.spacing(stamps[part][same])
+        exact[part][same] = ticks[same]
     start = int(exact[known][first_row])
     differences = np.full(len(stamps), np.nan)
     differences[known] = (exact[known] - start) / scale
@@ -98,25 +99,25 @@ def _is_large(seconds: FloatArray, first: int) -> bool:
 
 
 def _cells(dialect: Dialect, rows: Rows, column: int, decimals: int) -> Iterator[tuple[int, Integers, BoolArray]]:
-    """Block by block the number of its first row, its cells in 1 / 10^decimals, and which of them are plain digits."""
+    """Yield per block the number of its first row, the cells in 1 / 10^decimals, and which cells are plain digits."""
     line_end = dialect.text.line_end
     line, row = dialect.first_line, 0
     for block, size in dialect.text.blocks(dialect.offset):
         if dialect.blank_is_missing:
-            block, size, _ = filled(block, size, line_end)
+            block, size, _ = fill_blank_lines(block, size, line_end)
         data = np.frombuffer(block, dtype=np.uint8)
-        ends = np.flatnonzero(data[: size + 1] == line_end[0])  # one behind it stands in for the one that lacks
+        ends = np.flatnonzero(data[: size + 1] == line_end[0])  # the byte after the block replaces a missing line end
         ends = ends[: np.searchsorted(ends, size - 1) + 1]
         starts = np.concatenate(([0], ends[:-1] + 1))
-        kept = ~np.isin(line + np.arange(len(starts)), rows.not_rows)
-        kept[np.cumsum(kept) > rows.count - row] = False
-        begin = _begin(data[:size], starts[kept], dialect.separator, column)
+        is_row = ~np.isin(line + np.arange(len(starts)), rows.not_rows)
+        is_row[np.cumsum(is_row) > rows.count - row] = False
+        begin = _begin(data[:size], starts[is_row], dialect.separator, column)
         yield row, *_ticks(data, begin, ord(dialect.marks.decimal), decimals)
         line, row = line + len(starts), row + len(begin)
 
 
 def _begin(data: Bytes, starts: Integers, separator: str, column: int) -> Integers:
-    """Where the cells of a column begin in the lines that begin at `starts`; one that has none gets the data's end."""
+    """Return the bytes where the cells of a column start in the lines at `starts`; the data's end if one is missing."""
     if separator == " ":
         blank = (data == 32) | (data == 9) | (data == 10) | (data == 13)
         places = np.flatnonzero(~blank & np.concatenate(([True], blank[:-1])))
@@ -130,9 +131,9 @@ def _begin(data: Bytes, starts: Integers, separator: str, column: int) -> Intege
 
 
 def _ticks(data: Bytes, begin: Integers, mark: int, decimals: int) -> tuple[Integers, BoolArray]:
-    """Digits with at most one decimal mark as whole numbers of 1 / 10^decimals; which cells hold nothing else."""
+    """Return the cells as multiples of 1 / 10^decimals, and which are only digits and at most one decimal mark."""
     ticks = np.zeros(len(begin), dtype=np.int64)
-    places = np.full(len(begin), -1)  # digits behind the mark; -1: it has not come
+    places = np.full(len(begin), -1)  # digits after the decimal mark; -1 before the mark
     begun, ended, read = (np.zeros(len(begin), dtype=bool) for _ in range(3))
     last = len(data) - 1
     for i in range(_WIDEST):

@@ -1,7 +1,8 @@
-"""A decimal number in bytes -> the nearest float64, bit for bit what Python's float() gives.
+"""Read a decimal number from bytes as the nearest float64, identical to the result of Python's float().
 
-Up to 2^53 with a power of ten up to 22 one exact product or quotient rounds once (Clinger 1990); beyond that see
-decimal_kernel. What neither decides (subnormal, overflow, more than 19 digits) the caller leaves to float().
+For a mantissa up to 2^53 and a power of ten up to 22, one product or quotient of exact numbers rounds once (Clinger
+1990); for others see decimal_kernel. Numbers that remain undecided (subnormal, overflow, more than 19 digits) are
+passed to float() by the caller.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from cdtool.recording import FloatArray
 Bytes = npt.NDArray[np.uint8]
 Words = npt.NDArray[np.uint64]
 
-# Where a number ends is its second result; instead of it:
+# Results in place of the byte where a number ends:
 NOT_A_NUMBER, UNDECIDED = -1, -2
 BYTES = "Array(uint8, 1, 'C', readonly=True)"
 FLOATS = "Array(float64, 1, 'C', readonly=True)"
@@ -32,13 +33,13 @@ _NAN, _INF, _INITY, _TRUE, _FALSE = (int.from_bytes(word) for word in (b"nan", b
 
 @cache
 def powers() -> tuple[FloatArray, Words]:
-    """10^0 to 10^22, and the powers of five of decimal_kernel."""
+    """Return 10^0 to 10^22, and the powers of five of decimal_kernel."""
     return np.array([float(10**k) for k in range(23)]), powers_of_five()
 
 
 @kernel(f"int64({BYTES}, int64, int64)")
 def letters(data: Bytes, at: int, count: int) -> int:
-    """So many letters (at most 8) as one number, in lower case."""
+    """Return `count` letters (at most 8) as one integer, in lower case."""
     word: Any = 0
     for i in range(at, at + count):
         word = 256 * word + (np.int64(data[i]) | 32)
@@ -47,7 +48,7 @@ def letters(data: Bytes, at: int, count: int) -> int:
 
 @kernel(f"Tuple((float64, int64))({BYTES}, int64)")
 def _word(data: Bytes, at: int) -> tuple[float, int]:
-    """nan, inf, infinity, true (1) and false (0), in any case."""
+    """Read nan, inf, infinity, true (1) or false (0), in upper or lower case; return the value and its end."""
     word = letters(data, at, 3)
     if word == _NAN:
         return math.nan, at + 3
@@ -62,8 +63,8 @@ def _word(data: Bytes, at: int) -> tuple[float, int]:
 
 @kernel(f"Tuple((float64, int64))({BYTES}, int64, int64, {FLOATS})")
 def quick_number(data: Bytes, at: int, decimal: int, tens: FloatArray) -> tuple[float, int]:
-    """A plain number whose value one division gives, and where it ends; UNDECIDED for any other."""
-    p = np.uint64(at)  # unsigned: no index is ever taken from the end
+    """Return a plain number that one division can compute, and where it ends; UNDECIDED for any other number."""
+    p = np.uint64(at)  # unsigned, so that the compiled code does not test for negative indices
     negative = data[p] == 45
     if negative:
         p += _U1
@@ -99,10 +100,10 @@ def quick_number(data: Bytes, at: int, decimal: int, tens: FloatArray) -> tuple[
 def read_number(
     data: Bytes, at: int, decimal: int, thousands: int, tens: FloatArray, fives: Words
 ) -> tuple[float, int]:
-    """The number that starts at `data[at]`, and where it ends (or NOT_A_NUMBER, UNDECIDED).
+    """Return the number that starts at `data[at]`, and where it ends (or NOT_A_NUMBER, UNDECIDED).
 
-    `decimal` and `thousands` are bytes, -1 for none; groups of thousands hold three digits. The bytes must end in 16
-    that are of no number.
+    `decimal` and `thousands` are bytes, -1 for none; groups of thousands have three digits. The last 16 bytes of `data`
+    must not be parts of a number.
     """
     p = at
     negative = data[p] == 45

@@ -1,4 +1,4 @@
-"""`[csv]` of the machine file: the parts of a table's dialect that are said instead of found."""
+"""`[csv]` of the machine file: the parts of a table's dialect that are pinned instead of detected."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TIME_WORDS = ("", "number", "excel")
 
 
 def read_pins(table: Table) -> TablePins:
-    """The pins of `[csv]`; raises ConfigurationError naming the key."""
+    """Return the pins of `[csv]`; raises ConfigurationError naming the key."""
     separator = _one_of(table, "separator", {**_SEPARATORS, **{mark: mark for mark in _SEPARATORS.values()}})
     decimal = _one_of(table, "decimal", {",": ",", ".": ".", "comma": ",", "point": "."})
     thousands = table.text("thousands") if "thousands" in table else None
@@ -24,7 +24,7 @@ def read_pins(table: Table) -> TablePins:
         raise table.fault("thousands", f"is {value_in_words(thousands)}", '",", ".", "\'", a blank, or "" for none')
     if decimal and thousands == decimal:
         raise table.fault(
-            "thousands", f"is {value_in_words(thousands)}, as decimal is", "a number has one decimal mark"
+            "thousands", f"is {value_in_words(thousands)}, the same as decimal", "the two marks must differ"
         )
     pins = TablePins(
         separator=separator,
@@ -39,7 +39,7 @@ def read_pins(table: Table) -> TablePins:
         time_format=_time_format(table),
     )
     if pins.header is False and isinstance(pins.units, int) and pins.units is not False:
-        raise table.fault("units", f"is {pins.units} beside header = false", "a row of units follows a header")
+        raise table.fault("units", f"is {pins.units}, but header is false", "units need a header")
     table.finish()
     return pins
 
@@ -72,7 +72,7 @@ def _encoding(table: Table) -> str:
         narrow = "1,2\n".encode(known) == b"1,2\n"
     except (LookupError, UnicodeError, AssertionError):
         raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252") from None
-    # The numbers are read byte by byte: they have to be ASCII, or of the encodings that are recoded.
+    # Numbers are read byte by byte: their bytes must be ASCII, or the encoding must be one that is recoded to UTF-8.
     known = {"iso8859-1": "latin-1"}.get(known, known)
     if not narrow and known not in UNIT_BYTES:
         raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252")
@@ -83,7 +83,7 @@ def _time_format(table: Table) -> str:
     value = table.text("time_format", "")
     if value in _TIME_WORDS:
         return value
-    problem = check_pattern(value) if "%" in value else "is no layout"
+    problem = check_pattern(value) if "%" in value else "is not a layout"
     if problem:
         raise table.fault(
             "time_format", f"is '{value}': {problem}", "number, excel, or a layout such as %d.%m.%Y %H:%M:%S.%f"

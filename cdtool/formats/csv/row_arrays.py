@@ -1,4 +1,4 @@
-"""The arrays that the rows of a text table are read into."""
+"""The arrays for the rows of a text table."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdtool.recording import FloatArray
 
 @dataclass
 class Rows:
-    """The numbers (k, n) and the stamps (m, n) of the columns asked for; `not_rows` are lines that are none."""
+    """The numbers (k, n) and the stamps (m, n) of the requested columns; `not_rows` are the lines that are not rows."""
 
     numbers: FloatArray
     stamps: Integers
@@ -21,6 +21,6 @@ class Rows:
     not_rows: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def line(self, row: int) -> int:
-        """The file's line (from 1) of a row (from 0)."""
+        """Return the file's line (from 1) of a row (from 0)."""
         before = self.not_rows - np.arange(len(self.not_rows))
         return self.first_line + row + int(np.searchsorted(before, self.first_line + row, side="right"))

@@ -1,7 +1,7 @@
-"""Lines of a text table -> numbers: one pass over a block of whole lines, the wanted columns only.
+"""Read lines of a text table as numbers: one pass over a block of complete lines, for the requested columns only.
 
-Every line is looked at, every cell counted. A line that is not plain (another width, a word where a number belongs, a
-comment, a stray quote) gets a row of its own too and is listed; what it is, is decided outside.
+The cells of every line are counted. An irregular line (of another width, with a word in a column of numbers, a comment,
+a stray quote) also gets a row and is listed; the caller decides how to read it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 
 Integers = npt.NDArray[np.int64]
-# What a column of the file is for: k >= 0, a row of the numbers; else one of these, or STAMP - k, a row of the stamps.
+# Destination of a file's column: k >= 0 for row k of the numbers, STAMP - k for row k of the stamps, or one of these.
 LEFT, EMPTY, STAMP = -1, -2, -3
 MISSING_STAMP = np.int64(-(2**63))
 BLANK_SEPARATOR = 32
@@ -26,7 +26,7 @@ BLANK_SEPARATOR = 32
 
 @kernel(f"int64({BYTES}, int64)")
 def count_lines(data: Bytes, line_end: int) -> int:
-    """How many line ends there are."""
+    """Return the number of line ends."""
     count = 0
     for i in range(len(data)):
         count += data[i] == line_end
@@ -35,7 +35,7 @@ def count_lines(data: Bytes, line_end: int) -> int:
 
 @kernel(f"int64({BYTES}, int64, b1)")
 def _past_blanks(data: Bytes, at: int, tabs: bool) -> int:
-    """The first byte from `at` on that is no blank, nor a tab if `tabs` count as such."""
+    """Return the first position from `at` that is not a blank, nor a tab if `tabs` is True."""
     p = at
     while data[p] == 32 or (tabs and data[p] == 9):
         p += 1
@@ -56,24 +56,25 @@ def read_rows(
     stamps: Integers,
     row: int,
     blank: Integers,
-    odd: Integers,
+    irregular: Integers,
     counts: Integers,
     tens: FloatArray,
     fives: Words,
 ) -> None:
-    """Read the lines of `data[:stop]`, the last byte of which ends a line, into the rows from `row` on.
+    """Read the lines of `data[:stop]`, whose last byte is a line end, into the arrays, starting at row `row`.
 
     `marks`: line end, separator, decimal, thousands, quote, comment, each a byte or -1; a blank as separator stands for
-    any run of blanks. `targets`: see above, one a column. `blank` takes the lines (from 0) that hold nothing, `odd` one
-    of (line, row, first byte, last byte) for each line that is not plain. `counts` takes rows, lines, blank, odd ones.
+    any run of blanks. `targets`: the destination of each column, see above. Outputs: `blank` are the blank lines (from
+    0), `irregular` has (line, row, first byte, last byte) of each irregular line, and `counts` are the numbers of rows,
+    lines, blank lines and irregular lines.
     """
     line_end, separator, decimal, thousands = marks[0], marks[1], marks[2], marks[3]
     quote, comment = marks[4], marks[5]
-    other_end = 23 - line_end  # of \n and \r the one that ends no line
+    other_end = 23 - line_end  # the one of \n and \r that is not the line end
     width = len(targets)
     tabs = separator != 9
     by_blanks = separator == BLANK_SEPARATOR
-    # Outside quotes a separator is one, whatever else it may stand for.
+    # Outside quotes a separator is never a decimal or thousands mark.
     bare_decimal = -1 if decimal == separator else decimal
     bare_thousands = -1 if thousands == separator else thousands
     quick = not by_blanks and thousands < 0
@@ -81,7 +82,7 @@ def read_rows(
     p = 0
     line = 0
     blanks = 0
-    odds = 0
+    irregulars = 0
     first_row = row
     while p < stop:
         begin = p
@@ -98,7 +99,7 @@ def read_rows(
         column = 0
         while plain:
             target = targets[column]
-            if quick and target >= 0:  # nearly every cell: a plain number up to the separator
+            if quick and target >= 0:  # the usual case: a plain number followed by the separator
                 value, end = quick_number(data, p, bare_decimal, tens)
                 if end >= 0 and data[end] == (separator if column < last else line_end):
                     numbers[target, row] = value
@@ -167,15 +168,15 @@ def read_rows(
         if not plain or column != width:
             while data[p] != line_end:
                 p += 1
-            odd[odds, 0] = line
-            odd[odds, 1] = row
-            odd[odds, 2] = begin
-            odd[odds, 3] = p
-            odds += 1
+            irregular[irregulars, 0] = line
+            irregular[irregulars, 1] = row
+            irregular[irregulars, 2] = begin
+            irregular[irregulars, 3] = p
+            irregulars += 1
         row += 1
         line += 1
         p += 1
     counts[0] = row - first_row
     counts[1] = line
     counts[2] = blanks
-    counts[3] = odds
+    counts[3] = irregulars

@@ -1,7 +1,7 @@
-"""The rows of a text table, all or block by block: read with a compiled loop, every line accounted for.
+"""Read the rows of a text table, all at once or block by block, with a compiled loop.
 
-A plain line is read by the loop. Every other one comes here: it is a row written in an unusual way, a line that is
-skipped and named (comment, blank line, the header again, NUL bytes, the half-written end), or an error with its line.
+The loop reads regular lines. Any other line is a row with unusual notation, a line that is skipped and reported
+(comment, blank line, repeated header, NUL bytes, incomplete last line), or an error with its line number.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.cores import usable_cores
-from cdtool.formats.csv.blank_lines import filled
+from cdtool.formats.csv.blank_lines import fill_blank_lines
 from cdtool.formats.csv.cells import NARROW_BLANKS
 from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.irregular_lines import IrregularLine, IrregularLines
 from cdtool.formats.csv.marks import thousands_byte
 from cdtool.formats.csv.number_kernel import powers
-from cdtool.formats.csv.odd_lines import OddLine, OddLines
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, STAMP, Integers, count_lines, read_rows
 from cdtool.formats.csv.stamp_kernel import STEPS
@@ -32,22 +32,22 @@ _THREADS = 4
 
 @dataclass(frozen=True)
 class _Block:
-    """What one block gave: `rows` rows of `room` from `first` on, its lines, and those that are not plain.
+    """The result of one block: `rows` rows of `arrays` from row `first`, the number of lines, and irregular lines.
 
-    `empty` are blank lines that are rows.
+    `blank` are the blank lines; `empty` are blank lines that are rows.
     """
 
-    room: Rows
+    arrays: Rows
     first: int
     rows: int
     lines: int
     blank: Integers
     empty: Integers
-    odd: list[OddLine]
+    irregular: list[IrregularLine]
 
 
 class RowReader:
-    """Reads the rows of one file. `numeric` and `stamped` are the columns wanted, by their number, in order."""
+    """Reads the rows of one file. `numeric` and `stamped` are the requested columns, by number, in order."""
 
     def __init__(self, path: Path, dialect: Dialect, numeric: Sequence[int], stamped: Sequence[int]) -> None:
         self.path = path
@@ -63,50 +63,50 @@ class RowReader:
         self.shape = (len(numeric), len(stamped))
         self.ended = True
 
-    def read(self, odd: OddLines) -> Rows:
-        """Return the rows of all pieces side by side, which threads write where they stay; raises RecordingError."""
-        whole = self.room(self.dialect.text.count_lines(self.dialect.offset, count_lines))
-        parts = list(self.pieces(odd, whole))
+    def read(self, irregular: IrregularLines) -> Rows:
+        """Return all rows in one pair of arrays, into which several threads write; raises RecordingError."""
+        whole = self.allocate(self.dialect.text.count_lines(self.dialect.offset, count_lines))
+        parts = list(self.pieces(irregular, whole))
         count = sum(part.count for part in parts)
         not_rows = np.concatenate([whole.not_rows, *(part.not_rows for part in parts)])
         return Rows(whole.numbers[:, :count], whole.stamps[:, :count], count, whole.first_line, not_rows)
 
-    def pieces(self, odd: OddLines, whole: Rows | None = None) -> Iterator[Rows]:
-        """Yield the rows block by block, in memory of their own or one behind the other in `whole`.
+    def pieces(self, irregular: IrregularLines, whole: Rows | None = None) -> Iterator[Rows]:
+        """Yield the rows block by block, in arrays of their own or consecutively in `whole`.
 
-        Lines that are not plain go to `odd`. Raises RecordingError with the line of the first bad one.
+        Irregular lines are passed to `irregular`. Raises RecordingError with the first line that cannot be read.
         """
         line, end = self.dialect.first_line, 0
-        for block in self._ahead(whole):
-            for item in block.odd:
-                odd.take(item, line, block.room)
-            odd.blank += (block.blank + line).tolist()
-            odd.empty += (block.empty + line).tolist()
-            dropped = odd.end_block(range(block.first, block.first + block.rows))
+        for block in self._read_ahead(whole):
+            for each in block.irregular:
+                irregular.read(each, line, block.arrays)
+            irregular.blank += (block.blank + line).tolist()
+            irregular.empty += (block.empty + line).tolist()
+            dropped = irregular.end_block(range(block.first, block.first + block.rows))
             not_rows = np.sort(np.concatenate([block.blank + line, np.array([*dropped.values()], dtype=np.int64)]))
             begin = 0 if whole is None else end
-            end = _close_up(block, sorted(dropped), begin)
-            numbers, stamps = block.room.numbers[:, begin:end], block.room.stamps[:, begin:end]
+            end = _compact(block, sorted(dropped), begin)
+            numbers, stamps = block.arrays.numbers[:, begin:end], block.arrays.stamps[:, begin:end]
             yield Rows(numbers, stamps, end - begin, line, not_rows)
             line += block.lines
 
-    def room(self, count: int) -> Rows:
-        """Return memory for so many rows."""
+    def allocate(self, count: int) -> Rows:
+        """Return uninitialised arrays for `count` rows."""
         numbers, stamps = np.empty((self.shape[0], count)), np.empty((self.shape[1], count), dtype=np.int64)
         return Rows(numbers, stamps, 0, self.dialect.first_line)
 
-    def _raw(self, whole: Rows | None) -> Iterator[tuple[bytearray, int, int, int, Rows]]:
-        """Blocks, the bytes that belong to their lines, and where in which memory how many rows may be theirs."""
+    def _raw_blocks(self, whole: Rows | None) -> Iterator[tuple[bytearray, int, int, int, Rows]]:
+        """Yield per block the bytes, the size of its lines, the first row, the number of rows, and their arrays."""
         end, first = self.dialect.text.line_end[0], 0
         for block, size in self.dialect.text.blocks(self.dialect.offset):
             count = int(count_lines(np.frombuffer(block, dtype=np.uint8, count=size), end)) + (block[size - 1] != end)
-            yield block, size, first, count, self.room(count) if whole is None else whole
+            yield block, size, first, count, self.allocate(count) if whole is None else whole
             first += 0 if whole is None else count
 
-    def _ahead(self, whole: Rows | None) -> Iterator[_Block]:
-        """Blocks in the file's order, read ahead by threads (the loop runs without the interpreter lock)."""
+    def _read_ahead(self, whole: Rows | None) -> Iterator[_Block]:
+        """Yield blocks in the file's order, read ahead by threads (the loop runs without the interpreter lock)."""
         workers = min(_THREADS, usable_cores())
-        blocks = self._raw(whole)
+        blocks = self._raw_blocks(whole)
         begin = list(islice(blocks, 2))
         if len(begin) < 2 or workers == 1:
             yield from starmap(self._block, chain(begin, blocks))
@@ -124,11 +124,11 @@ class RowReader:
             finally:
                 pool.shutdown(cancel_futures=True)
 
-    def _block(self, block: bytearray, size: int, first: int, count: int, room: Rows) -> _Block:
+    def _block(self, block: bytearray, size: int, first: int, count: int, arrays: Rows) -> _Block:
         end = self.dialect.text.line_end
         unfinished = block[size - 1] not in b"\r\n"
         self.ended = self.ended and not unfinished
-        if block[size - 1 : size] != end:  # the line ends behind the block stand in for the one that lacks
+        if block[size - 1 : size] != end:  # the line ends after the block replace the missing one
             size += 1
         if self.dialect.marks.thousands in NARROW_BLANKS:
             encoding = "utf-8" if self.dialect.text.recoded else self.dialect.text.encoding
@@ -136,10 +136,10 @@ class RowReader:
             block, size = lines + end * AFTER, len(lines)
         empty = np.empty(0, dtype=np.int64)
         if self.dialect.blank_is_missing:
-            block, size, empty = filled(block, size, end)
+            block, size, empty = fill_blank_lines(block, size, end)
         data = np.frombuffer(block, dtype=np.uint8)
         blank = np.empty(count, dtype=np.int64)
-        odd = np.empty((count, 4), dtype=np.int64)
+        irregular = np.empty((count, 4), dtype=np.int64)
         counts = np.zeros(4, dtype=np.int64)
         read_rows(
             data,
@@ -147,20 +147,20 @@ class RowReader:
             self._marks(),
             self.targets,
             self.programs,
-            room.numbers,
-            room.stamps,
+            arrays.numbers,
+            arrays.stamps,
             first,
             blank,
-            odd,
+            irregular,
             counts,
             *powers(),
         )
         final = count - 1 if unfinished else -1
         listed = [
-            OddLine(line, row, bytes(block[begin:stop]), line == final)
-            for line, row, begin, stop in odd[: counts[3]].tolist()
+            IrregularLine(line, row, bytes(block[begin:stop]), line == final)
+            for line, row, begin, stop in irregular[: counts[3]].tolist()
         ]
-        return _Block(room, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed)
+        return _Block(arrays, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed)
 
     def _marks(self) -> Integers:
         dialect = self.dialect
@@ -178,12 +178,12 @@ class RowReader:
         )
 
 
-def _close_up(block: _Block, dropped: Sequence[int], to: int) -> int:
-    """Move a block's rows together from row `to` on, without those that are dropped; return where they end."""
+def _compact(block: _Block, dropped: Sequence[int], to: int) -> int:
+    """Move a block's rows, without the dropped ones, to consecutive rows from row `to`; return their end."""
     start = block.first
     for stop in (*dropped, block.first + block.rows):
         if to != start and stop > start:
-            for table in (block.room.numbers, block.room.stamps):
+            for table in (block.arrays.numbers, block.arrays.stamps):
                 table[:, to : to + stop - start] = table[:, start:stop]
         to += stop - start
         start = stop + 1

@@ -1,7 +1,7 @@
-"""Tables of several clocks side by side, as scopes and LabVIEW write them: time1, force, time2, torque.
+"""Tables with several clocks, as oscilloscopes and LabVIEW write them: time1, force, time2, torque.
 
-A clock is the one of the columns behind it, up to the next; where the table begins with another column and ends with a
-clock, of those before it. Clocks that stand side by side are of the same rows (a date, an epoch, the time since then).
+A clock belongs to the columns after it, up to the next clock; if the table starts with another column and ends with a
+clock, it belongs to the columns before it. Adjacent clocks belong to the same rows (a date, an epoch, an elapsed time).
 """
 
 from __future__ import annotations
@@ -25,98 +25,99 @@ from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-z]|$)", re.IGNORECASE)
-# What lies between two units of time: of clocks whose steps differ by another factor the rates differ.
+# Ratios of two units of time: clocks whose steps have another ratio differ in their rates.
 _FACTORS = tuple(10.0**power for power in (-9, -6, -3, 0, 3, 6, 9)) + tuple(
     factor**sign for factor in (60.0, 3600.0, 86400.0) for sign in (-1, 1)
 )
 _SAME_FACTOR = 0.01
-# A clock goes forward at this share of its steps at least.
+# At least this share of a clock's steps is forward.
 _FORWARD = 0.95
 OWN = 'time = { column = "time", unit = "s" }'
-HINT = f"write {OWN}, and each channel gets the clock beside it, in the unit of its header ('time2 [ms]')"
+HINT = f"write {OWN}: each channel then has the clock beside it, in the unit of its header ('time2 [ms]')"
 
 
 @dataclass(frozen=True)
 class Clocks:
-    """The clocks of a table by their numbers, in groups side by side; `of` maps any other column to its group."""
+    """The clocks of a table by number, in groups of adjacent columns; `of` maps any other column to its group."""
 
     groups: tuple[tuple[int, ...], ...]
     of: Mapping[int, int]
 
     @classmethod
-    def by_names(cls, dialect: Dialect, said: str | None = None) -> Clocks:
-        """Columns of numbers that are called as clocks are, and the one that is said to be it; no dates beside that."""
+    def by_names(cls, dialect: Dialect, stated: str | None = None) -> Clocks:
+        """Return the clocks: columns of numbers with a clock's name, and the column `stated` by the machine file."""
         names, count = dialect.names, len(dialect.names)
         numbers = [i for i in range(count) if dialect.kinds[i] == "N" and _NAMES.match(names[i])]
-        found = sorted({*numbers, *(i for i in range(count) if names[i] == said)})
-        starts = [i for i in found if i - 1 not in found]
-        groups = [tuple(i for i in found if start <= i < end) for start, end in pairwise([*starts, count])]
-        behind = bool(found) and found[0] > 0 and found[-1] == count - 1
+        clock_columns = sorted({*numbers, *(i for i in range(count) if names[i] == stated)})
+        starts = [i for i in clock_columns if i - 1 not in clock_columns]
+        groups = [tuple(i for i in clock_columns if start <= i < end) for start, end in pairwise([*starts, count])]
+        is_after_columns = bool(clock_columns) and clock_columns[0] > 0 and clock_columns[-1] == count - 1
         of = {}
         for column in range(count):
             before = [k for k, group in enumerate(groups) if group[0] < column]
             after = [k for k, group in enumerate(groups) if group[0] > column]
-            nearest = after[:1] if behind else before[-1:]
-            if column not in found and nearest:
+            nearest = after[:1] if is_after_columns else before[-1:]
+            if column not in clock_columns and nearest:
                 of[column] = nearest[0]
         return cls(tuple(groups), of)
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """All of them."""
+        """Return the numbers of all clocks."""
         return tuple(column for group in self.groups for column in group)
 
     def group(self, column: int) -> int | None:
-        """That of a clock or of any other column; None where no clock is beside it."""
+        """Return the group of a clock or of any other column; None if no clock is adjacent to the column."""
         return next((k for k, group in enumerate(self.groups) if column in group), self.of.get(column))
 
 
-def other_clock(
+def describe_other_clock(
     dialect: Dialect, clocks: Clocks, clock: str, keys: Sequence[str], values: Mapping[str, FloatArray]
 ) -> str:
-    """The first wanted column beside another clock than the one that is said to be its, and in what they differ.
+    """Return the first requested column with another clock than the stated one, and the difference of the clocks.
 
-    Empty where there is none. `clock` is the column that the machine file names, `keys` are all that it asks for,
-    `values` theirs and the clocks'.
+    The result is empty if there is no such column. `clock` is the column that the machine file states as the clock,
+    `keys` are the columns that it requests, and `values` are the values of these columns and of all clocks.
     """
     names = dialect.names
-    said = clocks.group(names.index(clock))
+    stated = clocks.group(names.index(clock))
     for key in keys:
         group = clocks.group(names.index(key))
-        if group is None or said is None or group == said or key == clock:
+        if group is None or stated is None or group == stated or key == clock:
             continue
         other = names[clocks.groups[group][0]]
-        apart = _apart(dialect, values, clock, other)
-        if apart:
-            return f"column '{key}' stands beside the clock '{other}', the machine file says '{clock}': {apart}"
+        difference = _difference(dialect, values, clock, other)
+        if difference:
+            return f"column '{key}' is beside the clock '{other}', but the machine file names '{clock}': {difference}"
     return ""
 
 
 def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]) -> list[Finding]:
-    """A warning on each clock whose times are not those of the first one in the same rows."""
-    names, found = dialect.names, []
+    """Return a warning on each clock whose times differ from those of the first clock in the same rows."""
+    names, findings = dialect.names, []
     for k, group in enumerate(clocks.groups[1:], 1):
-        columns = [names[column] for column, its in clocks.of.items() if its == k]
+        columns = [names[column] for column, nearest in clocks.of.items() if nearest == k]
         first, other = names[clocks.groups[0][0]], names[group[0]]
-        apart = _apart(dialect, values, first, other) if columns and {first, other} <= values.keys() else None
-        if apart:
-            found.append(Finding(OtherClock(first, apart, tuple(columns)), other))
-    return found
+        is_read = {first, other} <= values.keys()
+        difference = _difference(dialect, values, first, other) if columns and is_read else None
+        if difference:
+            findings.append(Finding(OtherClock(first, difference, tuple(columns)), other))
+    return findings
 
 
-def own_clocks(
+def columns_by_own_clock(
     path: Path, dialect: Dialect, clocks: Clocks, keys: Sequence[str], values: Mapping[str, FloatArray]
 ) -> tuple[dict[str, Column], float, list[Finding]]:
-    """The wanted columns, each with its times [s] by the clock beside it; what was taken off them [s]; what is told.
+    """Return the requested columns with the times [s] of their adjacent clocks, their origin [s], and findings.
 
-    A clock without a unit in the header is in s. A shorter one ends in empty cells: rows without a time are none of its
-    columns'. Raises RecordingError where no clock is beside a column.
+    A clock without a unit in the header is in s. A shorter clock ends with empty cells: rows without a time are left
+    out of its columns. Raises RecordingError if no clock is adjacent to a column.
     """
     times: dict[int, FloatArray] = {}
     for key in keys:
         group = clocks.group(dialect.names.index(key))
         if group is None:
-            raise RecordingError(f"{path}: no clock stands before column '{key}'", "name its clock in [channels] time")
+            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
         name = dialect.names[clocks.groups[group][0]]
         times.setdefault(group, values[name] * _factor(dialect, name, 1.0))
     starts = [float(time[np.isfinite(time)][0]) for time in times.values() if np.isfinite(time).any()]
@@ -126,15 +127,15 @@ def own_clocks(
     for key in keys:
         time = times[clocks.group(dialect.names.index(key)) or 0]
         timed = np.isfinite(time)
-        columns[key] = Column(key, values[key][timed], time[timed] - origin, told_unit(dialect, key))
+        columns[key] = Column(key, values[key][timed], time[timed] - origin, unit_from_header(dialect, key))
         lost = int(np.count_nonzero(np.isfinite(values[key][~timed])))
         if lost:
             findings.append(Finding(ValuesWithoutTime(lost), key, "loss"))
     return columns, origin, findings
 
 
-def told_unit(dialect: Dialect, name: str) -> str | None:
-    """What the header, or the row of units below it, says of a column."""
+def unit_from_header(dialect: Dialect, name: str) -> str | None:
+    """Return the unit of a column in the header, or in the row of units below it; None if there is no unit."""
     column = dialect.names.index(name)
     text = dialect.units[column].strip() if column < len(dialect.units) else ""
     if text[:1] + text[-1:] in ("[]", "()"):
@@ -143,25 +144,26 @@ def told_unit(dialect: Dialect, name: str) -> str | None:
 
 
 def _factor(dialect: Dialect, name: str, default: float) -> float:
-    """What leads from a clock's unit to s, as its header says; else the default."""
-    unit = find_unit(told_unit(dialect, name) or "?")
+    """Return the factor from the unit in a clock's header to s; the default if there is no unit of time."""
+    unit = find_unit(unit_from_header(dialect, name) or "?")
     return unit.factor if unit is not None and unit.si == "s" else default
 
 
-def _apart(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> ClockDifference | None:
-    """In what two clocks differ in the same rows; None where they are one clock in two units or from two starts."""
+def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> ClockDifference | None:
+    """Return how two clocks differ in the same rows; None if they differ only in unit or start."""
     a, b = values[first], values[other]
     both = np.isfinite(a) & np.isfinite(b)
     a, b = a[both], b[both]
     if len(a) < 3:
         return None
-    if min(np.mean(np.diff(a) > 0.0), np.mean(np.diff(b) > 0.0)) < _FORWARD:  # a name alone makes no clock
+    # A column that does not run forward is not a clock, whatever its name.
+    if min(np.mean(np.diff(a) > 0.0), np.mean(np.diff(b) > 0.0)) < _FORWARD:
         return None
     step, other_step = float(np.median(np.diff(a))), float(np.median(np.diff(b)))
     ratio = other_step / step
-    told = _factor(dialect, first, np.nan) / _factor(dialect, other, np.nan)
-    alike = re.sub(r"\W*[0-9]+$", "", first) == re.sub(r"\W*[0-9]+$", "", other)
-    factors = (told,) if np.isfinite(told) else (1.0,) if alike else _FACTORS
+    stated = _factor(dialect, first, np.nan) / _factor(dialect, other, np.nan)
+    same_name = re.sub(r"\W*[0-9]+$", "", first) == re.sub(r"\W*[0-9]+$", "", other)
+    factors = (stated,) if np.isfinite(stated) else (1.0,) if same_name else _FACTORS
     scale = min(factors, key=lambda factor: abs(np.log(ratio / factor)))
     if abs(ratio / scale - 1.0) > _SAME_FACTOR:
         return ClockDifference("steps", step, other_step)

@@ -1,4 +1,4 @@
-"""A date, a time of day or both in bytes -> nanoseconds, by a program of fields and letters (see stamps.py)."""
+"""Read a date, a time of day or both from bytes as nanoseconds, by a program of fields and letters (see stamps.py)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cdtool.kernels import kernel
 Programs = npt.NDArray[np.int64]
 PROGRAMS = "Array(int64, 2, 'C', readonly=True)"
 PROGRAM = "Array(int64, 1, 'C', readonly=True)"
-# Steps of a program: a letter (above 0) that has to stand there, the end (0), or a field.
+# Steps of a program: a letter (above 0) that must follow, the end (0), or a field (below 0).
 YEAR, SHORT_YEAR, MONTH, DAY, HOUR, MINUTE, SECOND = -1, -2, -3, -4, -5, -6, -7
 POINT_FRACTION, FRACTION, ZONE, MONTH_NAME, HALF_DAY, DATE_GAP = -8, -9, -10, -11, -12, -13
 STEPS = 32
@@ -27,7 +27,7 @@ _MONTH_DAYS = (31, 29, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 @kernel(f"UniTuple(int64, 2)({BYTES}, int64, int64, int64)")
 def _digits(data: Bytes, at: int, fewest: int, most: int) -> tuple[int, int]:
-    """A number of so many digits and its end, or -1."""
+    """Return a number of `fewest` to `most` digits and its end, or -1."""
     value: Any = 0
     p = at
     while p - at < most and 48 <= data[p] <= 57:
@@ -38,7 +38,7 @@ def _digits(data: Bytes, at: int, fewest: int, most: int) -> tuple[int, int]:
 
 @kernel(f"UniTuple(int64, 2)({BYTES}, int64)")
 def _fraction(data: Bytes, at: int) -> tuple[int, int]:
-    """Digits of a second as nanoseconds (further ones are dropped) and their end, or -1."""
+    """Return a fraction of a second as nanoseconds (more digits are dropped) and its end, or -1."""
     value: Any = 0
     p = at
     while 48 <= data[p] <= 57:
@@ -52,7 +52,7 @@ def _fraction(data: Bytes, at: int) -> tuple[int, int]:
 
 @kernel(f"UniTuple(int64, 2)({BYTES}, int64)")
 def _zone(data: Bytes, at: int) -> tuple[int, int]:
-    """Seconds east of Greenwich (Z, +hh, +hhmm, +hh:mm) and the end, or -1."""
+    """Return the offset [s] east of UTC (Z, +hh, +hhmm, +hh:mm) and its end, or -1."""
     p = at
     if data[p] == 32:
         p += 1
@@ -75,7 +75,7 @@ def _zone(data: Bytes, at: int) -> tuple[int, int]:
 
 @kernel("int64(int64, int64, int64)")
 def _days(year: int, month: int, day: int) -> int:
-    """Days from 1970-01-01 in the Gregorian calendar (years counted from March)."""
+    """Return the days since 1970-01-01 in the Gregorian calendar (years start in March)."""
     shifted = year - (month <= 2)
     era = shifted // 400
     of_era = shifted - 400 * era
@@ -85,7 +85,7 @@ def _days(year: int, month: int, day: int) -> int:
 
 @kernel(f"UniTuple(int64, 2)({BYTES}, int64, {PROGRAM})", entry=True)
 def read_stamp(data: Bytes, at: int, program: npt.NDArray[np.int64]) -> tuple[int, int]:
-    """Nanoseconds since 1970-01-01 (of a time of day: since midnight) and the end, or NOT_A_NUMBER."""
+    """Return the nanoseconds since 1970-01-01 (for a time of day since midnight) and the end, or NOT_A_NUMBER."""
     year, month, day, hour, minute, second, nano, east, half = 1970, 1, 1, 0, 0, 0, 0, 0, -1
     p = at
     for step in program:
@@ -144,6 +144,6 @@ def read_stamp(data: Bytes, at: int, program: npt.NDArray[np.int64]) -> tuple[in
             return 0, NOT_A_NUMBER
         hour = hour % 12 + half
     if year < 1680 or year > 2260:
-        return 0, NOT_A_NUMBER  # beyond what nanoseconds in 64 bits can hold
+        return 0, NOT_A_NUMBER  # out of the range of nanoseconds in 64 bits
     seconds = _days(year, month, day) * 86400 + hour * 3600 + minute * 60 + second - east
     return seconds * _NS + nano, p

@@ -1,9 +1,9 @@
-"""Columns of dates and times of day: which way they are written, by all their cells in the sample.
+"""Columns of dates and times of day: detect their layout from all cells in the sample.
 
 A layout is written as for `strptime`: `%d.%m.%Y %H:%M:%S.%f`, with `%f` for any number of digits and `%z` for a zone.
-`03.04.2025` is the third of April, as it is wherever points are used; `03/04/2025` and `03-04-2025` may be the fourth
-of March: unless a day above 12 decides, they are refused. So are `00:05`, five minutes or five seconds, and `:9`, `:10`
-behind the seconds, parts of a second or milliseconds.
+`03.04.2025` is the third of April, because dates with points start with the day; `03/04/2025` and `03-04-2025` may be
+the fourth of March and are refused unless a day above 12 decides. Also refused are `00:05`, which may be five minutes
+or five seconds, and `:9`, `:10` after the seconds, which may be parts of a second or milliseconds.
 """
 
 from __future__ import annotations
@@ -48,23 +48,23 @@ _MINUTE, _HOUR, _HALF_DAY, _DAY = 60 * NS, 3600 * NS, 43200 * NS, 86400 * NS
 
 @dataclass(frozen=True)
 class Layout:
-    """One way to write a stamp; `dated` if it has a day, `timed` if it has an hour."""
+    """A layout of time stamps; `dated` if it has a day, `timed` if it has an hour."""
 
     pattern: str
 
     @property
     def dated(self) -> bool:
-        """True if the stamps name a day."""
+        """Return whether the stamps have a day."""
         return "%d" in self.pattern
 
     @property
     def timed(self) -> bool:
-        """True if the stamps name a time of day."""
+        """Return whether the stamps have a time of day."""
         return "%H" in self.pattern or "%I" in self.pattern
 
     @property
     def wraps(self) -> tuple[int, str]:
-        """After how many ns stamps without a day start again, and what they pass there."""
+        """Return the period [ns] after which stamps without a day start again, and the name of that moment."""
         if "%H" in self.pattern or ("%I" in self.pattern and "%p" in self.pattern):
             return _DAY, "midnight"
         if "%I" in self.pattern:
@@ -73,11 +73,11 @@ class Layout:
 
     @property
     def program(self) -> list[int]:
-        """The steps that the kernel takes, ended by 0; raises ValueError for a pattern it cannot follow."""
+        """Return the steps of the kernel's program, ended by 0; raises ValueError if the pattern is not supported."""
         return _program(self.pattern)
 
     def read(self, text: str) -> int | None:
-        """Nanoseconds since 1970 (of a time of day: since midnight), or None if the text is written another way."""
+        """Return the nanoseconds since 1970 (for a time of day since midnight); None if the layout does not match."""
         raw = text.strip(" \t\r").encode("utf-8", errors="replace")
         data = np.frombuffer(raw + bytes(16), dtype=np.uint8)
         value, end = steps.read_stamp(data, 0, _compiled(self.pattern))
@@ -98,7 +98,7 @@ def _program(pattern: str) -> list[int]:
         elif part in _FIELDS:
             program.append(_FIELDS[part])
         elif (part.startswith("%") and part != "%%") or (len(part.encode()) > 1 and part.strip()):
-            raise ValueError(f"'{part}' is not known")
+            raise ValueError(f"'{part}' is not supported")
         elif part == "T" or not part.strip():
             program.append(steps.DATE_GAP)
         else:
@@ -109,21 +109,21 @@ def _program(pattern: str) -> list[int]:
 
 
 def check_pattern(pattern: str) -> str:
-    """What is wrong with a pinned layout; empty if nothing is."""
+    """Return the problem of a pinned layout; empty if it has none."""
     try:
         _program(pattern)
     except ValueError as fault:
         return str(fault)
     fields = re.findall(r"%.", pattern)
     missing = [name for name in ("%m", "%d") if "%b" not in fields and name not in fields] if "%Y" in fields else []
-    return f"{missing[0]} is missing" if missing else "" if fields else "names no field"
+    return f"{missing[0]} is missing" if missing else "" if fields else "has no field"
 
 
 @dataclass(frozen=True)
-class Stamped:
-    """The layouts that the cells of a column fit: none (words), one, or two that mean different times.
+class StampLayouts:
+    """The layouts that match the cells of a column: none (words), one, or two that mean different times.
 
-    `doubt` says why the digits of a second may be read in two ways ("": they may not).
+    `doubt` is the reason why the fraction of a second can be read in two ways; empty if it is unambiguous.
     """
 
     layouts: tuple[Layout, ...]
@@ -132,68 +132,69 @@ class Stamped:
 
     @property
     def layout(self) -> Layout | None:
-        """The layout, if it is certain."""
+        """Return the layout if it is unambiguous, otherwise None."""
         return self.layouts[0] if len(self.layouts) == 1 and not self.doubt else None
 
     @property
     def readings(self) -> str:
-        """The two readings, for a message."""
+        """Return the two readings as part of a message."""
         if self.doubt:
             return self.doubt
         times = [np.datetime64((layout.read(self.example) or 0) // NS, "s") for layout in self.layouts]
         days = [time.astype("datetime64[D]") for time in times]
-        shown = days if len(set(days)) > 1 else [str(time)[-8:] for time in times]
-        read = [f"{text} ({layout.pattern})" for text, layout in zip(shown, self.layouts, strict=True)]
-        return f"'{self.example}' is {' or '.join(read)}"
+        texts = days if len(set(days)) > 1 else [str(time)[-8:] for time in times]
+        readings = [f"{text} ({layout.pattern})" for text, layout in zip(texts, self.layouts, strict=True)]
+        return f"'{self.example}' may be {' or '.join(readings)}"
 
-    def beside_days(self) -> Stamped:
-        """Next to a column of days `12:05` is a time of day."""
+    def next_to_days(self) -> StampLayouts:
+        """Return the layouts of a column next to a column of days: there `12:05` is a time of day."""
         hours = tuple(layout for layout in self.layouts if layout.pattern != _MINUTES)
         return replace(self, layouts=hours or self.layouts)
 
 
-def find_layout(cells: Sequence[str], pinned: str = "") -> Stamped:
-    """The layout of a column by its cells: that of all, else that of most of them, so that the others can be named."""
+def find_layout(cells: Sequence[str], pinned: str = "") -> StampLayouts:
+    """Return the layouts of a column: those that match all cells, or most cells, so that the others can be reported."""
     texts = [cell for cell in dict.fromkeys(cells) if cell not in MISSING]
     likely = [
         texts[i] for i in sorted({0, len(texts) // 2, len(texts) - 1}) if texts and STAMP_LIKE.fullmatch(texts[i])
     ]
     if not texts or not (pinned or likely):
-        return Stamped(())
+        return StampLayouts(())
     possible = [Layout(pinned)] if pinned else [x for x in _known() if any(x.read(text) is not None for text in likely)]
-    # All days decide between two orders of day and month; some times of day are enough.
+    # All days are needed to decide between two orders of day and month; for times of day some cells are sufficient.
     first_of_day = {text.split()[0]: text for text in texts} if len(possible) > 1 else {}
-    looked = list(dict.fromkeys((*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values())))
-    fitting = possible
-    for text in looked:
-        fitting = [item for item in fitting if item.read(text) is not None]
-    if not fitting:
-        read = {item: sum(item.read(text) is not None for text in looked) for item in possible}
+    checked = list(dict.fromkeys((*texts[:: max(1, len(texts) // _LOOKED)], texts[-1], *first_of_day.values())))
+    matching = possible
+    for text in checked:
+        matching = [layout for layout in matching if layout.read(text) is not None]
+    if not matching:
+        read = {layout: sum(layout.read(text) is not None for text in checked) for layout in possible}
         most = max(read.values(), default=0)
-        fitting = [item for item in possible if read[item] == most and 2 * most >= len(looked)]
+        matching = [layout for layout in possible if read[layout] == most and 2 * most >= len(checked)]
     different: dict[tuple[int | None, ...], Layout] = {}
-    for item in fitting:
-        different.setdefault(tuple(item.read(text) for text in looked), item)
-    example = next((text for text in looked if len({item.read(text) for item in different.values()}) > 1), texts[0])
-    return Stamped(tuple(different.values()), example, "" if pinned or not different else _counted(texts))
+    for layout in matching:
+        different.setdefault(tuple(layout.read(text) for text in checked), layout)
+    example = next((text for text in checked if len({item.read(text) for item in different.values()}) > 1), texts[0])
+    return StampLayouts(tuple(different.values()), example, "" if pinned or not different else _fraction_doubt(texts))
 
 
-def _counted(texts: Sequence[str]) -> str:
-    """Why `:9`, `:10` behind the seconds may be milliseconds: as parts of a second they run backward; else empty."""
-    parts = [found for text in texts if (found := _FRACTION.fullmatch(text))]
+def _fraction_doubt(texts: Sequence[str]) -> str:
+    """Return why `:9`, `:10` after the seconds may be milliseconds: as fractions they would run backward; or empty."""
+    parts = [match for text in texts if (match := _FRACTION.fullmatch(text))]
     if len({len(part["digits"]) for part in parts}) < 2:
         return ""
-    back: tuple[str, str] | None = None
+    backward: tuple[str, str] | None = None
     for part, after in pairwise(parts):
         if (part["before"], part["after"]) != (after["before"], after["after"]):
             continue
         if int(part["digits"]) > int(after["digits"]):
             return ""
-        if back is None and part["digits"].ljust(9, "0") > after["digits"].ljust(9, "0"):
-            back = part[0], after["digits"]
-    if back is None:
+        if backward is None and part["digits"].ljust(9, "0") > after["digits"].ljust(9, "0"):
+            backward = part[0], after["digits"]
+    if backward is None:
         return ""
-    return f"'{back[1]}' behind '{back[0]}' is 0.{back[1]} s or {back[1]} ms: write each with three digits"
+    before, digits = backward
+    return f"'{digits}' after '{before}' may be 0.{digits} s or {digits} ms: write each with three digits"
 
 
 @cache
@@ -205,15 +206,15 @@ def _known() -> tuple[Layout, ...]:
     return tuple(Layout(pattern) for pattern in patterns)
 
 
-def unwrapped(
+def unwrap(
     stamps: np.ndarray[tuple[int], np.dtype[np.int64]],
     known: np.ndarray[tuple[int], np.dtype[np.bool_]],
     period: int = _DAY,
 ) -> int:
-    """Count `period` [ns] on each time that stamps without a day start again, in place; returns how often they did.
+    """Add `period` [ns] in place each time that stamps without a day start again; return how often they do.
 
-    A step back by more than half of it is such a passage, as midnight for times of day; a smaller one is left, and told
-    with the clock. A pause of a whole period or more does not show in the stamps.
+    Stamps start again, such as at midnight, where they step back by more than half a period; smaller backward steps
+    stay and are reported with the clock. A pause of a whole period or more cannot be detected from the stamps.
     """
     rows = np.flatnonzero(known)
     passed = np.cumsum(np.diff(stamps[rows], prepend=stamps[rows[:1]]) < -(period // 2))
@@ -224,7 +225,7 @@ def unwrapped(
 def seconds_since(
     stamps: np.ndarray[tuple[int], np.dtype[np.int64]], known: np.ndarray[tuple[int], np.dtype[np.bool_]], origin: int
 ) -> FloatArray:
-    """Seconds after `origin` [ns], the difference taken in whole nanoseconds; NaN where there is no stamp."""
+    """Return seconds after `origin` [ns], computed from whole nanoseconds; NaN where the stamp is missing."""
     values = np.full(len(stamps), np.nan)
     values[known] = (stamps[known] - origin) / NS
     return values

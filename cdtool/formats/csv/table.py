@@ -1,6 +1,6 @@
-"""The columns of one table as float64: numbers as they stand, stamps as seconds; and what was lost or skipped.
+"""Read the columns of a text table as float64 (time stamps as seconds), with findings on losses and skipped lines.
 
-A table is read as a whole, or block by block where it need not fit into memory.
+A table is read at once, or block by block if it need not fit into memory.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from cdtool.findings.clocks import WrittenTimes
 from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
 from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
-from cdtool.formats.csv.odd_lines import OddLines, not_numeric
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.several_clocks import Clocks, clock_findings
-from cdtool.formats.csv.stamps import NS, Layout, seconds_since, unwrapped
+from cdtool.formats.csv.stamps import NS, Layout, seconds_since, unwrap
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
 
@@ -36,9 +36,9 @@ _SHAPE = re.compile(r"[+-]?(?P<whole>[0-9]*)(?:[.,](?P<decimals>[0-9]*))?(?:[eE]
 
 
 class StampColumns:
-    """Dates and times of day as seconds: since the first that has a date (`origin` [ns]), midnight or the full hour.
+    """Dates and times of day as seconds since the first stamp with a date (`origin` [ns]), midnight or the full hour.
 
-    Rows may come piece by piece, in the file's order.
+    Rows may be passed piece by piece, in the file's order.
     """
 
     def __init__(self, dialect: Dialect, read: Sequence[int], dates: Mapping[int, int]) -> None:
@@ -50,11 +50,11 @@ class StampColumns:
 
     @property
     def names(self) -> list[str]:
-        """The columns that it makes."""
+        """Return the names of the resulting columns."""
         return [self._dialect.names[column] for column in self._columns]
 
     def seconds(self, rows: Rows) -> dict[str, FloatArray]:
-        """The next rows."""
+        """Return the columns of the next rows."""
         return {self._dialect.names[column]: self._of(column, rows) for column in self._columns}
 
     def _of(self, column: int, rows: Rows) -> FloatArray:
@@ -66,11 +66,11 @@ class StampColumns:
             known &= days != MISSING_STAMP
             stamps[known] += days[known]
         elif not dated and known.any():
-            # Before them the last stamp so far: midnight may lie between two pieces.
+            # Preceded by the last stamp of the piece before, because midnight may be between two pieces.
             times = np.concatenate((self._last.get(column, stamps[known][:1]), stamps[known]))
             self._last[column] = times[-1:].copy()
             period, _ = self._layout(column).wraps
-            passed = unwrapped(times, np.ones(len(times), dtype=bool), period)
+            passed = unwrap(times, np.ones(len(times), dtype=bool), period)
             stamps[known] = times[1:] + self._passed[column] * period
             self._passed[column] += passed
         if dated and self.origin is None and known.any():
@@ -87,8 +87,8 @@ class StampColumns:
         return self.origin if self._dated(column) and self.origin is not None else 0
 
     def findings(self) -> list[Finding]:
-        """How each is written, and what its seconds count from."""
-        found = []
+        """Return a note on each column: its layout, and the origin of its seconds."""
+        findings = []
         for column in self._columns:
             layout = self._layout(column)
             wraps = layout.wraps[1]
@@ -99,15 +99,16 @@ class StampColumns:
                 wraps=wraps,
                 wrapped=self._passed[column],
             )
-            found.append(Finding(fact, self._dialect.names[column], "note"))
-        return found
+            findings.append(Finding(fact, self._dialect.names[column], "note"))
+        return findings
 
 
 @dataclass
-class Table:
-    """`stamped` are the columns that were dates or times of day; `origin` [s] is taken off those with a date.
+class TextTable:
+    """The columns of a text table with findings.
 
-    `unbroken`: every line from the first row on is a row.
+    `stamped` are the columns of dates or times of day; `origin` [s] was subtracted from the columns with a date.
+    `unbroken`: every line after the first row is a row.
     """
 
     values: dict[str, FloatArray]
@@ -118,10 +119,10 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """The columns of a table that are read, by number: of numbers, of stamps, the days beside some of these.
+class RequestedColumns:
+    """The columns of a table that are read, by number: `numeric`, `stamps`, and the columns of days of some stamps.
 
-    `left_out` are those that a survey does not read, and why.
+    `left_out` are the columns that a survey leaves out, with the finding.
     """
 
     numeric: tuple[int, ...]
@@ -130,63 +131,65 @@ class Asked:
     left_out: dict[int, Finding]
 
     @classmethod
-    def of(cls, path: Path, dialect: Dialect, keys: Collection[str], clock: str | None, survey: bool) -> Asked:
-        """By their names; raises RecordingError where a stamp can be read in two ways."""
+    def of(
+        cls, path: Path, dialect: Dialect, keys: Collection[str], clock: str | None, survey: bool
+    ) -> RequestedColumns:
+        """Return the columns with these names; raises RecordingError if their stamps can be read in two ways."""
         columns = [i for i, name in enumerate(dialect.names) if name in keys]
-        numeric, stamps, left_out = _sorted_out(path, dialect, columns, clock, survey)
+        numeric, stamps, left_out = _sort_columns(path, dialect, columns, clock, survey)
         dates = {column: date for column in stamps if (date := _date_beside(path, dialect, column)) is not None}
         return cls(tuple(numeric), tuple(sorted({*stamps, *dates.values()})), dates, left_out)
 
 
-class _Reading:
-    """A table on its way: what is read of it, how, and what has been found so far."""
+class _TableReader:
+    """Reader of one table: the requested columns, their readers, and the irregular lines so far."""
 
     def __init__(
         self, path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, survey: bool = True
     ) -> None:
         self.path, self.dialect, self.survey = path, dialect, survey
-        self.asked = Asked.of(path, dialect, keys, clock, survey)
-        self.reader = RowReader(path, dialect, self.asked.numeric, self.asked.stamps)
-        self.odd = OddLines(path, dialect, survey, self.reader.targets, left_out=self.asked.left_out)
-        self.stamped = StampColumns(dialect, self.asked.stamps, self.asked.dates)
+        self.requested = RequestedColumns.of(path, dialect, keys, clock, survey)
+        self.reader = RowReader(path, dialect, self.requested.numeric, self.requested.stamps)
+        self.irregular = IrregularLines(path, dialect, survey, self.reader.targets, left_out=self.requested.left_out)
+        self.stamped = StampColumns(dialect, self.requested.stamps, self.requested.dates)
 
     def columns(self, rows: Rows) -> dict[str, FloatArray]:
-        """Return the columns of the next rows by name, of those, too, that are left out in the end."""
-        numbers = {self.dialect.names[column]: rows.numbers[k] for k, column in enumerate(self.asked.numeric)}
+        """Return the columns of the next rows by name, including columns that are left out later."""
+        numbers = {self.dialect.names[column]: rows.numbers[k] for k, column in enumerate(self.requested.numeric)}
         return numbers | self.stamped.seconds(rows)
 
     def end(self, rows: Rows, before: int = 0) -> list[Finding]:
-        """Return the findings about skipped lines, and about the end of the file.
+        """Return the findings on skipped lines and on the end of the file.
 
-        `rows` are the last ones, behind `before` others; the last of them may be dropped.
+        `rows` are the last rows, after `before` other rows; the last one may be removed from them.
         """
-        odd, text = self.odd, self.dialect.text
-        findings = odd.findings(rows.line(rows.count - 1))
-        if not self.reader.ended and not odd.cut_line and not odd.ends_skipped:
-            findings += _judge_last_line(self.dialect, rows, self.asked, before)
-        if odd.cut_line or text.padding:
-            line = odd.cut_line or rows.line(rows.count)
+        irregular, text = self.irregular, self.dialect.text
+        findings = irregular.findings(rows.line(rows.count - 1))
+        if not self.reader.ended and not irregular.cut_line and not irregular.ends_skipped:
+            findings += _check_last_line(self.dialect, rows, self.requested, before)
+        if irregular.cut_line or text.padding:
+            line = irregular.cut_line or rows.line(rows.count)
             findings.insert(0, Finding(LastLineCut(line), severity="loss"))
         if text.padding:
             findings.append(Finding(NulBytesAtEnd(text.padding), severity="loss"))
         return findings
 
-    def table(self, columns: Mapping[str, FloatArray], findings: list[Finding], unbroken: bool) -> Table:
-        """Return the table of these columns, without those that are left out; raises RecordingError where none is."""
-        left_out = {self.dialect.names[column] for column in self.odd.left_out} - set(self.stamped.names)
-        kept = {key: columns[key] for key in self.dialect.names if key in columns and key not in left_out}
+    def table(self, columns: Mapping[str, FloatArray], findings: list[Finding], unbroken: bool) -> TextTable:
+        """Return the table without the columns that are left out; raises RecordingError if no column remains."""
+        left_out = {self.dialect.names[column] for column in self.irregular.left_out} - set(self.stamped.names)
+        remaining = {key: columns[key] for key in self.dialect.names if key in columns and key not in left_out}
         findings += self.stamped.findings()
-        if self.survey and not kept:
-            raise RecordingError(f"{self.path}: no column holds numbers only", str(findings[0]) if findings else "")
-        return Table(kept, findings, (self.stamped.origin or 0) / NS, set(self.stamped.names), unbroken)
+        if self.survey and not remaining:
+            raise RecordingError(f"{self.path}: no column has only numbers", str(findings[0]) if findings else "")
+        return TextTable(remaining, findings, (self.stamped.origin or 0) / NS, set(self.stamped.names), unbroken)
 
 
 def read_table(
     path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
-) -> Table:
-    """Return the columns `keys`; `clock` is the one that the machine file calls the time. Raises RecordingError."""
-    reading = _Reading(path, dialect, keys, clock, survey=wanted is None)
-    rows = reading.reader.read(reading.odd)
+) -> TextTable:
+    """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
+    reading = _TableReader(path, dialect, keys, clock, survey=wanted is None)
+    rows = reading.reader.read(reading.irregular)
     findings = reading.end(rows)
     table = reading.table(reading.columns(rows), findings, not len(rows.not_rows))
     if clock is not None and wanted is not None:
@@ -197,14 +200,14 @@ def read_table(
     return table
 
 
-def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generator[Piece, None, Table]:
-    """Yield the columns `keys`, as far as they hold numbers; return the table without its rows.
+def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generator[Piece, None, TextTable]:
+    """Yield those of the columns `keys` that have numbers; return the table without its rows.
 
-    The last block that holds rows may lose its last one, once the file's end is known. Raises RecordingError.
+    The last row is removed from the last block if the file's end is incomplete. Raises RecordingError.
     """
-    reading = _Reading(path, dialect, keys)
+    reading = _TableReader(path, dialect, keys)
     clocks = Clocks.by_names(dialect)
-    last, before, unbroken = reading.reader.room(0), 0, True
+    last, before, unbroken = reading.reader.allocate(0), 0, True
     first: dict[str, FloatArray] = {}
     rounded: Counter[str] = Counter()
 
@@ -212,11 +215,11 @@ def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generat
         columns = reading.columns(rows)
         numbers = columns.keys() - set(reading.stamped.names)
         rounded.update({key: rounded_integers(columns[key]) for key in numbers})
-        if not first:  # as much of the clocks as shows whether they are several
+        if not first:  # the first block is sufficient to compare the clocks
             first.update({key: columns[key] for i in clocks.columns if (key := dialect.names[i]) in numbers})
         return Piece("", None, columns, rows.count)
 
-    for rows in reading.reader.pieces(reading.odd):
+    for rows in reading.reader.pieces(reading.irregular):
         unbroken = unbroken and not len(rows.not_rows)
         if rows.count:
             before += last.count
@@ -233,65 +236,68 @@ def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generat
     return table
 
 
-def _sorted_out(
+def _sort_columns(
     path: Path, dialect: Dialect, columns: Sequence[int], clock: str | None, survey: bool
 ) -> tuple[list[int], list[int], dict[int, Finding]]:
-    """Columns of numbers, columns of stamps, and those that a survey leaves out."""
+    """Return columns of numbers, columns of stamps, and columns that a survey leaves out, with the finding."""
     numeric, stamps, left_out = [], [], {}
     for column in columns:
-        name, found = dialect.names[column], dialect.stamped.get(column)
-        if found is None or not (survey or name == clock):
+        name, stamped = dialect.names[column], dialect.stamped.get(column)
+        if stamped is None or not (survey or name == clock):
             if survey and column in dialect.words:
                 words = dialect.words[column]
                 left_out[column] = not_numeric(name, words.line, words.text)
             else:
                 numeric.append(column)
-        elif found.layout is None:
-            timed = found.layouts[0].timed or _clock_beside(dialect, column) is not None
+        elif stamped.layout is None:
+            timed = stamped.layouts[0].timed or _clock_beside(dialect, column) is not None
             if not survey or timed:
                 raise RecordingError(
-                    f"{path}: column '{name}': {found.readings}", "pin time_format in [csv] of the machine file"
+                    f"{path}: column '{name}': {stamped.readings}", "pin time_format in [csv] of the machine file"
                 )
-            left_out[column] = Finding(AmbiguousTimes(name, found.readings))
+            left_out[column] = Finding(AmbiguousTimes(name, stamped.readings))
         else:
             stamps.append(column)
     return numeric, stamps, left_out
 
 
 def _clock_beside(dialect: Dialect, column: int) -> int | None:
-    """The column of times of day next to one of days."""
+    """Return the column of times of day next to a column of days; None if there is no such column."""
     for other in (column + 1, column - 1):
-        found = dialect.stamped.get(other)
-        if found is not None and found.layouts[0].timed and not found.layouts[0].dated:
+        stamped = dialect.stamped.get(other)
+        if stamped is not None and stamped.layouts[0].timed and not stamped.layouts[0].dated:
             return other
     return None
 
 
 def _date_beside(path: Path, dialect: Dialect, column: int) -> int | None:
-    """The column of days next to one of times of day; raises RecordingError if its days may be read in two ways."""
+    """Return the column of days next to a column of times of day; None if there is no such column.
+
+    Raises RecordingError if the days can be read in two ways.
+    """
     layout = dialect.stamped[column].layouts[0]
     if layout.dated or not layout.timed:
         return None
     for other in (column - 1, column + 1):
-        found = dialect.stamped.get(other)
-        if found is None or not found.layouts[0].dated or found.layouts[0].timed:
+        stamped = dialect.stamped.get(other)
+        if stamped is None or not stamped.layouts[0].dated or stamped.layouts[0].timed:
             continue
-        if found.layout is None:
+        if stamped.layout is None:
             raise RecordingError(
-                f"{path}: column '{dialect.names[other]}': {found.readings}",
+                f"{path}: column '{dialect.names[other]}': {stamped.readings}",
                 "pin time_format in [csv] of the machine file",
             )
         return other
     return None
 
 
-def _set_clock(path: Path, table: Table, clock: str, wanted: ChannelMap) -> None:
-    """Hold the machine file's unit against what the clock's column is."""
+def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> None:
+    """Check the machine file's unit against the clock's column, and convert days of Excel to seconds."""
     if clock in table.stamped:
         if wanted.time.factor != 1.0:
             raise RecordingError(
-                f"{path}: column '{clock}' holds dates or times of day, which are read in s",
-                'say unit = "s" in [channels] time',
+                f"{path}: column '{clock}' has dates or times of day, which are read in s",
+                'write unit = "s" in [channels] time',
             )
         return
     values = table.values[clock]
@@ -310,8 +316,8 @@ def _set_clock(path: Path, table: Table, clock: str, wanted: ChannelMap) -> None
         )
 
 
-def _set_exact(dialect: Dialect, rows: Rows, table: Table, clock: str, factor: float) -> None:
-    """Read the clock again where its stamps have more digits than float64."""
+def _set_exact(dialect: Dialect, rows: Rows, table: TextTable, clock: str, factor: float) -> None:
+    """Read the clock again if its stamps have more digits than float64 can represent."""
     if clock in table.stamped or table.origin:
         return
     exact = exact_differences(dialect, rows, dialect.names.index(clock), table.values[clock], factor)
@@ -319,10 +325,10 @@ def _set_exact(dialect: Dialect, rows: Rows, table: Table, clock: str, factor: f
         table.values[clock], table.origin = exact
 
 
-def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) -> list[Finding]:
-    """A plain last line without its end: keep it, keep it and say so, or drop it."""
+def _check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, before: int) -> list[Finding]:
+    """Check a regular last line without line end: keep the row, keep it with a warning, or remove it with a loss."""
     last = dialect.width - 1
-    if rows.count < 1 or dialect.trailing or last not in (*asked.numeric, *asked.stamps):
+    if rows.count < 1 or dialect.trailing or last not in (*requested.numeric, *requested.stamps):
         return []
     *others, unfinished = dialect.text.tail()
     if not unfinished.strip():
@@ -336,9 +342,9 @@ def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) ->
             break
     text = dialect.text.decode(unfinished).rstrip()
     cell = '"' if text.endswith('"') else split_line(text, dialect.separator)[-1]
-    whole, certain = is_whole(cell, above[: before + rows.count - 1])
+    complete, certain = is_complete(cell, above[: before + rows.count - 1])
     line = rows.line(rows.count - 1)
-    if whole and (certain or not dialect.text.padding):
+    if complete and (certain or not dialect.text.padding):
         if certain:
             return []
         return [Finding(LastLineKept(line, cell))]
@@ -352,7 +358,7 @@ def _judge_last_line(dialect: Dialect, rows: Rows, asked: Asked, before: int) ->
 
 @dataclass(frozen=True)
 class _Shape:
-    """Digits before and after the decimal mark (-1: no mark), and of the exponent (-1: none)."""
+    """The numbers of digits before the decimal mark, after it (-1: no mark) and in the exponent (-1: no exponent)."""
 
     whole: int
     decimals: int
@@ -360,26 +366,27 @@ class _Shape:
 
     @classmethod
     def of(cls, cell: str) -> _Shape | None:
-        found = _SHAPE.fullmatch(cell)
-        if found is None:
+        match = _SHAPE.fullmatch(cell)
+        if match is None:
             return None
-        decimals, power = found["decimals"], found["power"]
-        return cls(len(found["whole"]), -1 if decimals is None else len(decimals), -1 if power is None else len(power))
+        decimals, power = match["decimals"], match["power"]
+        return cls(len(match["whole"]), -1 if decimals is None else len(decimals), -1 if power is None else len(power))
 
 
-def is_whole(cell: str, above: Sequence[str]) -> tuple[bool, bool]:
-    """Is the last cell of an unfinished line whole, and is that certain? `above` are cells of its column.
+def is_complete(cell: str, above: Sequence[str]) -> tuple[bool, bool]:
+    """Return whether the last cell of an unfinished line is complete, and whether that is certain.
 
-    A cut leaves fewer digits. So the last number is believed if it has as many decimals as all those above it; where
-    their number varies, if it has no fewer than any of them, and that is said; else the line is dropped.
+    `above` are the cells above it in the same column. A number that is cut off has fewer digits. It is therefore
+    certainly complete if it has as many decimals as all cells above. If the number of decimals varies, it is assumed to
+    be complete if it has at least as many as the shortest cell above; otherwise it is incomplete.
     """
     if not above:
         return True, False
-    if cell == '"':  # the quote that closes it is there
+    if cell == '"':  # the closing quote is not cut off
         return True, True
     last, shapes = _Shape.of(cell), [_Shape.of(other) for other in above]
     known = [shape for shape in shapes if shape is not None]
-    if last is None:  # words, a stamp, nothing: as long as those above
+    if last is None:  # words, a stamp, or empty: compared by length
         lengths = {len(other) for other in above}
         return bool(lengths) and len(cell) >= min(lengths), len(lengths) == 1 and len(cell) in lengths
     if not known:

@@ -1,7 +1,7 @@
-"""A text file's bytes: encoding, line ends, NUL bytes at the end; and its lines in blocks.
+"""Read the bytes of a text file (encoding, line ends, NUL bytes at the end) and its lines in blocks.
 
-UTF-16 and UTF-32 are recoded to UTF-8 on the way; every other encoding agrees with ASCII in the bytes of a number, and
-is left as it is. What is read from here on is "the stream": bytes without a byte order mark.
+UTF-16 and UTF-32 are recoded to UTF-8 while reading; in any other encoding the bytes of a number are ASCII, and nothing
+is recoded. The result is called the stream: bytes without a byte order mark.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Bytes = npt.NDArray[np.uint8]
 
 SAMPLE_BYTES = 1 << 17
 BLOCK_BYTES = 1 << 20
-# Bytes behind a block that end any number, word or stamp.
+# Number of line ends after a block, which end any number, word or time stamp.
 AFTER = 32
 RING = 8
 TAIL_BYTES = 1 << 16
@@ -30,10 +30,7 @@ UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 
 @dataclass(frozen=True)
 class Text:
-    """How the bytes of a file are to be read.
-
-    `mark` bytes of byte order mark come first, `size` is where the text ends and `padding` NUL bytes begin.
-    """
+    """The encoding of a text file. The byte order mark has `mark` bytes; `padding` NUL bytes start at byte `size`."""
 
     path: Path
     encoding: str
@@ -44,15 +41,15 @@ class Text:
 
     @property
     def recoded(self) -> bool:
-        """True if the stream is UTF-8 made from wider characters."""
+        """Return whether the stream is UTF-8 that was recoded from UTF-16 or UTF-32."""
         return self.encoding in UNIT_BYTES
 
     def decode(self, line: bytes) -> str:
-        """A line of the stream as text."""
+        """Return a line of the stream as text."""
         return line.decode("utf-8" if self.recoded else self.encoding, errors="replace")
 
     def chunks(self) -> Iterator[bytes]:
-        """The stream, in pieces cut anywhere; raises RecordingError where it cannot be decoded."""
+        """Yield the stream in pieces that may end within a line; raises RecordingError if it cannot be decoded."""
         decoder = codecs.getincrementaldecoder(self.encoding)() if self.recoded else None
         with self.path.open("rb") as file:
             file.seek(self.mark)
@@ -66,12 +63,12 @@ class Text:
                     yield decoder.decode(piece, final=left == 0).encode()
                 except UnicodeError as fault:
                     raise RecordingError(
-                        f"{self.path}: is damaged: no {self.encoding.upper()} near byte {self.size - left}",
+                        f"{self.path}: damaged: not valid {self.encoding.upper()} near byte {self.size - left}",
                         "save it again as UTF-8",
                     ) from fault
 
     def tail(self) -> list[bytes]:
-        """The last lines of the stream, the last one unfinished; the first of them may be a part of a line."""
+        """Return the last lines of the stream, including an unfinished last line; the first may be part of a line."""
         if self.recoded:
             last = [b"", b""]
             for piece in self.chunks():
@@ -84,7 +81,10 @@ class Text:
         return end.split(self.line_end)
 
     def count_lines(self, offset: int, counted: Callable[[Bytes, int], int]) -> int:
-        """Lines from byte `offset` of the stream on, the last of which may be unfinished; `counted` counts one byte."""
+        """Return the number of lines after byte `offset` of the stream, including an unfinished last line.
+
+        `counted` counts the occurrences of one byte.
+        """
         end = self.line_end[0]
         total, last = 0, end
         for buffer, size in self._filled(offset, BLOCK_BYTES):
@@ -93,16 +93,17 @@ class Text:
         return total + (last != end)
 
     def blocks(self, offset: int) -> Iterator[tuple[bytearray, int]]:
-        """Whole lines from byte `offset` of the stream on: bytes with AFTER line ends behind them, and their number.
+        """Yield blocks of complete lines after byte `offset` of the stream: bytes, and the size of the lines in them.
 
-        Only the last block may lack the end of its last line. A block's buffer is used again RING blocks later.
+        The lines of a block are followed by AFTER line ends. Only the last line of the last block may be without a line
+        end. A block's buffer is reused RING blocks later.
         """
         left = [b""]
         for buffer, size in self._filled(offset, BLOCK_BYTES, lambda: left[0]):
             cut = buffer.rfind(self.line_end, 0, size) + 1
             rest = left[0] = bytes(memoryview(buffer)[cut:size])
             if len(rest) > BLOCK_BYTES // 2:
-                raise RecordingError(f"{self.path}: holds a line of more than {BLOCK_BYTES >> 11} KB", "is it a table?")
+                raise RecordingError(f"{self.path}: has a line of more than {BLOCK_BYTES >> 11} KB", "is it a table?")
             if cut:
                 buffer[cut : cut + AFTER] = self.line_end * AFTER
                 yield buffer, cut
@@ -110,14 +111,14 @@ class Text:
             yield bytearray(left[0] + self.line_end * AFTER), len(left[0])
 
     def _filled(self, offset: int, most: int, before: Callable[[], bytes] = bytes) -> Iterator[tuple[bytearray, int]]:
-        """The stream from `offset` on in buffers, with how far each is filled; `before` gives what it begins with."""
+        """Yield the stream from `offset` in buffers, with the size of their content; each starts with `before()`."""
         if self.recoded:
             for piece in self.chunks():
-                kept = piece[offset:]
+                content = piece[offset:]
                 offset = max(0, offset - len(piece))
-                if kept:
-                    kept = before() + kept
-                    yield bytearray(kept), len(kept)
+                if content:
+                    content = before() + content
+                    yield bytearray(content), len(content)
             return
         left = self.size - self.mark - offset
         ring = [bytearray(2 * most + AFTER) for _ in range(RING if left > most else 1)]
@@ -128,9 +129,9 @@ class Text:
                     return
                 buffer, first = ring[turn % len(ring)], before()
                 buffer[: len(first)] = first
-                place = memoryview(buffer)[len(first) : len(first) + min(most, left)]
-                size = file.readinto(place)
-                place.release()
+                free = memoryview(buffer)[len(first) : len(first) + min(most, left)]
+                size = file.readinto(free)
+                free.release()
                 if not size:
                     return
                 left -= size
@@ -138,7 +139,7 @@ class Text:
 
 
 def read_sample(path: Path) -> bytes:
-    """The first bytes of a file; raises RecordingError."""
+    """Return the first bytes of a file; raises RecordingError."""
     try:
         with path.open("rb") as file:
             return file.read(SAMPLE_BYTES)

@@ -15,14 +15,14 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.messages import NO_DATE
+from cdtool.formats.mcap.container.read_ahead import read_ahead
 from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times, with_exact_pieces, with_exact_times
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
-from cdtool.formats.mcap.uniform import UniformTaker
-from cdtool.formats.pieces import Pieces, joined
+from cdtool.formats.mcap.uniform import UniformChunkReader
+from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
@@ -43,23 +43,23 @@ class Mcap:
     topics: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
-        """True if the file starts with MCAP's magic bytes."""
+        """Return whether the file starts with MCAP's magic bytes."""
         with path.open("rb") as file:
             return file.read(len(MAGIC)) == MAGIC
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """The fields that `wanted` names, or all numeric ones; raises RecordingError."""
+        """Return the fields that `wanted` names, or all numeric fields; raises RecordingError."""
         if wanted is None:
-            return joined(self.pieces(path), sort=True)
-        return with_exact_times(_wanted(path, wanted), wanted, partial(_wanted, path))
+            return join_pieces(self.pieces(path), sort=True)
+        return with_exact_times(_read_wanted(path, wanted), wanted, partial(_read_wanted, path))
 
     def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
-        """All numeric fields, some MiB of the file at a time; raises RecordingError."""
+        """Yield all numeric fields, some MiB of the file at a time; raises RecordingError."""
         log = Log(path)
         topics: dict[str, TopicSurvey] = {}
         jumps = SequenceJumps()
         origin: int | None = None
-        for piece in ahead(log.pieces()):
+        for piece in read_ahead(log.pieces()):
             origin = _origin(path, log) if origin is None else origin
             jumps.add(piece, origin)
             for messages in piece:
@@ -69,43 +69,43 @@ class Mcap:
         findings = log.findings()
         columns: dict[str, Column] = {}
         for name in (name for name in log.topics if name in topics):
-            of_topic, found = topics[name].columns_and_findings()
+            of_topic, of_findings = topics[name].columns_and_findings()
             columns |= of_topic
-            findings += found
+            findings += of_findings
         return source_of(log, columns, findings + jumps.findings(), log.origin)
 
     def exact_pieces(self, path: Path) -> Pieces:
-        """What `pieces` gives; of a log that cdtool converted with the times that were written."""
+        """Yield the same as `pieces`; for a log that cdtool converted, with the exact times that were written."""
         return with_exact_pieces(self.pieces(path), path)
 
     def mapped(self, path: Path, wanted: ChannelMap) -> MappedFields:
-        """The fields that `wanted` names of a log that need not fit into memory; raises RecordingError."""
+        """Return the fields that `wanted` names, to be read piece by piece; raises RecordingError."""
         return MappedFields(path, wanted)
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
-        """What the first message of a topic that can be decoded names the elements of its arrays; () if it does not."""
+        """Return the names of array elements in a topic's first decodable message; () if it has none."""
         decoders = Decoders()
         try:
             for messages in chain.from_iterable(Log(path, topic.__eq__).pieces()):
                 decoder = decoders.of(messages.stream, messages.batch)
                 if decoder is not None:
-                    with suppress(UndecodableError):  # another channel of the topic may be decoded
+                    with suppress(UndecodableError):  # another channel of the topic may be decodable
                         return decoder.element_names(messages.batch.first(1))
-        except RecordingError:  # the survey says what is wrong
+        except RecordingError:  # the survey reports the problem
             return ()
         return ()
 
 
-def _wanted(path: Path, wanted: ChannelMap) -> Source:
-    asked = {source.topic for source in wanted.sources}
-    taker = UniformTaker(publish=wanted.time.clock == "publish")
-    log = Log(path, asked.__contains__, taker=taker)
+def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
+    names = {source.topic for source in wanted.sources}
+    taker = UniformChunkReader(publish=wanted.time.clock == "publish")
+    log = Log(path, names.__contains__, taker=taker)
     topics = wanted_topics(
-        path, wanted, partial(TopicColumns, expected={topic: log.expected(topic) for topic in asked})
+        path, wanted, partial(TopicColumns, expected={topic: log.expected(topic) for topic in names})
     )
     pieces = log.pieces()
-    # The taker has to learn from the first piece before the second one is made.
-    for piece in chain(islice(pieces, 1), ahead(pieces)):
+    # The chunk reader must learn from the first piece before the second one is read.
+    for piece in chain(islice(pieces, 1), read_ahead(pieces)):
         for messages in piece:
             topic = topics[messages.stream.topic]
             if messages.parts:
@@ -118,22 +118,22 @@ def _wanted(path: Path, wanted: ChannelMap) -> Source:
 
 
 def _bound(log: Log, topics: Mapping[str, TopicColumns]) -> dict[int, Binding]:
-    """By id the channels that whole chunks may hold to be taken: wanted ones with a recipe, and those not asked for."""
+    """Return, by id, the channels that uniform chunks may contain: wanted ones with a recipe, and unwanted ones."""
     channels = log.summary.channels.values()
-    alone = Counter(channel.topic for channel in channels)
+    channels_per_topic = Counter(channel.topic for channel in channels)
     bound: dict[int, Binding] = {}
     for channel in channels:
         if channel.topic not in topics:
             bound[channel.id] = None
-        elif alone[channel.topic] == 1 and (found := topics[channel.topic].binding(channel.id)) is not None:
-            bound[channel.id] = found
+        elif channels_per_topic[channel.topic] == 1 and (of_channel := topics[channel.topic].binding(channel.id)):
+            bound[channel.id] = of_channel
     return bound
 
 
 def _origin(path: Path, log: Log) -> int:
-    """Time [ns] of a log's first message, once its first piece is there."""
-    first = log.section.room.first_time or 0
-    if first >= NO_DATE:  # those so far are of no clock: which is the first that is shows at the end
+    """Return the time [ns] of a log's first message, after its first piece was read."""
+    first = log.section.arena.first_time or 0
+    if first >= NO_DATE:  # the times so far are not dates: the first valid one is known after reading all messages
         log = Log(path)
         for _ in log.pieces():
             pass
@@ -143,9 +143,10 @@ def _origin(path: Path, log: Log) -> int:
 
 @dataclass
 class MappedFields:
-    """An MCAP file that is read piece by piece as often as is asked for; each field is a clock of its own.
+    """An MCAP file that can be read piece by piece repeatedly; each field has a clock of its own.
 
-    The times count from the `origin` [ns] that the pass before has found; `settled`: the last pass counted from it.
+    The times are relative to the `origin` [ns] that the previous pass has determined; `settled`: the times of the last
+    pass were relative to the final origin.
     """
 
     path: Path
@@ -155,15 +156,15 @@ class MappedFields:
 
     def __post_init__(self) -> None:
         self._converted = exact_times(self.path)
-        self._asked = {source.described for source in self.wanted.sources}
+        self._fields = {source.described for source in self.wanted.sources}
 
     def pieces(self) -> Pieces:
         """Yield the fields that `wanted` names, some MiB of the file at a time; raises RecordingError."""
         topics = wanted_topics(self.path, self.wanted, Topic, () if self._converted is None else (EXACT_TIME,))
         log = Log(self.path, topics.__contains__)
         start = self.origin
-        for piece in ahead(log.pieces()):
-            first = log.section.room.first_time
+        for piece in read_ahead(log.pieces()):
+            first = log.section.arena.first_time
             if start is None and self.wanted.time.clock == "log" and first is not None and first < NO_DATE:
                 start = first
             for messages in piece:
@@ -173,7 +174,7 @@ class MappedFields:
                     continue
                 start = int(taken[0][0]) if start is None else start
                 for text in taken[1]:
-                    if (name := f"{topic.topic} {text}") in self._asked:
+                    if (name := f"{topic.topic} {text}") in self._fields:
                         of_field = self._piece(name, text, taken, start)
                         if of_field.rows:
                             yield of_field
@@ -184,7 +185,7 @@ class MappedFields:
         return replace(source, origin=float(self._converted.get("cdtool.origin_s", "0")))
 
     def _piece(self, name: str, text: str, taken: BatchValues, origin: int) -> Piece:
-        """Return the messages of a batch that name the field's joints."""
+        """Return one field of a batch's messages, without the messages that do not name its joints."""
         stamps, (values, other) = taken[0], taken[1][text]
         exact = None if self._converted is None else taken[1][EXACT_TIME][0]
         if other is not None:
@@ -197,13 +198,13 @@ class MappedFields:
 
 
 def mapped_source_of(log: Log, wanted: ChannelMap, topics: Mapping[str, Topic]) -> tuple[Source, int]:
-    """Return the columns of a map, once the log was run through, and what their times count from [ns]."""
+    """Return the columns of a channel map, after all pieces were read, and the origin [ns] of their times."""
     logged = [topic.name for topic in log.topics.values() if topic.count]
     columns, findings, origin = wanted_columns(log.path, wanted, topics, logged, log.origin)
     return source_of(log, columns, log.findings() + findings, origin), origin
 
 
 def source_of(log: Log, columns: Mapping[str, Column], findings: Sequence[Finding], origin: int) -> Source:
-    """Return these columns of a log that was run through; their times count from `origin` [ns]."""
+    """Return these columns as a source, after all pieces of the log were read; times are relative to `origin` [ns]."""
     start, names = origin / 1e9, tuple(columns)
     return Source(log.path, "mcap", columns, start, tuple(findings), names=names, topics=log.topic_details)

@@ -1,7 +1,7 @@
-"""Messages that never reached the log: where the numbers that their writers gave them jump.
+"""Detect messages that are missing from the log by jumps of their sequence numbers.
 
-A writer that counts numbers its messages 1, 2, 3 ...; one that does not leaves 0 (MCAP specification, Message). Most
-count each channel by itself, some all channels together.
+A writer numbers its messages 1, 2, 3 ..., or leaves all sequence numbers 0 (MCAP specification, Message). Most writers
+count each channel separately, some count all channels together.
 """
 
 from __future__ import annotations
@@ -17,59 +17,61 @@ from cdtool.formats.mcap.container.log import Messages
 
 Numbers = npt.NDArray[np.uint32]
 
-# Of the steps of a count so many are 1 at least, and no more go back: a log that was thinned out has other ones.
+# Numbers are a count if at least this share of the steps is 1, and at most this share is backward. A log from which
+# messages were removed regularly has other steps.
 _ONES, _BACK = 0.5, 0.01
 
 
 class SequenceJumps:
-    """The numbers of a log's messages, piece by piece in the file's order."""
+    """The sequence numbers of a log's messages, added piece by piece in the file's order."""
 
     def __init__(self) -> None:
-        self._counts: dict[int, _Count] = {}
-        self._all = _Count("")
-        self._shared = True  # as far as is known, channels are counted together
+        self._counts: dict[int, _SequenceCount] = {}
+        self._all = _SequenceCount("")
+        self._shared = True  # until a piece shows that the channels are not counted together
 
     def add(self, piece: Sequence[Messages], origin: int) -> None:
-        """The messages of a piece, with times from `origin` [ns] on."""
+        """Add the messages of a piece; times in findings are relative to `origin` [ns]."""
         numbers, stamps = [], []
         for messages in piece:
             channel, batch = messages.stream, messages.batch
-            found = batch.sequence
-            if found.any():
-                self._counts.setdefault(channel.id, _Count(channel.topic)).add(found, batch.log_time, origin)
-                numbers.append(found)
+            sequence = batch.sequence
+            if sequence.any():
+                count = self._counts.setdefault(channel.id, _SequenceCount(channel.topic))
+                count.add(sequence, batch.log_time, origin)
+                numbers.append(sequence)
                 stamps.append(batch.log_time)
         if not numbers or not self._shared:
             return
         together = np.concatenate(numbers)
         order = np.argsort(together, kind="stable")
         together = together[order]
-        # Counted together no number is there twice, and none comes a piece later.
-        self._shared = bool(np.all(together[1:] != together[:-1])) and self._all.goes_on_with(together)
+        # In a common count no number is repeated, and none is in a later piece.
+        self._shared = bool(np.all(together[1:] != together[:-1])) and self._all.is_continued_by(together)
         self._all.add(together, np.concatenate(stamps)[order], origin)
 
     def findings(self) -> list[Finding]:
-        """How many are missing, once all were seen; nothing where the numbers are no count."""
+        """Return warnings on missing messages, after the last piece; empty if the numbers are not a count."""
         counts = [self._all] if self._shared and len(self._counts) > 1 else list(self._counts.values())
-        return [found for count in counts for found in count.findings()]
+        return [finding for count in counts for finding in count.findings()]
 
 
-class _Count:
-    """The steps of a count; `_where` [s] is the time before its first jump."""
+class _SequenceCount:
+    """The steps of a count; `_jump_time` [s] is the time of the message before its first jump."""
 
     def __init__(self, topic: str) -> None:
         self._topic = topic
         self._last: Numbers = np.empty(0, np.uint32)
-        self._last_time = self._where = 0.0
+        self._last_time = self._jump_time = 0.0
         self._steps = self._ones = self._back = self._jumps = self._missing = 0
 
-    def goes_on_with(self, numbers: Numbers) -> bool:
-        """Not far back, as pieces of one count may lie."""
+    def is_continued_by(self, numbers: Numbers) -> bool:
+        """Return whether the numbers of the next piece can continue this count: they are not far behind it."""
         return not len(self._last) or int(numbers[0]) + len(numbers) // 2 > int(self._last[0])
 
     def add(self, numbers: Numbers, stamps: npt.NDArray[np.uint64], origin: int) -> None:
         known = np.concatenate((self._last, numbers))
-        steps = np.diff(known).view(np.int32)  # modulo 2^32, where the count restarts
+        steps = np.diff(known).view(np.int32)  # modulo 2^32, where the count overflows
         jumps = np.flatnonzero(steps > 1)
         self._steps += len(steps)
         self._ones += int(np.count_nonzero(steps == 1))
@@ -77,13 +79,13 @@ class _Count:
         if len(jumps):
             if not self._jumps:
                 before = int(jumps[0]) - len(self._last)
-                self._where = (int(stamps[before]) - origin) / 1e9 if before >= 0 else self._last_time
+                self._jump_time = (int(stamps[before]) - origin) / 1e9 if before >= 0 else self._last_time
             self._jumps += len(jumps)
             self._missing += int(np.sum(steps[jumps].astype(np.int64) - 1))
         self._last, self._last_time = known[-1:].copy(), (int(stamps[-1]) - origin) / 1e9
 
     def findings(self) -> list[Finding]:
-        counts = self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
-        if not self._jumps or not counts:
+        is_count = self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
+        if not self._jumps or not is_count:
             return []
-        return [Finding(MissingMessages(self._jumps, self._missing, self._where, bool(self._topic)), self._topic)]
+        return [Finding(MissingMessages(self._jumps, self._missing, self._jump_time, bool(self._topic)), self._topic)]

@@ -1,8 +1,8 @@
-"""Chunks in which every message is laid out as ones before it: columns without a look at single messages.
+"""The fast path for chunks whose messages all have the layout of earlier messages: whole chunks become columns.
 
-What the decoders found in the first messages of each channel are its recipes. A chunk that fits them is taken by the
-thread that decompressed it, straight into the columns; any other one goes the ordinary way, after which the recipes may
-be others.
+The decoders derive a recipe per channel from its first messages. If a chunk matches the recipes, the thread that has
+decompressed it writes its values directly into the columns; any other chunk is decoded message by message, after which
+the recipes may change.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from cdtool.messages.fast_path import (
     WrittenRows,
 )
 
-# Chunks that did not fit, beyond those that did, after which no more are tried.
-_MOST_IN_VAIN = 16
+# The fast path is given up when the chunks that did not match outnumber those that did by this number.
+_MOST_MISMATCHES = 16
 _KINDS = {"f": kernel.SINGLE, "i": kernel.SIGNED_INTEGER, "u": kernel.UNSIGNED_INTEGER, "?": kernel.TRUTH}
 
 
 @dataclass(frozen=True, eq=False)
 class _Tables:
-    """The recipes side by side, as the kernel takes them; `bound` keeps the columns that the addresses are of."""
+    """The recipes as arrays for the kernel; `bound` keeps references to the columns whose addresses they contain."""
 
     bound: Mapping[int, Binding]
     slots: IntArray
@@ -45,31 +45,31 @@ class _Tables:
     stamps: Words
 
 
-class UniformTaker:
-    """A Taker (fast_path.py); `publish`: of a record's two times the publish time is wanted, not the log time."""
+class UniformChunkReader:
+    """A Taker (taken.py) of uniform chunks; `publish`: its times are publish times of the records, not log times."""
 
     def __init__(self, publish: bool = False) -> None:
         self._time = kernel.PUBLISH_TIME if publish else kernel.LOG_TIME
         self._tables: _Tables | None = None
-        self._in_vain = 0
+        self._mismatches = 0
 
     def learn(self, bound: Mapping[int, Binding]) -> None:
-        """From now on channels (by id) are taken so; one that is not in here is not taken."""
-        given_up = self._in_vain >= _MOST_IN_VAIN or not any(bound.values())
+        """Set the recipes of channels, by id; chunks with any other channel are not taken."""
+        given_up = self._mismatches >= _MOST_MISMATCHES or not any(bound.values())
         self._tables = None if given_up else _tables(bound)
 
     @property
     def ready(self) -> bool:
-        """There is something to go by."""
+        """Return whether there are recipes."""
         return self._tables is not None
 
     def take(self, content: ByteArray, rows: Mapping[int, range], knows: IsKnownDefinition) -> ChunkRows | None:
-        """All messages of a chunk; None where one of them is not as expected, or a definition is not known."""
+        """Return all messages of a chunk; None if a message does not match, or if a definition is not known."""
         tables = self._tables
         if tables is None:
             return None
         taken = self._take(tables, content, rows, knows)
-        self._in_vain = max(0, self._in_vain + (1 if taken is None else -1))
+        self._mismatches = max(0, self._mismatches + (1 if taken is None else -1))
         return taken
 
     def _take(
@@ -81,9 +81,9 @@ class UniformTaker:
         first, limits = claimed
         reached, last = first.copy(), np.zeros(len(first), np.uint64)
         times = np.array([kernel.NO_DATE, 0, 0], np.uint64)
-        at, why = 0, kernel.DEFINITION
-        while why == kernel.DEFINITION:
-            at, why = kernel.take_messages(
+        at, reason = 0, kernel.DEFINITION
+        while reason == kernel.DEFINITION:
+            at, reason = kernel.take_messages(
                 words_of(content),
                 np.ndarray((max(0, len(content) - 3),), np.float32, content, strides=(1,)),
                 at,
@@ -101,14 +101,14 @@ class UniformTaker:
                 last,
                 times,
             )
-            if why == kernel.DEFINITION:
+            if reason == kernel.DEFINITION:
                 begin = at + kernel.PREFIX
                 opcode, end = int(content[at]), begin + int.from_bytes(content[at + 1 : begin].tobytes(), "little")
                 if not knows(opcode, content[begin:end].tobytes()):
                     return None
                 at = end
         earliest, latest, first_time = times.tolist()
-        if why != kernel.DONE or earliest > latest or latest >= kernel.NO_DATE:
+        if reason != kernel.DONE or earliest > latest or latest >= kernel.NO_DATE:
             return None
         counts, parts = {}, {}
         for (channel, bound), begin, end, limit, stamp in zip(
@@ -124,7 +124,7 @@ class UniformTaker:
 
 
 def _claimed_rows(bound: Mapping[int, Binding], rows: Mapping[int, range]) -> tuple[Words, Words] | None:
-    """Return the first row and the end of each channel's messages; None where its columns have not so many free."""
+    """Return first row and end of each channel's messages; None if its columns do not have as many free rows."""
     first, limits = np.zeros(len(bound), np.uint64), np.zeros(len(bound), np.uint64)
     for slot, (channel, each) in enumerate(bound.items()):
         if each is not None and channel in rows:
@@ -169,13 +169,13 @@ def _tables(bound: Mapping[int, Binding]) -> _Tables:
 
 
 def _numbers(layout: RowLayout, destination: Destination) -> Words:
-    """(k, kernel.NUMBER): float64 first."""
+    """Return the table of numbers (k, kernel.NUMBER), with float64 values first."""
     rows = []
     for numbers, table in zip(layout.fields, destination.tables, strict=True):
         size = np.dtype(numbers.dtype).itemsize
         kind = kernel.DOUBLE if numbers.dtype == "f8" else _KINDS[numbers.dtype[0]]
         for element, at in enumerate(numbers.at):
-            word = min(at, layout.template.shortest - WORD)  # the last words of a message are read whole, too
+            word = min(at, layout.template.shortest - WORD)  # the last word must also be within the message
             bits = 8 * (WORD - size)
             address = table.ctypes.data + element * WORD
             rows.append((address, table.strides[0], at, kind, word, bits - 8 * (at - word), bits))

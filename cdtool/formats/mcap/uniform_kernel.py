@@ -1,6 +1,6 @@
-"""A chunk's records whose messages are laid out as ones before them: compared, and their numbers put into columns.
+"""Compiled fast path for a chunk: compare the layout of its messages with a pattern, and copy numbers into columns.
 
-It runs over a chunk that was just decompressed, while the processor's caches hold it.
+It runs directly after the decompression of the chunk, while the content is in the processor's cache.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ from cdtool.instructions import store
 from cdtool.kernels import kernel
 from cdtool.messages.columns.decoded_batch import IntArray
 
-# Why it ended: at the chunk's end, before a definition, or before anything else that does not fit.
+# Reason of the end: the chunk's end, a definition, or any other record that does not match.
 DONE, DEFINITION, OTHER = range(3)
-# A row of `bounds`: shortest and longest message, a channel's rows in the tables of words to compare and of numbers,
-# of which float64 come first; the place of the header's stamp, -1: the record's time is wanted; are its seconds signed?
+# A row of `bounds`: shortest and longest message; the channel's rows in the tables of compared words and of numbers,
+# with float64 first; the byte of the header's stamp (-1: use the record's time); whether its seconds are signed.
 SHORTEST, LONGEST, COMPARED, COMPARED_END, NUMBERS, OTHERS, NUMBERS_END, STAMP, SIGNED, BOUNDS = range(10)
-# A row of `numbers`: the address of its column, the bytes between two rows of that, and its byte in a message; what is
-# no float64 has a kind, a word that holds it, and by how many bits that is moved up and down.
+# A row of `numbers`: the address of its column, the bytes between two rows of the column, and its byte in a message. A
+# number of another type than float64 also has a kind, the word that contains it, and shifts of that word up and down.
 ADDRESS, STRIDE, BYTE, KIND, WORD, UP, DOWN, NUMBER = range(8)
 DOUBLE, SINGLE, SIGNED_INTEGER, UNSIGNED_INTEGER, TRUTH = range(5)
-# Of a record before its content, and of a message's content before its payload [bytes].
+# Size of a record's prefix, and of the header in a message's content [bytes].
 PREFIX, _HEADER = 9, 22
-# Log and publish time in a message's content [bytes].
+# Positions of log time and publish time in a message's content [bytes].
 LOG_TIME, PUBLISH_TIME = 6, 14
 
-NO_DATE = 1 << 63  # times from here on [ns] are of no clock, or of before 1970
+NO_DATE = 1 << 63  # times from here [ns] are invalid, or before 1970
 _SECOND = 10**9
 
 _Words = npt.NDArray[np.uint64]
@@ -62,16 +62,16 @@ def take_messages(
     latest: _Words,
     times: _Words,
 ) -> tuple[int, int]:
-    """Take the messages of the bytes [at, end); where that ends, and why.
+    """Read the messages of the bytes [at, end); return the byte where that ends, and the reason.
 
-    `words[p]` and `singles[p]` are the bytes from byte p on. `slots[channel]` is a channel's row of `bounds`
-    (m, BOUNDS), -1: not known; without numbers its messages may be any. The numbers (k, NUMBER) of the next message go
-    to row `rows[slot]` of their columns, its time to that of the one at the address `stamps[slot]`; rows from
-    `limits[slot]` on are not written. `time` is which time of the record is wanted. `rows` (m,) grow; `latest` (m,) is
-    the last one's time, or NO_DATE once it went backwards or was no date; `times` (3,) are the earliest, latest and
-    first log time of all messages.
+    `words[p]` and `singles[p]` are read from byte p. `slots[channel]` is the channel's row of `bounds` (m, BOUNDS), or
+    -1 for an unknown channel; messages of a channel without numbers are only counted. The numbers (k, NUMBER) of the
+    next message are written to row `rows[slot]` of their columns, and its time to that row of the column at the address
+    `stamps[slot]`; rows from `limits[slot]` are not written. `time` selects the time of the record. Outputs: `rows`
+    (m,) are increased; `latest` (m,) is the time of the last message, or NO_DATE after a backward step or an invalid
+    time; `times` (3,) are the earliest, latest and first log time of all messages.
     """
-    # Unsigned numbers index arrays without a look whether they are negative.
+    # Unsigned, so that the compiled code does not test indices for negative values.
     eight, low, no_date = np.uint64(8), np.uint64(0xFFFFFFFF), np.uint64(NO_DATE)
     while at < end:
         if end - at < PREFIX:

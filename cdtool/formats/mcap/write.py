@@ -1,4 +1,4 @@
-"""Writing recordings as MCAP: ROS 2 CDR or JSON, the same bytes for the same input."""
+"""Write recordings as MCAP, in ROS 2 CDR or JSON; the same input gives the same bytes."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _Finish = Callable[[], None]
 
 @dataclass(frozen=True)
 class Stream:
-    """One topic: a sample of `fields` at each `time` [s] becomes a message of the type `schema`.
+    """One topic: the sample of `fields` at each `time` [s] is written as one message of the type `schema`.
 
-    A field is named as for reading: `data`, `wrench.force.z`, `position[0]`; `position` or `position[:]` with (n, k)
-    values fills a whole array. `names` are a JointState's joints (default joint_0, ...).
+    Fields have the same names as in reading: `data`, `wrench.force.z`, `position[0]`; `position` or `position[:]` with
+    (n, k) values fills a whole array. `names` are the joints of a JointState (default joint_0, ...).
     """
 
     topic: str
@@ -44,23 +44,23 @@ def write_mcap(
     compression: Literal["zstd", "lz4", "none"] = "zstd",
     encoding: Encoding = "cdr",
 ) -> None:
-    """Write the streams in the order of their times, time 0 being `start_ns`; raises UsageError."""
+    """Write the streams in the order of their times; `start_ns` is the log time of time 0. Raises UsageError."""
     topics = [stream.topic for stream in streams]
     if len(set(topics)) != len(topics):
-        raise UsageError(f"{path}: a topic is written twice: {', '.join(topics)}", "one stream a topic")
+        raise UsageError(f"{path}: several streams have the same topic: {', '.join(topics)}", "one stream per topic")
     fillers = [_Filler(stream) for stream in streams]
     stamps = [start_ns + np.rint(stream.time * _SECOND).astype(np.int64) for stream in streams]
     with path.open("wb") as file:
         open_file = _open_cdr if encoding == "cdr" else _open_json
         send, finish = open_file(file, streams, compression.upper())
-        for which, index in zip(*_merged(stamps), strict=True):
-            stamp = int(stamps[which][index])
-            send(which, index, stamp, fillers[which].message(index, stamp))
+        for number, index in zip(*_merged(stamps), strict=True):
+            stamp = int(stamps[number][index])
+            send(number, index, stamp, fillers[number].message(index, stamp))
         finish()
 
 
 class _Filler:
-    """One message, refilled with each sample."""
+    """A message object that is filled with each sample in turn."""
 
     def __init__(self, stream: Stream) -> None:
         definition = DEFINITIONS.get(stream.schema)
@@ -84,7 +84,7 @@ class _Filler:
             self.content["name"] = list(stream.names) or [f"joint_{i}" for i in range(width)]
 
     def message(self, index: int, stamp: int) -> dict[str, Any]:
-        """The message of one sample; the same object each time."""
+        """Return the message of one sample; each call returns the same object."""
         self.stamp["sec"], self.stamp["nanosec"] = divmod(stamp, _SECOND)
         for parent, leaf, values in self.leaves:
             parent[leaf] = values[index]
@@ -92,12 +92,14 @@ class _Filler:
 
 
 def _grouped(stream: Stream, definition: Definition) -> dict[str, FloatArray]:
-    """Values by field, the elements `position[0]`, `position[1]` joined to one (n, k) array."""
+    """Return the values by field; elements such as `position[0]`, `position[1]` are joined to one (n, k) array."""
     grouped: dict[str, FloatArray] = {}
     elements: dict[str, dict[int, FloatArray]] = {}
     for field, values in stream.fields.items():
         if len(values) != len(stream.time):
-            raise UsageError(f"{stream.topic} {field}: {len(values)} values at {len(stream.time)} times", "one a time")
+            raise UsageError(
+                f"{stream.topic} {field}: {len(values)} values at {len(stream.time)} times", "one value per time"
+            )
         name, _, index = field.removesuffix("]").partition("[")
         if name in definition.arrays and index.isdigit():
             elements.setdefault(name, {})[int(index)] = values
@@ -110,9 +112,7 @@ def _grouped(stream: Stream, definition: Definition) -> dict[str, FloatArray]:
             raise UsageError(f"{stream.topic}: no field '{field}' in {stream.schema}", nearest(field, known))
     for name, parts in elements.items():
         if sorted(parts) != list(range(len(parts))):
-            raise UsageError(
-                f"{stream.topic}: elements {sorted(parts)} of '{name}'", "number them from 0, none left out"
-            )
+            raise UsageError(f"{stream.topic}: elements {sorted(parts)} of '{name}'", "number them from 0 without gaps")
         grouped[name] = np.column_stack([parts[i] for i in range(len(parts))])
     return grouped
 
@@ -151,7 +151,7 @@ def _types(streams: Sequence[Stream]) -> list[str]:
 
 
 def _merged(stamps: list[npt.NDArray[np.int64]]) -> tuple[list[int], list[int]]:
-    """Stream and sample of every message, by time; at equal times in the order of the streams."""
+    """Return stream and sample of every message, by time; at equal times in the order of the streams."""
     which = np.repeat(np.arange(len(stamps)), [len(part) for part in stamps])
     index = np.concatenate([np.arange(len(part)) for part in stamps])
     order = np.lexsort((which, np.concatenate(stamps)))

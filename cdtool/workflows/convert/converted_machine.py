@@ -11,7 +11,7 @@ from typing import Any
 
 from cdtool.bounded_loading import ContentError, parse_toml, read_text
 from cdtool.errors import ConfigurationError
-from cdtool.formats.groups import Group, Written
+from cdtool.formats.groups import Group, WrittenNames
 from cdtool.machine_file import MachineFile
 from cdtool.recording import UNITLESS
 
@@ -20,7 +20,7 @@ _URDF = re.compile(r"^(\s*urdf\s*=\s*).*$", re.MULTILINE)
 
 
 def converted_machine(
-    machine_file: MachineFile, log: Path, groups: Sequence[Group], names: Written, target: Path
+    machine_file: MachineFile, log: Path, groups: Sequence[Group], names: WrittenNames, target: Path
 ) -> str:
     """Return the text of `target`: the machine file without its channels, then those of the converted log."""
     text = read_text(machine_file.path, ConfigurationError)
@@ -35,7 +35,7 @@ def converted_machine(
     return f"{kept.rstrip()}\n\n{_channels(log, groups, names, corner)}"
 
 
-def _channels(log: Path, groups: Sequence[Group], names: Written, corner: float) -> str:
+def _channels(log: Path, groups: Sequence[Group], names: WrittenNames, corner: float) -> str:
     topics = log.suffix.lower() == ".mcap"
     lines = [f"# The channels of {log.name} as cdtool convert wrote them: SI units, as logged."]
     lines += ["[channels.mcap]"] if topics else ["[channels]", 'time = { column = "time", unit = "s" }']

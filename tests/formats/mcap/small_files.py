@@ -1,4 +1,4 @@
-"""Small files and what can be read of them, for the tests of the container."""
+"""Small files and functions that read them, for the tests of the container."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Message = tuple[str, int, bytes]
 def small_file(
     path: Path, compression: str = "none", messages: int = 24, chunk_size: int = 500, **options
 ) -> list[Message]:
-    """A file of two topics in several chunks; gives its messages: topic, log time, payload."""
+    """Write a file of two topics in several chunks; return its messages: topic, log time, payload."""
     sent = []
     with path.open("wb") as file:
         writer = Writer(file, compression=CompressionType[compression.upper()], chunk_size=chunk_size, **options)
@@ -35,9 +35,9 @@ def small_file(
 
 
 def read(path: Path, **options) -> tuple[list[Message], list[Finding], Log]:
-    """All messages in the order of the file, findings, the log; nothing but RecordingError may be raised."""
+    """Return all messages in the order of the file, the findings and the log; only RecordingError may be raised."""
     log = Log(path, **options)
-    found = []
+    messages = []
     for piece in log.pieces():
         rows = [
             (int(batch.start[i]), item.stream.topic, int(batch.log_time[i]), _payload(batch, i))
@@ -45,19 +45,19 @@ def read(path: Path, **options) -> tuple[list[Message], list[Finding], Log]:
             for batch in [item.batch]
             for i in range(len(batch))
         ]
-        found += [row[1:] for row in sorted(rows)]
-    return found, log.findings(), log
+        messages += [row[1:] for row in sorted(rows)]
+    return messages, log.findings(), log
 
 
 def read_or_refused(path: Path) -> tuple[list[Message], list[str]]:
-    """Messages and findings; of a refused file no message and the error."""
+    """Return messages and findings; for a refused file no messages and the error."""
     try:
-        found, findings, _ = read(path)
+        messages, findings, _ = read(path)
     except RecordingError as fault:
         assert str(path) in fault.message
         assert "\n" not in str(fault)
         return [], [str(fault)]
-    return found, [str(finding) for finding in findings if finding.severity != "note"]
+    return messages, [str(finding) for finding in findings if finding.severity != "note"]
 
 
 def _payload(batch, i: int) -> bytes:

@@ -1,4 +1,4 @@
-"""Sizes that lie and bombs: refused soon, in little memory."""
+"""False sizes and decompression bombs are refused quickly and with little memory."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ found = run(sys.argv[2])
 print(json.dumps([found, time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - base]))
 """
 
-# What a bomb may take [s]: held by benchmarks/time_bounds.py.
+# The time allowed for a bomb [s]; checked by benchmarks/time_bounds.py.
 SECONDS = 5.0
 
 
@@ -76,10 +76,10 @@ def packed(compression, content):
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 @pytest.mark.parametrize("stated", [0, 1, 30, 10**6, 10**9, 2**40, 2**64 - 1])
-def test_a_chunk_that_is_not_as_large_as_it_claims_is_lost_and_the_next_is_read(tmp_path, compression, stated):
+def test_a_chunk_with_a_false_size_is_lost_and_the_next_is_read(tmp_path, compression, stated):
     content = one_message()
     path = file_of(
-        tmp_path / "lie.mcap",
+        tmp_path / "false.mcap",
         chunk(packed(compression, content), stated, compression),
         chunk(packed(compression, content), len(content), compression, zlib.crc32(content)),
     )
@@ -90,7 +90,7 @@ def test_a_chunk_that_is_not_as_large_as_it_claims_is_lost_and_the_next_is_read(
 
 @functools.cache
 def zeros(compression):
-    """300 MiB of zeros in some kilobytes (zstd) or a megabyte (lz4)."""
+    """Return 300 MiB of zeros in some kilobytes (zstd) or a megabyte (lz4)."""
     if compression == "zstd":
         maker = zstandard.ZstdCompressor().compressobj()
         parts = [maker.compress(bytes(MEBIBYTE)) for _ in range(300)]
@@ -117,8 +117,8 @@ def test_a_bomb_is_refused_in_less_than_300_megabytes(tmp_path, compression, sta
     assert kilobytes < 300_000
 
 
-def test_many_chunks_of_nearly_nothing_are_a_bomb_too(tmp_path):
-    """Each is small enough, together they would be a hundred times the file and more."""
+def test_many_small_chunks_with_high_ratios_are_a_bomb(tmp_path):
+    """Each chunk is small enough, but together they are more than a hundred times the file."""
     content = one_message() + record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"{}") * 400_000
     bomb = file_of(tmp_path / "bomb.mcap", *[chunk(packed("zstd", content), len(content), "zstd")] * 60)
     small = file_of(tmp_path / "small.mcap", chunk(packed("zstd", one_message()), len(one_message()), "zstd"))
@@ -133,33 +133,33 @@ def test_many_chunks_of_nearly_nothing_are_a_bomb_too(tmp_path):
 
 @pytest.mark.parametrize("opcode", [4, 5, 9, 12, 0x90])
 @pytest.mark.parametrize("length", [2**20, 2**40, 2**63, 2**64 - 1])
-def test_a_record_that_claims_more_than_the_file_holds_is_not_read(tmp_path, opcode, length):
+def test_a_record_that_declares_more_than_the_file_contains_is_not_read(tmp_path, opcode, length):
     content = one_message()
     good = chunk(content, len(content), "", zlib.crc32(content))
-    path = file_of(tmp_path / "lie.mcap", good, struct.pack("<BQ", opcode, length) + bytes(40), good)
+    path = file_of(tmp_path / "false.mcap", good, struct.pack("<BQ", opcode, length) + bytes(40), good)
     found, findings = read_or_refused(path)
     assert found == [("/a", 0, b"{}")] * 2
-    assert f"claims {length} bytes" in findings[0]
+    assert f"declares {length} bytes" in findings[0]
 
 
 @pytest.mark.parametrize(
-    ("given", "taken"), [(1, 1), (7, 1 << 20), (1 << 10, 1 << 7), (1 << 16, 1 << 17), (1 << 18, 1)]
+    ("input_size", "output_size"), [(1, 1), (7, 1 << 20), (1 << 10, 1 << 7), (1 << 16, 1 << 17), (1 << 18, 1)]
 )
-def test_lz4_gives_the_same_in_pieces_of_whatever_size(monkeypatch, given, taken):
+def test_lz4_gives_the_same_result_in_pieces_of_any_size(monkeypatch, input_size, output_size):
     rng = np.random.default_rng(0)
-    content = np.frombuffer(bytes(9_000) + rng.bytes(3_000) + bytes(70_000 if taken > 1 else 9), np.uint8)
+    content = np.frombuffer(bytes(9_000) + rng.bytes(3_000) + bytes(70_000 if output_size > 1 else 9), np.uint8)
     frames = b"".join(lz4.frame.compress(part.tobytes()) for part in (content[:10_000], content[10_000:]))
     packed = np.frombuffer(frames, np.uint8).copy()
     room = np.empty(len(content), np.uint8)
-    monkeypatch.setattr(chunks, "_LZ4_IN", given)
-    monkeypatch.setattr(chunks, "_LZ4_OUT", taken)
+    monkeypatch.setattr(chunks, "_LZ4_IN", input_size)
+    monkeypatch.setattr(chunks, "_LZ4_OUT", output_size)
     header = chunks.ChunkHeader(0, 0, 0, 0, len(content), 0, "lz4", 0, len(packed))
     chunks.Decompressor().fill(header, packed, room)
     assert room.tobytes() == content.tobytes()
 
 
 def camera_in_the_dark(path, compression):
-    """A cell at 100 Hz beside black images of 300 kB: together 200 MB of nearly nothing."""
+    """Write a load cell at 100 Hz and black images of 300 kB: 200 MB of almost only zeros."""
     image = b"\0\1\0\0" + bytes(300_000)
     with path.open("wb") as file:
         writer = Writer(file, compression=compression, chunk_size=1 << 20)
@@ -173,25 +173,25 @@ def camera_in_the_dark(path, compression):
     return path
 
 
-def test_an_honest_log_of_dark_images_is_told_how_to_be_read_whole(tmp_path):
+def test_the_findings_of_a_log_of_dark_images_state_how_to_read_it_completely(tmp_path):
     packed_log = camera_in_the_dark(tmp_path / "packed.mcap", CompressionType.ZSTD)
     for wanted in (
         None,
         ChannelMap(TimeSource(), (ChannelSource("force", topic="/cell", field="data"),), ("a",), True),
     ):
         source = Mcap().columns(packed_log, wanted)
-        assert [found.kind for found in source.findings].count("chunks_refused") == 1
-        assert any(found.severity == "loss" for found in source.findings)
+        assert [finding.kind for finding in source.findings].count("chunks_refused") == 1
+        assert any(finding.severity == "loss" for finding in source.findings)
     plain = camera_in_the_dark(tmp_path / "plain.mcap", CompressionType.NONE)
     source = Mcap().columns(plain)
     assert source.columns["/cell data"].values.tolist() == list(range(700))
-    # The images are in an encoding that is not read; nothing else of the log is lost.
-    others = [found for found in source.findings if not isinstance(found.fact, UndecodableMessages)]
-    assert not [found for found in others if found.severity == "loss" or isinstance(found.fact, ChunksRefused)]
+    # The images have an unknown encoding; nothing else of the log is lost.
+    others = [finding for finding in source.findings if not isinstance(finding.fact, UndecodableMessages)]
+    assert not [finding for finding in others if finding.severity == "loss" or isinstance(finding.fact, ChunksRefused)]
 
 
-def test_numbers_that_never_change_are_read_however_long(tmp_path, monkeypatch):
-    """A frozen joint shrinks to a tenth: its times do not."""
+def test_numbers_that_never_change_are_read_in_logs_of_any_length(tmp_path, monkeypatch):
+    """The values of a stuck joint are compressed to a tenth, but its times are not."""
     monkeypatch.setattr(chunks, "_LONG", 1 << 20)
     monkeypatch.setattr(chunks, "LARGEST", 1 << 20)
     path = tmp_path / "frozen.mcap"
@@ -204,4 +204,4 @@ def test_numbers_that_never_change_are_read_however_long(tmp_path, monkeypatch):
         writer.finish()
     source = Mcap().columns(path)
     assert len(source.columns["/q position[:]"].values) == 60_000
-    assert not [found for found in source.findings if found.severity == "loss"]
+    assert not [finding for finding in source.findings if finding.severity == "loss"]

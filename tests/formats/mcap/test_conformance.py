@@ -1,4 +1,4 @@
-"""The format's own conformance suite: every record with all its fields, and the messages read both ways."""
+"""The conformance suite of MCAP: every record with all its fields, and the messages by both readers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from cdtool.formats.mcap.container.chunks import Decompressor, chunk_header
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.mcap.container.records import MAGIC, Chunk, MessageIndex
-from cdtool.formats.mcap.container.summary import parsed
+from cdtool.formats.mcap.container.summary import parse_records
 from tests.data_folder import data, needs_data
 from tests.formats.mcap.small_files import read
 
@@ -35,11 +35,11 @@ def as_json(value):
 
 
 def every_record(path):
-    """The file's records from the front, those of chunks in their place, without message indexes: the suite's order."""
+    """Yield the records in the suite's order: those of a chunk in its place, without message indexes."""
     content = memoryview(path.read_bytes())
     assert bytes(content[: len(MAGIC)]) == bytes(content[-len(MAGIC) :]) == MAGIC
     at = len(MAGIC)
-    for record in parsed(content[at : -len(MAGIC)]):
+    for record in parse_records(content[at : -len(MAGIC)]):
         length = 9 + int.from_bytes(content[at + 1 : at + 9], "little")
         if isinstance(record, Chunk):
             room = np.empty(record.uncompressed_size, np.uint8)
@@ -49,13 +49,13 @@ def every_record(path):
                 Decompressor().fill(header, packed, room)
             else:
                 room[:] = packed
-            yield from parsed(room.data)
+            yield from parse_records(room.data)
         elif not isinstance(record, MessageIndex):
             yield record
         at += length
 
 
-def test_the_suite_is_whole():
+def test_the_suite_is_complete():
     assert sum(len(files(group)) for group in GROUPS) == 416
     assert {path.parent.name for path in data("mcap_conformance").glob("*/*.mcap")} == set(GROUPS)
 
@@ -76,13 +76,13 @@ def as_json_of(value):
 
 
 @pytest.mark.parametrize("group", GROUPS)
-@pytest.mark.parametrize("way", ["from the front", "by the index"])
-def test_the_messages_of_every_file_are_those_of_its_json(group, way):
+@pytest.mark.parametrize("reader", ["from the start", "by the index"])
+def test_the_messages_of_every_file_are_those_of_its_json(group, reader):
     for path in files(group):
         records = stated(path)
         fields = [dict(record["fields"]) for record in records if record["type"] == "Message"]
         expected = [(int(item["log_time"]), bytes(map(int, item["data"]))) for item in fields]
-        if way == "from the front":
+        if reader == "from the start":
             found, findings, log = read(path, use_index=False)
         else:
             topics = {dict(item["fields"])["topic"] for item in records if item["type"] == "Channel"} or {"none"}
@@ -95,18 +95,18 @@ def test_the_messages_of_every_file_are_those_of_its_json(group, way):
         assert log.count == len(expected), path.name
 
 
-def test_a_summary_gives_the_records_that_stand_in_it():
+def test_the_records_of_a_summary_are_read():
     for path in (path for group in GROUPS for path in files(group)):
         records = stated(path)
         names = [record["type"] for record in records]
-        behind = names[names.index("DataEnd") + 1 : -1]
+        after_data_end = names[names.index("DataEnd") + 1 : -1]
         log = Log(path)
         assert not log.summary.problem, path.name
-        assert [type(record).__name__ for record in log.summary.records] == behind, path.name
+        assert [type(record).__name__ for record in log.summary.records] == after_data_end, path.name
 
 
 @needs_data("mcap_samples")
-def test_samples_of_other_writers_read_without_loss():
+def test_samples_of_other_writers_are_read_without_loss():
     for path in sorted(data("mcap_samples").glob("*.mcap")):
         found, findings, log = read(path)
         assert len(found) == log.count > 0, path.name

@@ -1,4 +1,4 @@
-"""Cut and flipped files: true values or none, never a traceback, and every loss said."""
+"""Cut files and flipped bytes: only true values, never a traceback, and every loss is reported."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from tests.formats.mcap.small_files import COMPRESSIONS, read, read_or_refused, 
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_a_file_cut_at_any_byte_gives_true_messages_and_says_that_it_is_cut(tmp_path, compression):
+def test_a_file_cut_at_any_byte_yields_true_messages_and_reports_the_cut(tmp_path, compression):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression, messages=14)
     whole = path.read_bytes()
     before = 0
     for cut in range(len(whole)):
         path.write_bytes(whole[:cut])
-        found, findings = read_or_refused(path)
-        assert found == sent[: len(found)], cut
+        messages, findings = read_or_refused(path)
+        assert messages == sent[: len(messages)], cut
         assert any("damaged" in text for text in findings), cut
-        assert len(found) >= before, cut  # a longer piece never gives fewer messages
-        before = len(found)
+        assert len(messages) >= before, cut  # a longer part never has fewer messages
+        before = len(messages)
     assert before == len(sent)
 
 
-def test_of_an_uncompressed_file_every_whole_message_before_the_cut_is_given(tmp_path):
+def test_an_uncompressed_file_yields_every_complete_message_before_the_cut(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     whole = path.read_bytes()
@@ -41,19 +41,19 @@ def test_of_an_uncompressed_file_every_whole_message_before_the_cut_is_given(tmp
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("flip", [0x01, 0xFF])
-def test_any_flipped_byte_gives_true_messages_only_and_what_is_missing_is_said(tmp_path, compression, flip):
+def test_any_flipped_byte_yields_only_true_messages_and_missing_ones_are_reported(tmp_path, compression, flip):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression, messages=14)
     whole = path.read_bytes()
     for at in range(len(whole)):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ flip]) + whole[at + 1 :])
-        found, findings = read_or_refused(path)
-        assert set(found) <= set(sent), at
-        assert found == sent or findings, at
+        messages, findings = read_or_refused(path)
+        assert set(messages) <= set(sent), at
+        assert messages == sent or findings, at
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_after_a_damaged_chunk_reading_goes_on_with_the_next(tmp_path, compression):
+def test_after_a_damaged_chunk_reading_continues_with_the_next(tmp_path, compression):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     whole = bytearray(path.read_bytes())
@@ -61,28 +61,28 @@ def test_after_a_damaged_chunk_reading_goes_on_with_the_next(tmp_path, compressi
     hit = chunks[2]
     whole[hit.chunk_start_offset + hit.chunk_length - 12] ^= 0x5A
     path.write_bytes(whole)
-    found, findings, log = read(path)
-    lost = len(sent) - len(found)
+    messages, findings, log = read(path)
+    lost = len(sent) - len(messages)
     assert 0 < lost < 12
-    assert set(found) < set(sent)
-    assert [loss.chunks for loss in log.section.losses.places] == [1]
+    assert set(messages) < set(sent)
+    assert [loss.chunks for loss in log.section.losses.entries] == [1]
     span = tuple((stamp - 10**9) / 1e9 for stamp in (hit.message_start_time, hit.message_end_time))
     assert findings[0].fact.lost == LostBytes(hit.chunk_length, True, lost, span)
-    assert Finding(MessageCountDiffers(len(sent), len(found)), severity="loss") in findings
+    assert Finding(MessageCountDiffers(len(sent), len(messages)), severity="loss") in findings
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_the_next_chunk_is_found_without_a_summary_too(tmp_path, compression):
+def test_the_next_chunk_is_also_found_without_a_summary(tmp_path, compression):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     chunks = sorted(Log(path).summary.chunks)
     whole = bytearray(path.read_bytes()[:-60])
-    whole[chunks[1] + 5] ^= 0x10  # its length: now beyond the end of the file
+    whole[chunks[1] + 5] ^= 0x10  # its length, which is now beyond the end of the file
     path.write_bytes(whole)
-    found, _, log = read(path)
+    messages, _, log = read(path)
     assert log.summary.problem
-    assert set(found) < set(sent)
-    assert found[-1] == sent[-1]
+    assert set(messages) < set(sent)
+    assert messages[-1] == sent[-1]
 
 
 def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_path):
@@ -91,22 +91,22 @@ def test_messages_of_a_cut_chunk_are_unverified_and_those_before_are_not(tmp_pat
     last = max(Log(path).summary.chunks)
     whole = path.read_bytes()
     path.write_bytes(whole[: whole.index(sent[-1][2], last) + 3])
-    found, findings, log = read(path)
-    assert found == sent[:-1]
-    assert 0 < log.unverified < len(found)
-    assert findings[-1].fact == Unverified(log.unverified, len(found))
+    messages, findings, log = read(path)
+    assert messages == sent[:-1]
+    assert 0 < log.unverified < len(messages)
+    assert findings[-1].fact == Unverified(log.unverified, len(messages))
 
 
-def test_a_lost_definition_is_taken_from_the_summary(tmp_path):
+def test_a_lost_definition_is_read_from_the_summary(tmp_path):
     """The package's writer defines channels in the first chunk only."""
     path = tmp_path / "log.mcap"
     sent = small_file(path, "zstd")
     whole = bytearray(path.read_bytes())
     whole[min(Log(path).summary.chunks) + 70] ^= 0xFF
     path.write_bytes(whole)
-    found, _, log = read(path)
-    assert len(found) > len(sent) / 2
-    assert found == sent[-len(found) :]
+    messages, _, log = read(path)
+    assert len(messages) > len(sent) / 2
+    assert messages == sent[-len(messages) :]
     assert log.unverified == 0
 
 
@@ -125,21 +125,21 @@ def test_without_a_definition_messages_are_lost_and_counted(tmp_path):
 def test_messages_that_no_checksum_covers_are_counted(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path, enable_crcs=False)
-    found, findings, log = read(path)
-    assert found == sent
+    messages, findings, log = read(path)
+    assert messages == sent
     assert log.unverified == len(sent)
     assert findings == [Finding(Unverified(len(sent), len(sent)), severity="note")]
 
 
-def test_a_message_shorter_than_its_header_ends_what_can_be_trusted(tmp_path):
+def test_nothing_is_read_after_a_message_shorter_than_its_header(tmp_path):
     path = tmp_path / "log.mcap"
     small_file(path, use_chunking=False)
     whole = path.read_bytes()
     record = struct.pack("<BQ", 5, 34)
     at = whole.index(record, whole.index(record) + 1)
     path.write_bytes(whole[: at + 1] + struct.pack("<Q", 3) + whole[at + 9 :])
-    found, findings = read_or_refused(path)
-    assert len(found) == 1
+    messages, findings = read_or_refused(path)
+    assert len(messages) == 1
     assert "a message shorter than its header" in findings[0]
 
 
@@ -156,7 +156,7 @@ def test_a_wrong_checksum_of_an_attachment_is_a_loss(tmp_path):
         writer.finish()
     assert not read(path)[1]
     path.write_bytes(path.read_bytes().replace(b"Monday", b"Friday"))
-    found, findings, _ = read(path)
-    assert len(found) == 1
+    messages, findings, _ = read(path)
+    assert len(messages) == 1
     assert findings[0].severity == "loss"
-    assert findings[0].fact.reason == "the checksum of an attachment does not fit"
+    assert findings[0].fact.reason == "the checksum of an attachment does not match"

@@ -1,4 +1,4 @@
-"""Ids that change their meaning or have none: messages are lost and counted, never read by another schema."""
+"""Ids that are redefined or undefined: their messages are lost and counted, and never read by another schema."""
 
 from __future__ import annotations
 
@@ -38,46 +38,46 @@ DEFINED = (schema(1, b"float64 data"), channel(1, b"/a"), channel(2, b"/b", 0))
 
 @pytest.mark.parametrize("change", [schema(1, b"float32 data"), channel(1, b"/c"), channel(1, b"/a", 0)])
 @pytest.mark.parametrize("apart", [False, True], ids=["in one chunk", "in two chunks"])
-def test_after_a_redefinition_messages_are_lost_and_counted_and_other_channels_go_on(tmp_path, change, apart):
+def test_after_a_redefinition_messages_are_lost_and_counted_and_other_channels_are_read(tmp_path, change, apart):
     before = (*DEFINED, message(1, 1), message(2, 2), message(1, 3))
-    behind = (change, message(1, 4), message(2, 5), message(1, 6))
-    chunks = (verified(*before), verified(*behind)) if apart else (verified(*before, *behind),)
-    found, findings = read_or_refused(file_of(tmp_path / "redefined.mcap", *chunks))
-    assert [time for _, time, _ in found] == [1, 2, 3, 5]
-    assert [topic for topic, _, _ in found] == ["/a", "/b", "/a", "/b"]
+    after = (change, message(1, 4), message(2, 5), message(1, 6))
+    chunks = (verified(*before), verified(*after)) if apart else (verified(*before, *after),)
+    messages, findings = read_or_refused(file_of(tmp_path / "redefined.mcap", *chunks))
+    assert [time for _, time, _ in messages] == [1, 2, 3, 5]
+    assert [topic for topic, _, _ in messages] == ["/a", "/b", "/a", "/b"]
     assert "is defined twice, differently: 2 messages lost" in findings[0]
 
 
-def test_the_same_definition_again_is_none(tmp_path):
+def test_a_repeated_definition_is_not_a_redefinition(tmp_path):
     again = (*DEFINED, message(1, 1))
-    found, findings = read_or_refused(file_of(tmp_path / "again.mcap", verified(*again), verified(*again)))
-    assert len(found) == 2
+    messages, findings = read_or_refused(file_of(tmp_path / "again.mcap", verified(*again), verified(*again)))
+    assert len(messages) == 2
     assert not findings
 
 
-def test_a_channel_that_is_not_there_loses_its_messages_only(tmp_path):
+def test_only_the_messages_of_an_undefined_channel_are_lost(tmp_path):
     path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, message(1, 1), message(7, 2), message(7, 3)))
-    found, findings = read_or_refused(path)
-    assert [time for _, time, _ in found] == [1]
-    assert findings == ["a message names channel 7, which is not there: 2 messages lost"]
+    messages, findings = read_or_refused(path)
+    assert [time for _, time, _ in messages] == [1]
+    assert findings == ["a message names channel 7, which is not defined: 2 messages lost"]
 
 
-def test_a_schema_that_is_not_there_loses_its_messages_only(tmp_path):
+def test_only_the_messages_of_an_undefined_schema_are_lost(tmp_path):
     path = file_of(tmp_path / "missing.mcap", verified(*DEFINED, channel(3, b"/c", 9), message(1, 1), message(3, 2)))
-    found, findings = read_or_refused(path)
-    assert [time for _, time, _ in found] == [1]
-    assert findings == ["channel '/c' names schema 9, which is not there: 1 message lost"]
+    messages, findings = read_or_refused(path)
+    assert [time for _, time, _ in messages] == [1]
+    assert findings == ["channel '/c' names schema 9, which is not defined: 1 message lost"]
 
 
 def test_a_schema_with_the_id_0_is_ignored(tmp_path):
-    found, findings = read_or_refused(
+    messages, findings = read_or_refused(
         file_of(tmp_path / "zero.mcap", verified(schema(0, b""), *DEFINED, message(2, 1)))
     )
-    assert len(found) == 1
+    assert len(messages) == 1
     assert not findings
 
 
 def test_a_definition_outside_of_chunks_leaves_its_messages_unverified(tmp_path):
     path = file_of(tmp_path / "outside.mcap", *DEFINED, verified(message(1, 1), message(2, 2)))
-    found, _, log = read(path)
-    assert len(found) == log.unverified == 2
+    messages, _, log = read(path)
+    assert len(messages) == log.unverified == 2

@@ -1,4 +1,4 @@
-"""Reading in pieces: bounded memory, one piece ahead, many messages, files that vanish."""
+"""Reading in pieces: bounded memory, reading one piece ahead, many messages, files that shrink."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 from cdtool.errors import RecordingError
-from cdtool.formats.mcap.container import chunks_ahead
+from cdtool.formats.mcap.container import chunk_read_ahead
 from cdtool.formats.mcap.container import messages as table
-from cdtool.formats.mcap.container.ahead import ahead
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.container.read_ahead import read_ahead
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("most", [1, 7, 10**5])
 @pytest.mark.parametrize("joined", [1, 900, 10**6])
-def test_however_small_the_pieces_are_the_messages_are_the_same(tmp_path, monkeypatch, compression, most, joined):
+def test_pieces_of_any_size_have_the_same_messages(tmp_path, monkeypatch, compression, most, joined):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
     monkeypatch.setattr(table, "MOST_MESSAGES", most)
-    monkeypatch.setattr(chunks_ahead, "JOINED", joined)
+    monkeypatch.setattr(chunk_read_ahead, "JOINED", joined)
     found, findings, _ = read(path)
     assert found == sent
     assert not findings
@@ -37,7 +37,7 @@ def test_messages_outside_of_chunks_are_read_window_by_window(tmp_path, monkeypa
     assert read(path)[0] == sent
 
 
-def test_a_message_larger_than_a_window_is_read_whole(tmp_path):
+def test_a_message_larger_than_a_window_is_read_completely(tmp_path):
     path = tmp_path / "log.mcap"
     large = np.random.default_rng(0).bytes(200_000)
     for chunking in (False, True):
@@ -51,7 +51,7 @@ def test_a_message_larger_than_a_window_is_read_whole(tmp_path):
         assert [len(payload) for _, _, payload in read(path)[0]] == [5, 200_000, 0, 100_000, 5]
 
 
-def test_headers_of_messages_are_read_where_they_stand(tmp_path):
+def test_headers_of_messages_are_read_at_their_positions(tmp_path):
     path = tmp_path / "log.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -67,14 +67,14 @@ def test_headers_of_messages_are_read_where_they_stand(tmp_path):
     assert item.batch.length.tolist() == list(range(5))
 
 
-def test_one_ahead_gives_the_same_items_and_the_same_error():
+def test_reading_ahead_yields_the_same_items_and_the_same_error():
     def items():
         yield from range(5)
         raise RecordingError("the drive is lost")
 
     found = []
     with pytest.raises(RecordingError, match="the drive is lost"):
-        for item in ahead(items()):
+        for item in read_ahead(items()):
             found.append(item)
     assert found == list(range(5))
 

@@ -1,4 +1,4 @@
-"""The exit statuses of `cdtool recover`."""
+"""The exit statuses and messages of `cdtool recover`."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def run(*arguments):
     return CliRunner().invoke(APP, [str(argument) for argument in arguments])
 
 
-def test_a_whole_file_ends_with_status_0(tmp_path):
+def test_recovering_an_undamaged_file_exits_with_status_0(tmp_path):
     small_file(tmp_path / "log.mcap")
     done = run(tmp_path / "log.mcap", "-o", tmp_path / "out.mcap")
     assert done.exit_code == 0
     assert "24 messages" in done.output
 
 
-def test_a_cut_file_ends_with_status_3_and_says_what_is_lost_and_left_out(tmp_path):
+def test_recovering_a_cut_file_exits_with_status_3_and_reports_losses(tmp_path):
     sent = small_file(tmp_path / "log.mcap")
     whole = (tmp_path / "log.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: whole.index(sent[-1][2])])
@@ -39,7 +39,7 @@ def test_a_cut_file_ends_with_status_3_and_says_what_is_lost_and_left_out(tmp_pa
     assert "left out" not in kept.output
 
 
-def test_a_file_that_is_there_is_overwritten_with_force_only_and_the_source_never(tmp_path):
+def test_an_existing_file_is_overwritten_only_with_force_and_the_source_never(tmp_path):
     for name in ("log.mcap", "other.mcap"):
         small_file(tmp_path / name, messages=12 if name == "log.mcap" else 24)
     other, source = (tmp_path / "other.mcap").read_bytes(), (tmp_path / "log.mcap").read_bytes()

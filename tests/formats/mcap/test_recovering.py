@@ -1,4 +1,4 @@
-"""cdtool recover: what is left, byte for byte; what was damaged is never stamped as good."""
+"""cdtool recover: messages are recovered unchanged, and unverified ones never get a checksum."""
 
 from __future__ import annotations
 
@@ -15,35 +15,36 @@ from cdtool.workflows.recovering import recover
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
 
-def said(path):
+def provenance_of(path):
     with path.open("rb") as file:
-        return next(item.metadata for item in make_reader(file).iter_metadata() if item.name == "cdtool.recovered")
+        records = make_reader(file).iter_metadata()
+        return next(record.metadata for record in records if record.name == "cdtool.recovered")
 
 
-def by_the_package(path):
-    """Messages as the mcap package's seeking reader gives them, every CRC checked."""
+def read_by_the_package(path):
+    """Return the messages by the mcap package's seeking reader, with every CRC checked."""
     with path.open("rb") as file:
         rows = make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)
         return [(channel.topic, message.log_time, message.data) for _, channel, message in rows]
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_a_whole_file_comes_out_whole(tmp_path, compression):
+def test_an_undamaged_file_is_recovered_completely(tmp_path, compression):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source, compression)
     done = recover(source, output)
     assert done.whole
     assert (done.messages, done.unverified, done.left_out) == (len(sent), 0, 0)
-    found, findings, log = read(output)
-    assert found == by_the_package(output) == sent
+    messages, findings, log = read(output)
+    assert messages == read_by_the_package(output) == sent
     assert not findings
     assert log.summary.verified
-    assert said(output)["source_sha256"] == hashlib.sha256(source.read_bytes()).hexdigest()
-    assert said(output)["lost"] == "nothing"
+    assert provenance_of(output)["source_sha256"] == hashlib.sha256(source.read_bytes()).hexdigest()
+    assert provenance_of(output)["lost"] == "nothing"
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_what_a_damaged_chunk_held_is_not_in_the_output_and_is_said(tmp_path, compression):
+def test_the_messages_of_a_damaged_chunk_are_left_out_and_reported(tmp_path, compression):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source, compression)
     whole = bytearray(source.read_bytes())
@@ -52,39 +53,39 @@ def test_what_a_damaged_chunk_held_is_not_in_the_output_and_is_said(tmp_path, co
     source.write_bytes(whole)
     done = recover(source, output)
     assert not done.whole
-    found, findings, _ = read(output)
-    assert found == by_the_package(output)
-    assert set(found) < set(sent)
-    assert len(found) == done.messages
+    messages, findings, _ = read(output)
+    assert messages == read_by_the_package(output)
+    assert set(messages) < set(sent)
+    assert len(messages) == done.messages
     assert not findings
-    assert f"a chunk of {hit.chunk_length} bytes lost" in said(output)["lost"]
+    assert f"a chunk of {hit.chunk_length} bytes lost" in provenance_of(output)["lost"]
 
 
-@pytest.mark.parametrize("keep", [False, True], ids=["left out", "kept"])
-def test_messages_of_a_cut_chunk_are_left_out_or_kept_without_a_checksum(tmp_path, keep):
+@pytest.mark.parametrize("keep", [False, True], ids=["left out", "written"])
+def test_messages_of_a_cut_chunk_are_left_out_or_written_without_a_checksum(tmp_path, keep):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source)
     whole = source.read_bytes()
     source.write_bytes(whole[: whole.index(sent[-1][2], max(Log(source).summary.chunks)) + 3])
     left = read(source)[2].unverified
     done = recover(source, output, unverified=keep)
-    found, _, log = read(output)
+    messages, _, log = read(output)
     assert not done.whole
-    assert found == sent[: len(sent) - 1 - (0 if keep else left)]
+    assert messages == sent[: len(sent) - 1 - (0 if keep else left)]
     assert (done.unverified, done.left_out) == ((left, 0) if keep else (0, left))
     assert log.unverified == done.unverified
-    assert said(output)["unverified"].startswith(f"{done.unverified} messages in chunks")
+    assert provenance_of(output)["unverified"].startswith(f"{done.unverified} messages in chunks")
 
 
-def test_without_any_checksum_nothing_is_kept_unless_it_is_asked_for(tmp_path):
+def test_without_any_checksum_nothing_is_recovered_unless_requested(tmp_path):
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source, use_chunking=False)
     with pytest.raises(RecordingError, match=r"none of its 24 messages has a checksum \(--unverified keeps them"):
         recover(source, output)
     assert not output.exists()
     assert recover(source, output, unverified=True).whole
-    found, findings, log = read(output)
-    assert found == sent
+    messages, findings, log = read(output)
+    assert messages == sent
     assert log.unverified == len(sent)
     assert not log.summary.verified
     assert findings[0].fact == Unverified(24, 24)
@@ -100,27 +101,27 @@ def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path
         recover(source, output, force=True)
     done = recover(source, output, unverified=True, force=True)
     assert not done.whole
-    assert "the checksum of the data section does not fit" in said(output)["lost"]
+    assert "the checksum of the data section does not match" in provenance_of(output)["lost"]
     assert read(output)[2].unverified == len(sent)
 
 
-def test_what_a_checksum_covered_is_still_covered_behind_what_none_did(tmp_path):
-    """Channels are then defined in a chunk without a checksum first, and again in one with it."""
+def test_verified_messages_keep_a_checksum_after_unverified_ones(tmp_path):
+    """Channels are defined in a chunk without a checksum, and again in one with a checksum."""
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
     sent = small_file(source)
     whole = bytearray(source.read_bytes())
     first = min(Log(source).summary.chunks)
-    whole[first + 33 : first + 37] = bytes(4)  # the first chunk's CRC: there is none
+    whole[first + 33 : first + 37] = bytes(4)  # the first chunk's CRC: 0, no checksum
     source.write_bytes(whole)
     unverified = read(source)[2].unverified
     assert 0 < unverified < len(sent)
     recover(source, output, unverified=True)
-    found, _, log = read(output)
-    assert found == sent
+    messages, _, log = read(output)
+    assert messages == sent
     assert log.unverified == unverified
 
 
-def test_attachments_and_metadata_are_kept(tmp_path):
+def test_attachments_and_metadata_are_recovered(tmp_path):
     from mcap.writer import Writer
 
     source, output = tmp_path / "log.mcap", tmp_path / "out.mcap"
@@ -136,7 +137,7 @@ def test_attachments_and_metadata_are_kept(tmp_path):
         reader = make_reader(file)
         (attachment,) = reader.iter_attachments()
         assert (attachment.name, attachment.data, attachment.log_time) == ("note.bin", b"\x00\x01" * 700_000, 2)
-        assert {item.name: item.metadata for item in reader.iter_metadata()}["machine"] == {"name": "gate"}
+        assert {record.name: record.metadata for record in reader.iter_metadata()}["machine"] == {"name": "gate"}
     assert [opcode for opcode, _, _ in read(output)[2].section.extras].count(Attachment.opcode) == 1
 
 

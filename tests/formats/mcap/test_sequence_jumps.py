@@ -1,4 +1,4 @@
-"""Messages that never reached a log show in the numbers that their writer gave them."""
+"""Missing messages are detected by their sequence numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MS = 10**6
 
 
 def write(path, messages, chunk_size=400):
-    """Messages (topic, time [ms], number)."""
+    """Write messages (topic, time [ms], sequence number)."""
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=chunk_size)
         writer.start()
@@ -31,14 +31,14 @@ def write(path, messages, chunk_size=400):
     return path
 
 
-def told(path):
-    return [found for found in Mcap().columns(path).findings if isinstance(found.fact, MissingMessages)]
+def missing_messages(path):
+    return [finding for finding in Mcap().columns(path).findings if isinstance(finding.fact, MissingMessages)]
 
 
 def test_jumps_are_counted_with_the_time_of_the_first(tmp_path):
     numbers = [i + 1 for i in range(400) if i not in (100, 101, 102, 300)]
     path = write(tmp_path / "log.mcap", [("/a", number - 1, number) for number in numbers])
-    assert told(path) == [Finding(MissingMessages(2, 4, 0.099, of_topic=True), "/a", "warning")]
+    assert missing_messages(path) == [Finding(MissingMessages(2, 4, 0.099, of_topic=True), "/a", "warning")]
 
 
 @pytest.mark.parametrize(
@@ -51,25 +51,25 @@ def test_jumps_are_counted_with_the_time_of_the_first(tmp_path):
         [*range(2**32 - 100, 2**32), *range(100)],
         np.random.default_rng(1).integers(0, 2**32, 200).tolist(),
     ],
-    ids=["no numbers", "all there", "every tenth", "started anew", "32 bits pass over", "no count"],
+    ids=["no numbers", "complete", "every tenth", "restarted", "32-bit overflow", "random"],
 )
-def test_what_is_no_count_with_jumps_is_not_told(tmp_path, numbers):
-    assert not told(write(tmp_path / "log.mcap", [("/a", i, number) for i, number in enumerate(numbers)]))
+def test_numbers_other_than_a_count_with_jumps_are_not_reported(tmp_path, numbers):
+    assert not missing_messages(write(tmp_path / "log.mcap", [("/a", i, number) for i, number in enumerate(numbers)]))
 
 
-def test_each_topic_is_counted_by_itself(tmp_path):
+def test_each_topic_is_counted_separately(tmp_path):
     messages = [("/a", i, i + 1) for i in range(300) if i != 200]
     messages += [("/b", 10 * i, i + 1) for i in range(30)]
     messages.sort(key=lambda item: item[1])
-    (only,) = told(write(tmp_path / "log.mcap", messages))
+    (only,) = missing_messages(write(tmp_path / "log.mcap", messages))
     assert only == Finding(MissingMessages(1, 1, 0.199, of_topic=True), "/a")
 
 
-def test_a_log_whose_topics_are_counted_together_has_no_jumps_but_its_own(tmp_path):
+def test_a_log_whose_topics_are_counted_together_has_only_common_jumps(tmp_path):
     small_file(tmp_path / "whole.mcap", messages=200)  # two topics, one count
-    assert not told(tmp_path / "whole.mcap")
+    assert not missing_messages(tmp_path / "whole.mcap")
     messages = [("/b" if i % 3 == 2 else "/a", i, i + 1) for i in range(300) if not 100 <= i < 110]
-    (only,) = told(write(tmp_path / "log.mcap", messages))
+    (only,) = missing_messages(write(tmp_path / "log.mcap", messages))
     assert only == Finding(MissingMessages(1, 10, 0.099, of_topic=False))
 
 
@@ -77,13 +77,13 @@ def test_a_log_whose_topics_are_counted_together_has_no_jumps_but_its_own(tmp_pa
 @given(lost=st.sets(st.integers(1, 298), max_size=60), chunk=st.sampled_from([100, 1000, 10**6]))
 def test_any_loss_between_the_first_and_the_last_message_is_counted(tmp_path_factory, lost, chunk):
     messages = [("/a", i, i + 1) for i in range(300) if i not in lost]
-    found = told(write(tmp_path_factory.mktemp("jumps") / "log.mcap", messages, chunk))
-    assert len(found) == bool(lost)
+    findings = missing_messages(write(tmp_path_factory.mktemp("jumps") / "log.mcap", messages, chunk))
+    assert len(findings) == bool(lost)
     if lost:
-        assert found[0].fact.missing == len(lost)
+        assert findings[0].fact.missing == len(lost)
 
 
-def test_of_two_channels_of_a_topic_one_of_which_cannot_be_decoded_the_other_is_read(tmp_path):
+def test_a_channel_is_read_if_another_one_of_its_topic_cannot_be_decoded(tmp_path):
     path = tmp_path / "log.mcap"
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=300)
@@ -95,5 +95,7 @@ def test_of_two_channels_of_a_topic_one_of_which_cannot_be_decoded_the_other_is_
         writer.finish()
     source = Mcap().columns(path)
     assert source.columns["/a v"].values.tolist() == list(range(50))
-    assert any(isinstance(found.fact, UndecodableMessages) and found.fact.count == 50 for found in source.findings)
+    assert any(
+        isinstance(finding.fact, UndecodableMessages) and finding.fact.count == 50 for finding in source.findings
+    )
     assert Mcap().element_names(path, "/a") == ("x",)

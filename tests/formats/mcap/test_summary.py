@@ -1,4 +1,4 @@
-"""The summary held against the data: what it tells otherwise is found, and nothing is skipped on its word alone."""
+"""The summary is compared with the data: differences are reported, and no chunk is skipped without verification."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.formats.mcap.small_files import read, small_file
 
 
 def with_summary(path, change):
-    """Write the file anew with its summary section changed, and a CRC that fits."""
+    """Write the file again with a changed summary section and its valid CRC."""
     whole = path.read_bytes()
     start = Log(path).summary.footer.summary_start
     section, footer = change(bytearray(whole[start:-37])), whole[-37:-12]
@@ -29,8 +29,8 @@ def with_summary(path, change):
     path.write_bytes(whole[:start] + bytes(section) + footer + struct.pack("<I", crc) + whole[-8:])
 
 
-def by_turns(path):
-    """Chunks of one topic each: 10 of /a and of /b by turns, the first of /a."""
+def alternating_chunks(path):
+    """Write chunks of one topic each: alternately 10 messages of /a and of /b."""
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=600, compression=CompressionType.NONE)
         writer.start()
@@ -41,7 +41,7 @@ def by_turns(path):
         writer.finish()
 
 
-def place(section, value):
+def find(section, value):
     at = section.find(value)
     assert at >= 0
     return at
@@ -49,14 +49,14 @@ def place(section, value):
 
 def test_chunks_without_a_wanted_topic_are_not_read(tmp_path, monkeypatch):
     path = tmp_path / "log.mcap"
-    by_turns(path)
+    alternating_chunks(path)
     checked = []
     monkeypatch.setattr(chunks, "check_crc", lambda header, _: checked.append(header.at))
     for topic in ("/a", "/b"):
         checked.clear()
-        found, findings, log = read(path, wanted=topic.__eq__)
-        assert len(found) == 100
-        assert {name for name, _, _ in found} == {topic}
+        messages, findings, log = read(path, wanted=topic.__eq__)
+        assert len(messages) == 100
+        assert {name for name, _, _ in messages} == {topic}
         assert not findings
         assert log.count == 200
         assert {name: item.count for name, item in log.topics.items()} == {"/a": 100, "/b": 100}
@@ -67,22 +67,22 @@ def test_chunks_without_a_wanted_topic_are_not_read(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "what", ["a chunk is left out", "a count", "a channel of a chunk", "message indexes are longer", "no CRC"]
 )
-def test_a_summary_that_tells_otherwise_loses_nothing_and_is_found(tmp_path, what):
+def test_a_false_summary_loses_nothing_and_is_reported(tmp_path, what):
     path = tmp_path / "log.mcap"
-    by_turns(path)
+    alternating_chunks(path)
     log = Log(path)
     indexes = list(log.summary.chunks.values())
 
     def change(section):
-        at = place(section, struct.pack("<QQ", indexes[5].chunk_start_offset, indexes[5].chunk_length)) + 16
+        at = find(section, struct.pack("<QQ", indexes[5].chunk_start_offset, indexes[5].chunk_length)) + 16
         if what == "a chunk is left out":
             begin = at - 41
             length = 9 + int.from_bytes(section[begin + 1 : begin + 9], "little")
             assert section[begin] == 8
             del section[begin : begin + length]
-            section[begin:begin] = struct.pack("<BQ", 0x90, length - 9) + bytes(length - 9)  # places stay as they are
+            section[begin:begin] = struct.pack("<BQ", 0x90, length - 9) + bytes(length - 9)  # all offsets stay the same
         elif what == "a count":
-            at = place(section, struct.pack("<HQHQ", 1, 100, 2, 100))
+            at = find(section, struct.pack("<HQHQ", 1, 100, 2, 100))
             section[at : at + 20] = struct.pack("<HQHQ", 1, 110, 2, 90)
         elif what == "a channel of a chunk":
             section[at + 4] = 1 if section[at + 4] == 2 else 2
@@ -98,47 +98,47 @@ def test_a_summary_that_tells_otherwise_loses_nothing_and_is_found(tmp_path, wha
         whole = path.read_bytes()
         path.write_bytes(whole[:-12] + bytes(4) + whole[-8:])
     for topic in ("/a", "/b"):
-        found, findings, _ = read(path, wanted=topic.__eq__)
-        assert len(found) == 100, topic
+        messages, findings, _ = read(path, wanted=topic.__eq__)
+        assert len(messages) == 100, topic
         if what in ("a chunk is left out", "a count"):
-            assert any(isinstance(item.fact, IndexDisagrees | ChannelCountsDiffer) for item in findings)
+            assert any(isinstance(finding.fact, IndexDisagrees | ChannelCountsDiffer) for finding in findings)
 
 
-def test_a_file_with_more_messages_than_its_summary_says_gives_them_all(tmp_path):
+def test_a_file_with_more_messages_than_in_its_summary_is_read_completely(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     statistics = Log(path).summary.statistics
 
     def change(section):
-        at = place(section, struct.pack("<QH", statistics.message_count, statistics.schema_count))
+        at = find(section, struct.pack("<QH", statistics.message_count, statistics.schema_count))
         struct.pack_into("<Q", section, at, 20)
         return section
 
     with_summary(path, change)
-    found, findings, _ = read(path)
-    assert found == sent
+    messages, findings, _ = read(path)
+    assert messages == sent
     assert findings[0].fact == MessageCountDiffers(20, len(sent))
 
 
 @pytest.mark.parametrize("field", ["start", "end"])
-def test_a_chunk_whose_times_are_not_those_of_its_messages_is_found(tmp_path, field):
+def test_a_chunk_whose_times_differ_from_its_messages_is_reported(tmp_path, field):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     whole = bytearray(path.read_bytes())
     at = sorted(Log(path).summary.chunks)[1] + (9 if field == "start" else 17)
     whole[at] ^= 0x01
     path.write_bytes(whole)
-    found, findings, _ = read(path)
-    assert found == sent
+    messages, findings, _ = read(path)
+    assert messages == sent
     assert {IndexDisagrees(1, "other values"), ChunkTimesDiffer(1)} <= {finding.fact for finding in findings}
 
 
-def test_a_damaged_summary_is_said_and_the_data_read_without_it(tmp_path):
+def test_a_damaged_summary_is_reported_and_the_data_are_read_without_it(tmp_path):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     whole = bytearray(path.read_bytes())
     whole[Log(path).summary.footer.summary_start + 30] ^= 0x01
     path.write_bytes(whole)
-    found, findings, _ = read(path)
-    assert found == sent
-    assert findings[0].fact == SummaryDamaged("the checksum of the summary does not fit", len(sent))
+    messages, findings, _ = read(path)
+    assert messages == sent
+    assert findings[0].fact == SummaryDamaged("the checksum of the summary does not match", len(sent))

@@ -1,4 +1,4 @@
-"""Chunks taken as a whole give what their messages give one by one: values, times, order, findings and errors."""
+"""The fast path for uniform chunks gives the same values, times, order, findings and errors as single messages."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from mcap_ros2.writer import Writer as Ros2Writer
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.container import chunks_ahead
+from cdtool.formats.mcap.container import chunk_read_ahead
 from cdtool.formats.mcap.container.log import Log
-from cdtool.formats.mcap.uniform import UniformTaker
+from cdtool.formats.mcap.uniform import UniformChunkReader
 from cdtool.messages.schemas import DEFINITIONS
-from tests.formats.mcap_damage.assembly import Ending, assemble, blocks_of, lying
+from tests.formats.mcap_damage.assembly import Ending, assemble, blocks_of, with_false_header
 from tests.formats.mcap_damage.messages import DEFINITIONS as TOPICS
 from tests.formats.mcap_damage.messages import START as START_S
 from tests.formats.mcap_damage.messages import payload
@@ -33,25 +33,25 @@ JOINTS = ("c", "a", "b")
 
 
 @pytest.fixture(scope="module")
-def taken():
-    """How many chunks were taken, and how many were not."""
-    counted = {True: 0, False: 0}
-    take = UniformTaker.take
+def fast_path_chunks():
+    """Yield the numbers of chunks that the fast path has read (True) and has not read (False)."""
+    counts = {True: 0, False: 0}
+    take = UniformChunkReader.take
 
     def counting(self, content, rows, knows):
-        found = take(self, content, rows, knows)
-        counted[found is not None] += 1
-        return found
+        result = take(self, content, rows, knows)
+        counts[result is not None] += 1
+        return result
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(UniformTaker, "take", counting)
-        yield counted
+        patch.setattr(UniformChunkReader, "take", counting)
+        yield counts
 
 
 def read(path, wanted, cores):
-    """Columns as bytes and everything told, or the error."""
+    """Return the columns as bytes, the origin and the findings, or the error."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chunks_ahead, "usable_cores", lambda: cores)
+        patch.setattr(chunk_read_ahead, "usable_cores", lambda: cores)
         try:
             source = Mcap().columns(path, wanted)
         except RecordingError as fault:
@@ -64,26 +64,26 @@ def read(path, wanted, cores):
 
 
 def bits(values):
-    """The bytes of float64 numbers; one NaN is as good as another."""
+    """Return float64 numbers as bytes; all NaN are equal."""
     return np.where(np.isnan(values), np.nan, np.ascontiguousarray(values, dtype=np.float64)).tobytes()
 
 
 def same(path, fields, clock="log", joints=JOINTS):
-    """The same with chunks read ahead by several threads and without; what it is."""
+    """Check that reading ahead with several threads gives the same as reading without; return the result."""
     wanted = ChannelMap(
         TimeSource(clock=clock),
         tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in fields),
         joints,
         topics=True,
     )
-    alone = read(path, wanted, cores=1)
-    assert read(path, wanted, cores=3) == alone
-    return alone
+    one_core = read(path, wanted, cores=1)
+    assert read(path, wanted, cores=3) == one_core
+    return one_core
 
 
 @st.composite
 def recordings(draw):
-    """A definition, runs of the same message and single ones, times [ns] in any order, a topic beside."""
+    """Return a definition, repeated and single messages, times [ns] in any order, and messages of another topic."""
     text, values = draw(definitions())
     runs = draw(st.lists(st.tuples(values, st.sampled_from([1, 2, 60])), min_size=1, max_size=5))
     messages = [message for message, count in runs for _ in range(count)]
@@ -100,7 +100,7 @@ def recordings(draw):
     st.sampled_from(["log", "publish"]),
     st.data(),
 )
-def test_any_messages_are_the_same_taken_and_one_by_one(recording, compression, chunk_size, clock, data):
+def test_the_fast_path_reads_any_messages_like_one_by_one(recording, compression, chunk_size, clock, data):
     text, messages, times = recording
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.mcap"
@@ -122,7 +122,7 @@ def test_any_messages_are_the_same_taken_and_one_by_one(recording, compression, 
 
 
 def joint_states(path, count=400, chunk_size=2000, change=None, stamp=None, repeated=1):
-    """A log of /joint_states and /force; `change(i, message)` alters messages."""
+    """Write a log of /joint_states and /force; `change(i, message)` changes messages."""
     rng = np.random.default_rng(3)
     with path.open("wb") as file:
         writer = Ros2Writer(file, chunk_size=chunk_size)
@@ -146,15 +146,15 @@ FIELDS = [("/joint_states", field) for field in ("position[:]", "velocity[b]", "
 
 
 @pytest.mark.parametrize("clock", ["log", "publish", "header"])
-def test_all_but_the_first_chunk_of_a_usual_log_are_taken(tmp_path, taken, clock):
+def test_the_fast_path_reads_all_but_the_first_chunk_of_a_usual_log(tmp_path, fast_path_chunks, clock):
     path = tmp_path / "log.mcap"
     joint_states(path)
-    before = dict(taken)
+    before = dict(fast_path_chunks)
     columns, _, findings = same(path, FIELDS, clock)
     chunks = len(Log(path).summary.chunks)
     assert chunks > 30
-    assert taken[True] - before[True] == chunks - 1
-    assert taken[False] == before[False]
+    assert fast_path_chunks[True] - before[True] == chunks - 1
+    assert fast_path_chunks[False] == before[False]
     assert not findings
     assert columns["/joint_states position[:]"][0] == (400, 3)
 
@@ -172,7 +172,7 @@ def test_all_but_the_first_chunk_of_a_usual_log_are_taken(tmp_path, taken, clock
     ],
     ids=["order", "names", "no efforts", "two positions", "empty", "frame"],
 )
-def test_messages_that_differ_now_and_then_are_the_same_taken_and_one_by_one(tmp_path, every, change):
+def test_the_fast_path_reads_messages_that_differ_sometimes_like_one_by_one(tmp_path, every, change):
     path = tmp_path / "log.mcap"
     joint_states(path, change=lambda i, message: change(message) if i % every == every - 1 else message)
     for clock in ("log", "header"):
@@ -191,13 +191,13 @@ def test_messages_that_differ_now_and_then_are_the_same_taken_and_one_by_one(tmp
     ],
     ids=["backwards", "again", "set", "before 1970", "standing"],
 )
-def test_stamps_in_any_order_are_told_the_same(tmp_path, stamp):
+def test_stamps_in_any_order_have_the_same_findings(tmp_path, stamp):
     path = tmp_path / "log.mcap"
     joint_states(path, stamp=stamp)
     same(path, FIELDS, "header")
 
 
-def test_two_topics_of_one_type_and_one_that_is_not_asked_for(tmp_path):
+def test_two_topics_of_one_type_and_one_that_is_not_requested(tmp_path):
     path = tmp_path / "log.mcap"
     joint_states(path, repeated=2)
     same(path, [*FIELDS, ("/joint_states_2", "effort[a]")], "header")
@@ -212,7 +212,7 @@ def unchanged(_, message):
 
 
 def blocks(everywhere=False, count=600, size=20, change=unchanged):
-    """Chunks of three topics in turn: two in CDR, one of ROS 1."""
+    """Return chunks with alternating messages of three topics: two in CDR, one of ROS 1."""
     messages = []
     for i in range(count):
         topic, time = WANTED[i % 3][0], START_S + i * 10**6
@@ -225,33 +225,33 @@ def written(path, parts, ending=None):
     return path
 
 
-def test_definitions_that_are_repeated_in_every_chunk_are_passed_over(tmp_path, taken):
+def test_definitions_that_are_repeated_in_every_chunk_are_skipped(tmp_path, fast_path_chunks):
     path = written(tmp_path / "log.mcap", blocks(everywhere=True))
-    before = taken[True]
+    before = fast_path_chunks[True]
     columns, _, findings = same(path, WANTED)
-    assert taken[True] - before == 29
+    assert fast_path_chunks[True] - before == 29
     assert not findings
     assert sorted(shape for shape, _, _ in columns.values()) == [(200,)] * 3
 
 
 @pytest.mark.parametrize("at", [0, 1, 7, 28])
 @pytest.mark.parametrize("kind", ["another type", "another topic"])
-def test_a_channel_that_is_defined_anew_is_lost_the_same(tmp_path, at, kind):
+def test_a_redefined_channel_is_lost_on_the_fast_path_too(tmp_path, at, kind):
     force = TOPICS["/force"]
     other = replace(force, topic="/elsewhere") if kind == "another topic" else replace(force, encoding="json")
     parts = blocks()
-    parts[at] = replace(parts[at], behind=other.records)
+    parts[at] = replace(parts[at], after=other.records)
     _, _, findings = same(written(tmp_path / "log.mcap", parts), WANTED)
     assert any("defined twice" in finding for finding in findings)
 
 
 def shorter(index):
-    """Claims one message fewer of a channel and one more of the next."""
+    """Return an index with one message fewer of a channel and one more of the next."""
     return replace(index, offsets={channel: at - 16 * (channel == 3) for channel, at in index.offsets.items()})
 
 
 @pytest.mark.parametrize(
-    "lie",
+    "falsify",
     [
         shorter,
         lambda index: replace(index, index_length=index.index_length + 160),
@@ -263,8 +263,10 @@ def shorter(index):
     ids=["shifted", "longer", "shorter", "none", "one", "exchanged"],
 )
 @pytest.mark.parametrize("which", [range(30), range(5, 6), range(20, 30)], ids=["all", "one", "last"])
-def test_lies_about_how_many_messages_a_chunk_holds_change_nothing(tmp_path, lie, which):
-    ending = Ending(indexes=lambda found: [lie(index) if i in which else index for i, index in enumerate(found)])
+def test_false_message_counts_of_a_chunk_change_nothing(tmp_path, falsify, which):
+    ending = Ending(
+        indexes=lambda all_indexes: [falsify(index) if i in which else index for i, index in enumerate(all_indexes)]
+    )
     path = written(tmp_path / "log.mcap", blocks(), ending)
     columns = same(path, WANTED)[0]
     if not isinstance(columns, str):
@@ -273,14 +275,14 @@ def test_lies_about_how_many_messages_a_chunk_holds_change_nothing(tmp_path, lie
 
 
 @pytest.mark.parametrize("off", [lambda n: n - 20, lambda n: n + 10**6, lambda _: 0, lambda _: 1])
-def test_lies_about_how_many_messages_there_are_change_nothing(tmp_path, off):
+def test_false_message_counts_of_the_file_change_nothing(tmp_path, off):
     ending = Ending(counts=lambda counts: {channel: off(count) for channel, count in counts.items()})
     same(written(tmp_path / "log.mcap", blocks(), ending), WANTED)
 
 
 @pytest.mark.parametrize("lost", [(0,), (1,), (11, 12, 20), tuple(range(2, 30, 2))])
-def test_behind_chunks_that_are_lost_rows_move_up(tmp_path, lost):
-    parts = [lying(part, crc=1) if i in lost else part for i, part in enumerate(blocks())]
+def test_rows_after_lost_chunks_are_consecutive(tmp_path, lost):
+    parts = [with_false_header(part, crc=1) if i in lost else part for i, part in enumerate(blocks())]
     columns, _, findings = same(written(tmp_path / "log.mcap", parts), WANTED)
     assert any("checksum" in finding for finding in findings)
     kept = [i for i in range(600) if i // 20 not in lost]
@@ -289,7 +291,7 @@ def test_behind_chunks_that_are_lost_rows_move_up(tmp_path, lost):
         assert columns[f"{topic} {field}"][1] == expected.tobytes()
 
 
-def test_messages_cut_short_are_lost_the_same(tmp_path):
+def test_truncated_messages_are_lost_on_the_fast_path_too(tmp_path):
     def cut(i, message):
         return replace(message, payload=message.payload[:-3]) if i % 50 == 49 else message
 
@@ -298,7 +300,7 @@ def test_messages_cut_short_are_lost_the_same(tmp_path):
 
 
 @pytest.mark.parametrize("time", [2**63, 2**64 - 1, 0])
-def test_times_of_no_clock_are_the_same(tmp_path, time):
+def test_invalid_times_are_the_same_on_the_fast_path(tmp_path, time):
     def without(i, message):
         return replace(message, time=time) if i % 100 == 70 or i < 3 else message
 

@@ -1,1 +1,1 @@
-"""Damaged MCAP files, each with the truth that a careful person would read; seeded."""
+"""Damaged MCAP files from a seed, each with its expected messages and findings."""

@@ -1,4 +1,4 @@
-"""Any seed: `python -m tests.formats.mcap_damage SEED COUNT [FIRST]` prints what fails, kind by kind."""
+"""Run the cases of any seed: `python -m tests.formats.mcap_damage SEED COUNT [FIRST]` prints the failures by kind."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ import time
 from collections import defaultdict
 from pathlib import Path
 
+from tests.formats.mcap_damage.assessment import LONGEST, faults, warm_up
 from tests.formats.mcap_damage.generator import cases
-from tests.formats.mcap_damage.judge import LONGEST, faults, warm_up
 
 
 def main(seed: int, count: int, first: int = 0) -> int:
-    """Run the cases; 1 where any failed."""
+    """Run the cases; return 1 if any case fails, otherwise 0."""
     failed: dict[str, list[str]] = defaultdict(list)
     slowest = (0.0, "")
     with tempfile.TemporaryDirectory() as folder:
         warm_up(Path(folder) / "case.mcap")
         for number, case in enumerate(cases(seed, count, first), start=first):
             start = time.process_time()
-            found = faults(case, Path(folder) / "case.mcap")
-            took = time.process_time() - start
-            slowest = max(slowest, (took, f"{number} {case.name}"))
-            if took > LONGEST:
-                found.append(f"took {took:.1f} s of a processor")
-            if found:
-                failed[case.kind].append(f"{number} {case.name}: {'; '.join(found)}")
+            problems = faults(case, Path(folder) / "case.mcap")
+            seconds = time.process_time() - start
+            slowest = max(slowest, (seconds, f"{number} {case.name}"))
+            if seconds > LONGEST:
+                problems.append(f"needed {seconds:.1f} s of processor time")
+            if problems:
+                failed[case.kind].append(f"{number} {case.name}: {'; '.join(problems)}")
     for kind, texts in failed.items():
         print(f"{kind}: {len(texts)} fail")
         for text in texts:
             print(f"    {text}")
-    print(f"{sum(map(len, failed.values()))} of {count} fail; the slowest took {slowest[0]:.2f} s ({slowest[1]})")
+    print(f"{sum(map(len, failed.values()))} of {count} fail; the slowest needed {slowest[0]:.2f} s ({slowest[1]})")
     return 1 if failed else 0
 
 

@@ -1,4 +1,4 @@
-"""A whole file of parts: chunks with their message indexes, bare records, and a summary that tells of them."""
+"""Assemble a file from parts: chunks with their message indexes, single records, and a summary of them."""
 
 from __future__ import annotations
 
@@ -15,38 +15,41 @@ from tests.formats.mcap_damage.truth import Message
 
 @dataclass(frozen=True)
 class Block:
-    """A chunk: definitions (and whatever else), its messages, what stands behind them; `lies` go to records.chunk."""
+    """A chunk: records before its messages (definitions), its messages, and records after them.
+
+    `false_fields` are arguments of `records.chunk`.
+    """
 
     messages: tuple[Message, ...] = ()
     before: bytes = b""
-    behind: bytes = b""
+    after: bytes = b""
     compression: str = ""
-    lies: Mapping[str, Any] = field(default_factory=dict)
+    false_fields: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def content(self) -> bytes:
-        """The records, uncompressed."""
-        return self.before + b"".join(record_of(message) for message in self.messages) + self.behind
+        """Return the uncompressed records."""
+        return self.before + b"".join(record_of(message) for message in self.messages) + self.after
 
     @property
     def times(self) -> tuple[int, int]:
-        """Earliest and latest log time [ns]."""
+        """Return earliest and latest log time [ns]."""
         times = [message.time for message in self.messages] or [0]
         return min(times), max(times)
 
     def entries(self) -> dict[int, list[tuple[int, int]]]:
-        """Channel -> (time, offset) of its messages."""
-        found: dict[int, list[tuple[int, int]]] = {}
+        """Return (time, offset) of the messages per channel."""
+        entries: dict[int, list[tuple[int, int]]] = {}
         at = len(self.before)
         for message in self.messages:
-            found.setdefault(CHANNELS[message.topic], []).append((message.time, at))
+            entries.setdefault(CHANNELS[message.topic], []).append((message.time, at))
             at += len(record_of(message))
-        return found
+        return entries
 
 
 @dataclass(frozen=True)
 class Index:
-    """What a chunk index tells; see records.chunk_index."""
+    """The fields of a chunk index; see records.chunk_index."""
 
     times: tuple[int, int]
     start: int
@@ -58,14 +61,14 @@ class Index:
 
     @property
     def record(self) -> bytes:
-        """The chunk index as bytes."""
+        """Return the chunk index as bytes."""
         offsets, length = self.offsets, self.index_length
         return records.chunk_index(self.times, self.start, self.length, offsets, length, self.compression, self.sizes)
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a file ends: with a summary or not, with CRCs or not, and in what the summary lies."""
+    """The end of a file: with or without summary and CRCs, and functions that make the summary's values false."""
 
     summary: bool = True
     crc: bool = True
@@ -77,31 +80,31 @@ class Ending:
 
 
 def blocks_of(messages: Sequence[Message], size: int, compression: str, everywhere: bool = False) -> list[Block]:
-    """Chunks of `size` messages; the definitions stand in the first one, or in every one."""
-    made = []
+    """Return chunks of `size` messages, with definitions in the first chunk, or in every chunk."""
+    blocks = []
     for at in range(0, len(messages), size):
         before = ALL_DEFINITIONS if everywhere or at == 0 else b""
-        made.append(Block(tuple(messages[at : at + size]), before, compression=compression))
-    return made
+        blocks.append(Block(tuple(messages[at : at + size]), before, compression=compression))
+    return blocks
 
 
 def assemble(parts: Sequence[Block | bytes], ending: Ending | None = None) -> bytes:
-    """The file of these parts; bare records in between are taken as they are, and the summary knows nothing of them."""
+    """Return the file of these parts; single records are inserted unchanged, and the summary does not include them."""
     ending = ending or Ending()
-    made = bytearray(records.MAGIC + records.header())
+    data = bytearray(records.MAGIC + records.header())
     indexes: list[Index] = []
     counts: Counter[int] = Counter()
     for part in parts:
         if isinstance(part, bytes):
-            made += part
+            data += part
             continue
         counts.update({channel: len(entries) for channel, entries in part.entries().items()})
-        indexes.append(_add(made, part))
-    made += records.data_end(zlib.crc32(made) if ending.data_crc else 0)
+        indexes.append(_add(data, part))
+    data += records.data_end(zlib.crc32(data) if ending.data_crc else 0)
     if not ending.summary:
-        return bytes(made) + records.ending(b"", 0, ending.crc)
+        return bytes(data) + records.ending(b"", 0, ending.crc)
     times = [time for index in indexes for time in index.times]
-    told = ending.counts(dict(counts))
+    stated_counts = ending.counts(dict(counts))
     summary = ending.definitions
     summary += records.statistics(
         sum(counts.values()) + ending.count_off,
@@ -109,26 +112,28 @@ def assemble(parts: Sequence[Block | bytes], ending: Ending | None = None) -> by
         4,
         len(indexes),
         (min(times, default=0), max(times, default=0)),
-        told,
+        stated_counts,
     )
     summary += b"".join(index.record for index in ending.indexes(indexes))
-    return bytes(made) + records.ending(summary, len(made), ending.crc)
+    return bytes(data) + records.ending(summary, len(data), ending.crc)
 
 
-def _add(made: bytearray, block: Block) -> Index:
-    content, start = block.content, len(made)
-    options = {"compression": block.compression, **block.lies}
+def _add(data: bytearray, block: Block) -> Index:
+    content, start = block.content, len(data)
+    options = {"compression": block.compression, **block.false_fields}
     chunk = records.chunk(content, options.pop("times", block.times), **options)
-    made += chunk
+    data += chunk
     offsets = {}
-    behind = len(made)
+    chunk_end = len(data)
     for number, entries in block.entries().items():
-        offsets[number] = len(made)
-        made += records.message_index(number, entries)
+        offsets[number] = len(data)
+        data += records.message_index(number, entries)
     size = len(records.packed(block.compression, content))
-    return Index(block.times, start, len(chunk), offsets, len(made) - behind, block.compression, (size, len(content)))
+    return Index(
+        block.times, start, len(chunk), offsets, len(data) - chunk_end, block.compression, (size, len(content))
+    )
 
 
-def lying(block: Block, **lies: Any) -> Block:
-    """The same chunk with lies in its header."""
-    return replace(block, lies={**block.lies, **lies})
+def with_false_header(block: Block, **false_fields: Any) -> Block:
+    """Return the same chunk with false fields in its header."""
+    return replace(block, false_fields={**block.false_fields, **false_fields})

@@ -1,6 +1,6 @@
-"""Small files that would become large ones: what they claim is not to be believed, and not to be tried out.
+"""Decompression bombs: small files that declare or have a very large decompressed size.
 
-Honest chunks stand around each bomb, whose messages must still be given; so none of these files is refused as a whole.
+Each bomb is between undamaged chunks, whose messages must still be read: no file is refused as a whole.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import zstandard
 
 from tests.formats.mcap_damage import records
-from tests.formats.mcap_damage.assembly import Block, assemble, blocks_of, lying
+from tests.formats.mcap_damage.assembly import Block, assemble, blocks_of, with_false_header
 from tests.formats.mcap_damage.messages import ALL_DEFINITIONS, START, ordinary
 from tests.formats.mcap_damage.truth import Case, Truth
 
@@ -22,40 +22,40 @@ _MIB = 1 << 20
 
 
 def bombs() -> dict[str, Callable[[], Case]]:
-    """Name -> what makes it; they are made one by one, since some are large."""
+    """Return the functions that create the bombs, by name; the bombs are created one by one, since some are large."""
     return {
-        "zstd, 10 GB of zeros, said to be 10 GB": lambda: _one(_zeros_zstd(_TEN_GB), _TEN_GB, "zstd"),
-        "zstd, 10 GB of zeros, said to be 1000 bytes": lambda: _one(_zeros_zstd(_TEN_GB), 1000, "zstd"),
-        "zstd, 10 GB of zeros, said to be 120 MiB": lambda: _one(_zeros_zstd(_TEN_GB), 120 * _MIB, "zstd"),
-        "zstd, 10 GB of zeros, said to be 2^63": lambda: _one(_zeros_zstd(_TEN_GB), 2**63, "zstd"),
+        "zstd, 10 GB of zeros, declared as 10 GB": lambda: _one(_zeros_zstd(_TEN_GB), _TEN_GB, "zstd"),
+        "zstd, 10 GB of zeros, declared as 1000 bytes": lambda: _one(_zeros_zstd(_TEN_GB), 1000, "zstd"),
+        "zstd, 10 GB of zeros, declared as 120 MiB": lambda: _one(_zeros_zstd(_TEN_GB), 120 * _MIB, "zstd"),
+        "zstd, 10 GB of zeros, declared as 2^63": lambda: _one(_zeros_zstd(_TEN_GB), 2**63, "zstd"),
         "zstd, 10 GB of zeros, its frame without a size": lambda: _one(_zeros_zstd(_TEN_GB, False), _TEN_GB, "zstd"),
         "zstd, a window of 2 GB": lambda: _one(_wide_window(), 1000, "zstd"),
-        "lz4, 10 GB of zeros, said to be 10 GB": lambda: _one(_zeros_lz4(_TEN_GB), _TEN_GB, "lz4"),
-        "lz4, 10 GB of zeros, said to be 1000 bytes": lambda: _one(_zeros_lz4(_TEN_GB), 1000, "lz4"),
-        "lz4, 10 GB of zeros, said to be 120 MiB": lambda: _one(_zeros_lz4(_TEN_GB), 120 * _MIB, "lz4"),
-        "no compression, said to be 2^63": lambda: _one(b"abc", 2**63, ""),
+        "lz4, 10 GB of zeros, declared as 10 GB": lambda: _one(_zeros_lz4(_TEN_GB), _TEN_GB, "lz4"),
+        "lz4, 10 GB of zeros, declared as 1000 bytes": lambda: _one(_zeros_lz4(_TEN_GB), 1000, "lz4"),
+        "lz4, 10 GB of zeros, declared as 120 MiB": lambda: _one(_zeros_lz4(_TEN_GB), 120 * _MIB, "lz4"),
+        "no compression, declared as 2^63": lambda: _one(b"abc", 2**63, ""),
         "zstd, 10 GB in 600 chunks of 16 MiB": lambda: _quilt("zstd", 600),
         "lz4, 10 GB in 600 chunks of 16 MiB": lambda: _quilt("lz4", 600),
         "zstd, half a million definitions": lambda: _many(records.channel(9, 0, "/t", "json")),
         "zstd, half a million different definitions": _many_definitions,
         "zstd, half a million messages of no channel": lambda: _many(records.message(999, START, b"")),
-        "zstd, half a million messages that nobody can decode": lambda: _many(records.message(9, START, b"{")),
+        "zstd, half a million undecodable messages": lambda: _many(records.message(9, START, b"{")),
         "zstd, half a million empty records": lambda: _many(records.record(0x80, b""), 3 * _MIB),
         "zstd, a message of 16 MB of brackets": lambda: _many(records.message(9, START, b"[" * 15 * _MIB), 1),
     }
 
 
-def honest() -> Case:
-    """The same file without a bomb."""
+def without_bomb() -> Case:
+    """Return the same file without a bomb."""
     return _around([])
 
 
 def _one(data: bytes, size: int, compression: str) -> Case:
-    return _around([lying(Block(compression=compression), data=data, size=size, crc=0)])
+    return _around([with_false_header(Block(compression=compression), data=data, size=size, crc=0)])
 
 
 def _around(blocks: list[Block], truth_of_it: bool = True) -> Case:
-    """`truth_of_it` False: the bomb holds messages of its own, and perhaps nothing that is a loss."""
+    """Return a file with these chunks between others; `truth_of_it` False: their messages are unknown, perhaps read."""
     rng = np.random.default_rng(5)
     messages = ordinary(rng, 48)
     around = blocks_of(messages, 8, "zstd", everywhere=True)
@@ -64,10 +64,10 @@ def _around(blocks: list[Block], truth_of_it: bool = True) -> Case:
 
 
 def _quilt(compression: str, count: int) -> Case:
-    """Every chunk honest about its size, and of a size that an honest chunk may have."""
+    """Return a file with many chunks, each of a correct and allowed size."""
     content = bytes(16 * _MIB)
     data = zstandard.compress(content) if compression == "zstd" else lz4.frame.compress(content)
-    return _around([lying(Block(compression=compression), data=data, size=len(content), crc=0)] * count)
+    return _around([with_false_header(Block(compression=compression), data=data, size=len(content), crc=0)] * count)
 
 
 def _many(record: bytes, size: int = 15 * _MIB) -> Case:
@@ -82,11 +82,13 @@ def _many_definitions() -> Case:
 def _filled(content: bytes) -> Case:
     content = ALL_DEFINITIONS + records.channel(9, 0, "/many", "json") + content
     block = Block(compression="zstd")
-    return _around([lying(block, data=zstandard.compress(content), size=len(content), crc=0)], truth_of_it=False)
+    return _around(
+        [with_false_header(block, data=zstandard.compress(content), size=len(content), crc=0)], truth_of_it=False
+    )
 
 
 def _zeros_zstd(size: int, with_size: bool = True) -> bytes:
-    """A frame of RLE blocks (RFC 8878, 3.1.1.2): four bytes for each 128 KiB."""
+    """Return a frame of RLE blocks (RFC 8878, 3.1.1.2): four bytes for each 128 KiB."""
     if with_size:
         head = struct.pack("<IBBQ", 0xFD2FB528, 0b1100_0000, 0x58, size)
     else:
@@ -100,15 +102,15 @@ def _zeros_zstd(size: int, with_size: bool = True) -> bytes:
 
 
 def _wide_window() -> bytes:
-    """A frame that asks for a window of 2 GB (RFC 8878, 3.1.1.1.2) and holds 1000 zeros."""
+    """Return a frame with a window of 2 GB (RFC 8878, 3.1.1.1.2) and 1000 zeros."""
     return struct.pack("<IBB", 0xFD2FB528, 0, 21 << 3) + struct.pack("<I", 1000 << 3 | 1 << 1 | 1)[:3] + b"\0"
 
 
 def _zeros_lz4(size: int) -> bytes:
-    """A frame of equal, independent blocks of 4 MiB, each as the compressor makes it."""
-    made = lz4.frame.compress(
+    """Return a frame of equal, independent blocks of 4 MiB."""
+    frame = lz4.frame.compress(
         bytes(8 * _MIB), block_size=lz4.frame.BLOCKSIZE_MAX4MB, block_linked=False, store_size=False
     )
-    (length,) = struct.unpack_from("<I", made, 7)
-    block = made[7 : 7 + 4 + length]
-    return made[:7] + block * (size // (4 * _MIB)) + bytes(4)
+    (length,) = struct.unpack_from("<I", frame, 7)
+    block = frame[7 : 7 + 4 + length]
+    return frame[:7] + block * (size // (4 * _MIB)) + bytes(4)

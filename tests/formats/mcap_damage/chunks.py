@@ -1,4 +1,4 @@
-"""Chunks in another order, twice, gone, or with headers that lie about sizes, times, CRC and compression."""
+"""Chunks in another order, repeated, missing, or with false sizes, times, CRC or compression in their headers."""
 
 from __future__ import annotations
 
@@ -11,89 +11,89 @@ import numpy as np
 import zstandard
 
 from tests.formats.mcap_damage import records
-from tests.formats.mcap_damage.assembly import Block, Ending, assemble, blocks_of, lying
+from tests.formats.mcap_damage.assembly import Block, Ending, assemble, blocks_of, with_false_header
 from tests.formats.mcap_damage.messages import ordinary, record_of
 from tests.formats.mcap_damage.truth import Case, Message, Truth, without
 
 COMPRESSIONS = ("", "lz4", "zstd")
 
 
-def drawn(
+def draw_blocks(
     rng: np.random.Generator, compression: str | None = None, everywhere: bool | None = None
 ) -> tuple[list[Message], list[Block]]:
-    """Messages in eight chunks; their definitions in the first chunk or in every one."""
+    """Return messages and eight chunks of them; the definitions are in the first chunk, or in every chunk."""
     compression = COMPRESSIONS[int(rng.integers(3))] if compression is None else compression
     everywhere = bool(rng.random() < 0.5) if everywhere is None else everywhere
     messages = ordinary(rng, 64)
     return messages, blocks_of(messages, 8, compression, everywhere)
 
 
-def ending(rng: np.random.Generator) -> Ending:
-    """Mostly with a summary; sometimes without its CRC, or with one of the data."""
+def draw_ending(rng: np.random.Generator) -> Ending:
+    """Return an ending, usually with a summary; sometimes without the summary's CRC, or with a CRC of the data."""
     without_any, without_crc, data_crc = rng.random(3) < (0.25, 0.2, 0.2)
     return Ending(not without_any, not without_crc, bool(data_crc))
 
 
 def swapped_chunks(rng: np.random.Generator) -> Case:
-    """Two chunks have changed places: nothing is lost, whatever the order."""
-    messages, blocks = drawn(rng, everywhere=True)
+    """Exchange two chunks: nothing is lost."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     i, k = rng.choice(len(blocks), 2, replace=False).tolist()
     blocks[i], blocks[k] = blocks[k], blocks[i]
     truth = Truth(tuple(messages), tuple(messages), loss=False)
-    return Case(f"swapped_chunks {i} and {k}", assemble(blocks, ending(rng)), truth)
+    return Case(f"swapped_chunks {i} and {k}", assemble(blocks, draw_ending(rng)), truth)
 
 
-def swapped_behind_the_index(rng: np.random.Generator) -> Case:
-    """Two chunks of equal length have changed places, and the index still has the old ones."""
-    messages, blocks = drawn(rng, "", everywhere=True)
+def swapped_without_the_index(rng: np.random.Generator) -> Case:
+    """Exchange two chunks of equal length, without changing the index."""
+    messages, blocks = draw_blocks(rng, "", everywhere=True)
     parts = {block.messages: records.chunk(block.content, block.times) for block in blocks}
     one, two = next((a, b) for a, b in combinations(parts.values(), 2) if len(a) == len(b))
     marked = assemble(blocks, Ending()).replace(one, b"\xfe" * len(one))
     data = marked.replace(two, one).replace(b"\xfe" * len(one), two)
-    return Case("swapped_behind_the_index", data, Truth(tuple(messages), tuple(messages)))
+    return Case("swapped_without_the_index", data, Truth(tuple(messages), tuple(messages)))
 
 
 def repeated_chunk(rng: np.random.Generator) -> Case:
-    """A chunk stands there twice: its messages may be given twice, once they must."""
-    messages, blocks = drawn(rng)
+    """Repeat a chunk: its messages must be read once, and may be read twice."""
+    messages, blocks = draw_blocks(rng)
     i, k = int(rng.integers(len(blocks))), int(rng.integers(len(blocks)))
     twice = blocks[i]
     blocks.insert(max(i, k) + 1, twice)
-    truth = Truth(tuple(messages), tuple(messages), also=twice.messages)
-    return Case(f"repeated_chunk {i}", assemble(blocks, ending(rng)), truth)
+    truth = Truth(tuple(messages), tuple(messages), optional=twice.messages)
+    return Case(f"repeated_chunk {i}", assemble(blocks, draw_ending(rng)), truth)
 
 
 def chunk_copied_over_another(rng: np.random.Generator) -> Case:
-    """A bare copy of a chunk stands where the index knows none."""
-    messages, blocks = drawn(rng)
+    """Insert a copy of a chunk that is not in the index."""
+    messages, blocks = draw_blocks(rng)
     i, k = int(rng.integers(len(blocks))), int(rng.integers(len(blocks)))
     block = blocks[i]
     parts: list[Block | bytes] = list(blocks)
     parts.insert(max(i, k) + 1, records.chunk(block.content, block.times, block.compression))
-    truth = Truth(tuple(messages), tuple(messages), also=block.messages)
-    return Case(f"chunk_copied_over_another {i}", assemble(parts, ending(rng)), truth)
+    truth = Truth(tuple(messages), tuple(messages), optional=block.messages)
+    return Case(f"chunk_copied_over_another {i}", assemble(parts, draw_ending(rng)), truth)
 
 
 def missing_chunk(rng: np.random.Generator) -> Case:
-    """A chunk is cut out of the file; the summary's places are all wrong behind it."""
-    messages, blocks = drawn(rng, everywhere=True)
-    how = ending(rng)
+    """Remove a chunk: all positions after it in the summary are wrong."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
+    how = draw_ending(rng)
     i = int(rng.integers(len(blocks)))
     block = blocks[i]
     data = assemble(blocks, how)
-    made = records.chunk(block.content, block.times, block.compression)
+    chunk = records.chunk(block.content, block.times, block.compression)
     rest = without(messages, block.messages)
-    truth = Truth(tuple(messages), rest, silent=not (how.summary or how.data_crc), loss=None)
-    return Case(f"missing_chunk {i}", data.replace(made, b"", 1), truth)
+    truth = Truth(tuple(messages), rest, undetectable=not (how.summary or how.data_crc), loss=None)
+    return Case(f"missing_chunk {i}", data.replace(chunk, b"", 1), truth)
 
 
-def lying_chunk(rng: np.random.Generator) -> Case:
-    """A chunk's header lies; all other chunks must be given, and their definitions are in every chunk."""
-    messages, blocks = drawn(rng, everywhere=True)
+def false_chunk_header(rng: np.random.Generator) -> Case:
+    """Set a false field in a chunk's header: all other chunks, which have their own definitions, must be read."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     i = int(rng.integers(len(blocks)))
     block = blocks[i]
     size, data = len(block.content), records.packed(block.compression, block.content)
-    lies: list[dict[str, Any]] = [
+    false_fields: list[dict[str, Any]] = [
         {"size": size - 1},
         {"size": size + 1},
         {"size": 0},
@@ -122,61 +122,67 @@ def lying_chunk(rng: np.random.Generator) -> Case:
         {"data": bytes(len(data))},
         {"data": rng.bytes(len(data))},
     ]
-    lie = lies[int(rng.integers(len(lies)))]
-    blocks[i] = lying(block, **lie)
-    key, value = next(iter(lie.items()))
+    false_field = false_fields[int(rng.integers(len(false_fields)))]
+    blocks[i] = with_false_header(block, **false_field)
+    key, value = next(iter(false_field.items()))
     shown = value if isinstance(value, int) else value[:8]
     truth = Truth(tuple(messages), without(messages, block.messages))
-    return Case(f"lying_chunk {i} {block.compression or 'none'} {key} {shown!r}", assemble(blocks, ending(rng)), truth)
+    return Case(
+        f"false_chunk_header {i} {block.compression or 'none'} {key} {shown!r}",
+        assemble(blocks, draw_ending(rng)),
+        truth,
+    )
 
 
-def lying_times(rng: np.random.Generator) -> Case:
-    """A chunk's header tells other times than its messages: they are what counts."""
-    messages, blocks = drawn(rng)
+def false_chunk_times(rng: np.random.Generator) -> Case:
+    """Set false times in a chunk's header: the times of the messages must be read."""
+    messages, blocks = draw_blocks(rng)
     i = int(rng.integers(len(blocks)))
     times = [(0, 0), (2**64 - 1, 0), (0, 2**64 - 1), (5, 4)][int(rng.integers(4))]
-    blocks[i] = lying(blocks[i], times=times)
-    return Case(f"lying_times {times}", assemble(blocks, ending(rng)), Truth(tuple(messages), tuple(messages)))
+    blocks[i] = with_false_header(blocks[i], times=times)
+    return Case(
+        f"false_chunk_times {times}", assemble(blocks, draw_ending(rng)), Truth(tuple(messages), tuple(messages))
+    )
 
 
 def chunk_without_crc(rng: np.random.Generator) -> Case:
-    """A CRC of 0 is none: given, and marked."""
-    messages, blocks = drawn(rng)
+    """Set a chunk's CRC to 0: its messages must be read, and reported as unverified."""
+    messages, blocks = draw_blocks(rng)
     i = int(rng.integers(len(blocks)))
-    blocks[i] = lying(blocks[i], crc=0)
-    how = ending(rng)
+    blocks[i] = with_false_header(blocks[i], crc=0)
+    how = draw_ending(rng)
     truth = Truth(tuple(messages), tuple(messages), loss=False, unverified=not how.data_crc)
     return Case(f"chunk_without_crc {i}", assemble(blocks, how), truth)
 
 
 def other_frames(rng: np.random.Generator) -> Case:
-    """Frames as other writers make them: several, with checksums, without sizes; chunks with more fields."""
-    messages, blocks = drawn(rng)
-    made = [_framed(block, rng) for block in blocks]
+    """Compress chunks like other writers: several frames, with checksums, without sizes; chunks with more fields."""
+    messages, blocks = draw_blocks(rng)
+    frames = [_framed(block, rng) for block in blocks]
     truth = Truth(tuple(messages), tuple(messages), loss=False)
-    return Case(f"other_frames {blocks[0].compression or 'none'}", assemble(made, ending(rng)), truth)
+    return Case(f"other_frames {blocks[0].compression or 'none'}", assemble(frames, draw_ending(rng)), truth)
 
 
 def empty_chunk(rng: np.random.Generator) -> Case:
-    """A chunk without a record, or with definitions only."""
-    messages, blocks = drawn(rng)
+    """Insert a chunk without records, or with definitions only."""
+    messages, blocks = draw_blocks(rng)
     compression = blocks[0].compression
     before = blocks[0].before if rng.random() < 0.5 else b""
     blocks.insert(int(rng.integers(len(blocks) + 1)), Block((), before, compression=compression))
     truth = Truth(tuple(messages), tuple(messages), loss=False)
-    return Case("empty_chunk", assemble(blocks, ending(rng)), truth)
+    return Case("empty_chunk", assemble(blocks, draw_ending(rng)), truth)
 
 
 def nested_chunk(rng: np.random.Generator) -> Case:
-    """A chunk in a chunk, which the specification does not allow: what it holds is not there, or comes once."""
-    messages, blocks = drawn(rng, everywhere=True)
+    """Insert a chunk in a chunk, which the specification does not allow: its messages may be read at most once."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     i, k = 3, 4
     inside = records.chunk(blocks[k].content, blocks[k].times, blocks[k].compression)
-    held, hidden = blocks[i], blocks[k].messages
-    blocks[i] = replace(held, behind=inside)
+    block, hidden = blocks[i], blocks[k].messages
+    blocks[i] = replace(block, after=inside)
     del blocks[k]
-    truth = Truth(without(messages, hidden), without(messages, hidden), also=hidden)
-    return Case("nested_chunk", assemble(blocks, ending(rng)), truth)
+    truth = Truth(without(messages, hidden), without(messages, hidden), optional=hidden)
+    return Case("nested_chunk", assemble(blocks, draw_ending(rng)), truth)
 
 
 def _framed(block: Block, rng: np.random.Generator) -> Block:
@@ -201,17 +207,17 @@ def _framed(block: Block, rng: np.random.Generator) -> Block:
         ]
     else:
         choices = [content]
-    return lying(block, data=choices[int(rng.integers(len(choices)))], **extra)
+    return with_false_header(block, data=choices[int(rng.integers(len(choices)))], **extra)
 
 
-def lying_inside(rng: np.random.Generator) -> Case:
-    """Inside a chunk whose CRC fits, a record lies: what stands before it in the chunk, and all other chunks."""
-    messages, blocks = drawn(rng, everywhere=True)
+def false_record_in_chunk(rng: np.random.Generator) -> Case:
+    """Insert a false record in a chunk with a valid CRC: records before it, and all other chunks, must be read."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     i = int(rng.integers(len(blocks)))
     block = blocks[i]
     kept = int(rng.integers(len(block.messages)))
     whole = record_of(block.messages[kept])
-    lies = {
+    false_fields = {
         "a length beyond the chunk": whole[:1] + (10**6).to_bytes(8, "little") + whole[9:],
         "a length of 2^63": whole[:1] + (2**63).to_bytes(8, "little") + whole[9:],
         "a length of 2^64 - 1": whole[:1] + b"\xff" * 8 + whole[9:],
@@ -219,24 +225,24 @@ def lying_inside(rng: np.random.Generator) -> Case:
         "an empty message": records.record(records.MESSAGE, b""),
         "kind 0": b"\0" + whole[1:],
     }
-    name = list(lies)[int(rng.integers(len(lies)))]
+    name = list(false_fields)[int(rng.integers(len(false_fields)))]
     rest = b"".join(record_of(message) for message in block.messages[kept + 1 :])
-    blocks[i] = replace(block, messages=block.messages[:kept], behind=lies[name] + rest)
-    truth = Truth(tuple(messages), without(messages, block.messages[kept:]), loss=True, passed_over=True)
-    return Case(f"lying_inside {name}", assemble(blocks, ending(rng)), truth)
+    blocks[i] = replace(block, messages=block.messages[:kept], after=false_fields[name] + rest)
+    truth = Truth(tuple(messages), without(messages, block.messages[kept:]), loss=True, skippable=True)
+    return Case(f"false_record_in_chunk {name}", assemble(blocks, draw_ending(rng)), truth)
 
 
 KINDS = {
     swapped_chunks: 2,
-    swapped_behind_the_index: 1,
+    swapped_without_the_index: 1,
     repeated_chunk: 2,
     chunk_copied_over_another: 1,
     missing_chunk: 2,
-    lying_chunk: 8,
-    lying_times: 1,
+    false_chunk_header: 8,
+    false_chunk_times: 1,
     chunk_without_crc: 1,
     other_frames: 2,
     empty_chunk: 1,
     nested_chunk: 1,
-    lying_inside: 4,
+    false_record_in_chunk: 4,
 }

@@ -1,4 +1,4 @@
-"""Files that end too early: at every record's boundary, inside every kind of record, inside chunks at each place."""
+"""Files that are cut off: at boundaries of records, in all kinds of records, and anywhere in chunks."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from tests.formats.mcap_damage.truth import Case, Message, Truth, without
 
 
 def cut_at_a_boundary(rng: np.random.Generator) -> Case:
-    """Between two records of the top level."""
+    """Cut a file between two records of the top level."""
     log = write(rng, style(rng))
     return cut(log, log.spans[int(rng.integers(len(log.spans)))].start, "cut_at_a_boundary")
 
 
 def cut_in_a_record(rng: np.random.Generator) -> Case:
-    """Inside a record of a kind that is drawn, so that every kind is."""
+    """Cut a file in a record of a randomly chosen kind, so that all kinds occur."""
     log = write(rng, style(rng))
     kinds = sorted({span.opcode for span in log.spans})
     kind = kinds[int(rng.integers(len(kinds)))]
@@ -26,58 +26,60 @@ def cut_in_a_record(rng: np.random.Generator) -> Case:
 
 
 def cut_in_a_chunk(rng: np.random.Generator) -> Case:
-    """Inside a chunk's data, at each place alike."""
+    """Cut a file in a chunk's data, with equal probability for all bytes."""
     log = write(rng, _chunked(rng))
     span = log.chunks[int(rng.integers(len(log.chunks)))]
     return cut(log, int(rng.integers(span.data_at, span.end)), "cut_in_a_chunk")
 
 
 def cut_in_a_large_chunk(rng: np.random.Generator) -> Case:
-    """A chunk of many compressed blocks: those before the cut can be had."""
+    """Cut a file in a chunk of many compressed blocks: the blocks before the cut can be read."""
     log = write(rng, _chunked(rng), count=1200, chunk_size=1 << 20, filler=1500)
     span = log.chunks[0]
     return cut(log, int(rng.integers(span.data_at, span.end)), "cut_in_a_large_chunk")
 
 
 def cut_in_the_ending(rng: np.random.Generator) -> Case:
-    """Behind the last message: in the data end, summary, footer or the last magic bytes."""
+    """Cut a file after the last message: in the data end, summary, footer or the last magic bytes."""
     log = write(rng, style(rng))
     return cut(log, int(rng.integers(log.data_end, len(log.data))), "cut_in_the_ending")
 
 
 def cut(log: Log, at: int, kind: str) -> Case:
-    """The first `at` bytes. What lies whole before the cut must be given; of a cut chunk, what can be decompressed."""
-    must: list[Message] = []
-    mostly: list[Message] = []
+    """Return the first `at` bytes: complete messages before the cut must be read, and the readable part of a chunk."""
+    required: list[Message] = []
+    mostly_required: list[Message] = []
     for span in log.spans:
         if span.end <= at:
-            must += span.messages
+            required += span.messages
         elif span.opcode == records.CHUNK and span.data_at < at:
             content = unpacked(log.style.compression, log.data[span.data_at : at])
             whole = sum(opcode == records.MESSAGE for opcode, _, _ in inner(content))
             if log.style.compression:
-                mostly += span.messages[:whole]
+                mostly_required += span.messages[:whole]
             else:
-                must += span.messages[:whole]
-    # A chunk that is cut off has lost its CRC's meaning; a file without CRCs has none, unless the data's own is there.
+                required += span.messages[:whole]
+    # The CRC of a cut chunk cannot be checked; a file without chunk CRCs is only covered by the CRC of the data.
     covered = log.style.crcs and log.style.chunked
     covered = covered or (log.style.data_crc and at >= log.data_end + 13)
-    unverified = bool(without(must, () if not covered else [m for s in log.chunks if s.end <= at for m in s.messages]))
+    unverified = bool(
+        without(required, () if not covered else [m for s in log.chunks if s.end <= at for m in s.messages])
+    )
     truth = Truth(
         log.messages,
-        tuple(must),
-        tuple(mostly),
+        tuple(required),
+        tuple(mostly_required),
         loss=True,
         unverified=unverified and not (log.style.data_crc and at >= log.data_end + 13),
-        refusable=not must,
+        refusable=not required,
     )
     return Case(f"{kind} at byte {at} of {len(log.data)} ({log.style})", log.data[:at], truth)
 
 
 def _chunked(rng: np.random.Generator) -> Style:
-    drawn = style(rng)
+    options = style(rng)
     compression = ("", "lz4", "zstd")[int(rng.integers(3))]
-    return Style(compression, True, drawn.crcs, drawn.data_crc, drawn.summary, drawn.indexed)
+    return Style(compression, True, options.crcs, options.data_crc, options.summary, options.indexed)
 
 
 KINDS = {

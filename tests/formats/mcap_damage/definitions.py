@@ -1,4 +1,4 @@
-"""Schemas and channels that change, are missing, are too many, or lie about their own strings and maps."""
+"""Schemas and channels that change, are missing, are very many, or have false lengths of strings and maps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.formats.mcap_damage import records
 from tests.formats.mcap_damage.assembly import Block, Ending, assemble
-from tests.formats.mcap_damage.chunks import drawn, ending
+from tests.formats.mcap_damage.chunks import draw_blocks, draw_ending
 from tests.formats.mcap_damage.messages import ALL_DEFINITIONS, DEFINITIONS, START
 from tests.formats.mcap_damage.truth import Case, Message, Truth
 
@@ -18,15 +18,15 @@ _FORCE = DEFINITIONS["/force"]
 
 
 def redefined_schema(rng: np.random.Generator) -> Case:
-    """From some chunk on /force has another layout under its schema's id: read by the old one it is a wrong value."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Redefine the schema of /force at some chunk: with the old schema, messages after it would have wrong values."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     other = records.schema(_FORCE.schema, _FORCE.schema_name, "ros2msg", b"float64 other\nfloat64 data")
     return _redefined(rng, messages, blocks, other, "redefined_schema", _two_numbers)
 
 
 def redefined_channel(rng: np.random.Generator) -> Case:
-    """From some chunk on /force's channel id stands for another topic."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Redefine the channel of /force at some chunk as another topic."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     other = records.channel(_FORCE.channel, _FORCE.schema, "/other", "cdr")
     return _redefined(rng, messages, blocks, other, "redefined_channel", _other_topic)
 
@@ -48,10 +48,10 @@ def _redefined(
         parts.insert(i, other)
     else:
         parts[i] = replace(blocks[i], before=other)
-    # The channel's messages may all be refused; those of the other channels have nothing to do with it.
-    held = tuple(changed.get(id(message), message) for message in messages)
-    must = tuple(message for message in messages if message.topic != "/force")
-    return Case(f"{kind} in chunk {i}", assemble(parts, ending(rng)), Truth(held, must, unverified=False))
+    # All messages of this channel may be refused; the messages of other channels must be read.
+    written = tuple(changed.get(id(message), message) for message in messages)
+    required = tuple(message for message in messages if message.topic != "/force")
+    return Case(f"{kind} in chunk {i}", assemble(parts, draw_ending(rng)), Truth(written, required, unverified=False))
 
 
 def _two_numbers(message: Message) -> Message:
@@ -63,60 +63,62 @@ def _other_topic(message: Message) -> Message:
 
 
 def repeated_definitions(rng: np.random.Generator) -> Case:
-    """The same definitions again, in chunks and between them: that is allowed."""
-    messages, blocks = drawn(rng, everywhere=True)
+    """Repeat the definitions, in chunks and between them, which is allowed."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     parts: list[Block | bytes] = [*blocks[:3], ALL_DEFINITIONS, *blocks[3:]]
     return Case(
-        "repeated_definitions", assemble(parts, ending(rng)), Truth(tuple(messages), tuple(messages), loss=False)
+        "repeated_definitions", assemble(parts, draw_ending(rng)), Truth(tuple(messages), tuple(messages), loss=False)
     )
 
 
 def channel_without_its_schema(rng: np.random.Generator) -> Case:
-    """/force's schema is nowhere: its messages are lost and counted, the others are not."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Remove the schema of /force: its messages are lost and counted, all others are read."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     schema = records.schema(_FORCE.schema, _FORCE.schema_name, _FORCE.schema_encoding, _FORCE.schema_data)
     rest = ALL_DEFINITIONS.replace(schema, b"")
     blocks[0] = replace(blocks[0], before=rest)
-    must = tuple(message for message in messages if message.topic != "/force")
-    how = replace(ending(rng), definitions=rest)
-    return Case("channel_without_its_schema", assemble(blocks, how), Truth(tuple(messages), must, loss=True))
+    required = tuple(message for message in messages if message.topic != "/force")
+    how = replace(draw_ending(rng), definitions=rest)
+    return Case("channel_without_its_schema", assemble(blocks, how), Truth(tuple(messages), required, loss=True))
 
 
 def message_of_an_unknown_channel(rng: np.random.Generator) -> Case:
-    """/raw's channel is nowhere."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Remove the channel of /raw."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     channel = records.channel(DEFINITIONS["/raw"].channel, DEFINITIONS["/raw"].schema, "/raw", "ros1")
     rest = ALL_DEFINITIONS.replace(channel, b"")
     blocks[0] = replace(blocks[0], before=rest)
-    must = tuple(message for message in messages if message.topic != "/raw")
-    how = replace(ending(rng), definitions=rest)
-    truth = Truth(tuple(messages), must, loss=True, passed_over=True)
+    required = tuple(message for message in messages if message.topic != "/raw")
+    how = replace(draw_ending(rng), definitions=rest)
+    truth = Truth(tuple(messages), required, loss=True, skippable=True)
     return Case("message_of_an_unknown_channel", assemble(blocks, how), truth)
 
 
 def definitions_in_the_last_chunk(rng: np.random.Generator) -> Case:
-    """The definitions come after the messages; only a summary tells them in time."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Write the definitions after the messages: only a summary has them before."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     blocks[0] = replace(blocks[0], before=b"")
-    blocks[-1] = replace(blocks[-1], behind=ALL_DEFINITIONS)
-    how = ending(rng)
-    must = tuple(messages) if how.summary and how.crc else ()
+    blocks[-1] = replace(blocks[-1], after=ALL_DEFINITIONS)
+    how = draw_ending(rng)
+    required = tuple(messages) if how.summary and how.crc else ()
     return Case(
-        "definitions_in_the_last_chunk", assemble(blocks, how), Truth(tuple(messages), must, refusable=not must)
+        "definitions_in_the_last_chunk", assemble(blocks, how), Truth(tuple(messages), required, refusable=not required)
     )
 
 
 def schema_of_id_0(rng: np.random.Generator) -> Case:
-    """A schema with the id 0 is invalid and to be ignored; channels with the schema 0 have none."""
-    messages, blocks = drawn(rng)
-    odd = records.schema(0, "nobody/Knows", "ros2msg", b"float32 x") + records.schema(0, "other", "json", b"")
-    blocks[0] = replace(blocks[0], before=odd + blocks[0].before)
-    return Case("schema_of_id_0", assemble(blocks, ending(rng)), Truth(tuple(messages), tuple(messages), loss=False))
+    """Insert a schema with the id 0, which is invalid and ignored; channels with the schema id 0 have no schema."""
+    messages, blocks = draw_blocks(rng)
+    variants = records.schema(0, "nobody/Knows", "ros2msg", b"float32 x") + records.schema(0, "other", "json", b"")
+    blocks[0] = replace(blocks[0], before=variants + blocks[0].before)
+    return Case(
+        "schema_of_id_0", assemble(blocks, draw_ending(rng)), Truth(tuple(messages), tuple(messages), loss=False)
+    )
 
 
 def two_channels_of_a_topic(rng: np.random.Generator) -> Case:
-    """Two channels of one topic, each with a layout of its own: both are read by their own."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Insert a second channel of a topic with another layout: each channel is read with its own layout."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     schema = records.schema(9, "std_msgs/msg/Two", "ros2msg", b"float64 other\nfloat64 data")
     extra = schema + records.channel(9, 9, "/force", "cdr")
     own: list[Message] = []
@@ -126,43 +128,45 @@ def two_channels_of_a_topic(rng: np.random.Generator) -> Case:
         own.append(message)
         records_of_own += records.message(9, message.time, message.payload)
     blocks.append(Block((), extra, records_of_own, blocks[0].compression))
-    held = (*messages, *own)
-    how = replace(ending(rng), summary=False)
-    return Case("two_channels_of_a_topic", assemble(blocks, how), Truth(held, held, loss=False))
+    written = (*messages, *own)
+    how = replace(draw_ending(rng), summary=False)
+    return Case("two_channels_of_a_topic", assemble(blocks, how), Truth(written, written, loss=False))
 
 
 def many_schemas(rng: np.random.Generator) -> Case:
-    """65,535 schemas, as many as there can be, and some of them again."""
-    messages, blocks = drawn(rng, "zstd", everywhere=False)
+    """Define 65,535 schemas, the largest possible number, and repeat some of them."""
+    messages, blocks = draw_blocks(rng, "zstd", everywhere=False)
     extra = b"".join(records.schema(i, f"a/msg/M{i}", "ros2msg", b"float64 x") for i in range(5, 65536))
     blocks[0] = replace(blocks[0], before=extra + blocks[0].before)
-    return Case("many_schemas", assemble(blocks, ending(rng)), Truth(tuple(messages), tuple(messages), loss=False))
+    return Case("many_schemas", assemble(blocks, draw_ending(rng)), Truth(tuple(messages), tuple(messages), loss=False))
 
 
 def many_channels(rng: np.random.Generator) -> Case:
-    """Twenty thousand channels without a message."""
-    messages, blocks = drawn(rng, "lz4", everywhere=False)
+    """Define twenty thousand channels without a message."""
+    messages, blocks = draw_blocks(rng, "lz4", everywhere=False)
     extra = b"".join(records.channel(i, 0, f"/t{i}", "json") for i in range(10, 20_000))
-    blocks[0] = replace(blocks[0], behind=extra)
-    return Case("many_channels", assemble(blocks, ending(rng)), Truth(tuple(messages), tuple(messages), loss=False))
+    blocks[0] = replace(blocks[0], after=extra)
+    return Case(
+        "many_channels", assemble(blocks, draw_ending(rng)), Truth(tuple(messages), tuple(messages), loss=False)
+    )
 
 
-def odd_topic(rng: np.random.Generator) -> Case:
-    """A further channel whose topic is very long, empty, no UTF-8, or would move a terminal's cursor."""
+def unusual_topic(rng: np.random.Generator) -> Case:
+    """Define a channel whose topic is very long, empty, not UTF-8, or contains control sequences of a terminal."""
     topics = [b"/" + b"long" * 100_000, b"", b"\xff\xfe", b"a\nb\nc", b"\x1b[31mred", b"/a b", b"\0", "/µ°€".encode()]
-    messages, blocks = drawn(rng)
+    messages, blocks = draw_blocks(rng)
     topic = topics[int(rng.integers(len(topics)))]
     extra = records.channel(9, 0, topic, "json") + records.message(9, START, b'{"x": 1}')
-    blocks[2] = replace(blocks[2], behind=extra)
-    how = replace(ending(rng), summary=False)
-    also = Message(topic.decode("utf-8", "replace"), START, b'{"x": 1}', 1.0)
-    truth = Truth(tuple(messages), tuple(messages), also=(also,))
-    return Case(f"odd_topic {topic[:12]!r}", assemble(blocks, how), truth)
+    blocks[2] = replace(blocks[2], after=extra)
+    how = replace(draw_ending(rng), summary=False)
+    optional = Message(topic.decode("utf-8", "replace"), START, b'{"x": 1}', 1.0)
+    truth = Truth(tuple(messages), tuple(messages), optional=(optional,))
+    return Case(f"unusual_topic {topic[:12]!r}", assemble(blocks, how), truth)
 
 
-def lying_definition(rng: np.random.Generator) -> Case:
-    """A further schema or channel whose string or map claims more than its record holds; the chunk's CRC fits."""
-    messages, blocks = drawn(rng, everywhere=True)
+def oversized_definition(rng: np.random.Generator) -> Case:
+    """Define a schema or channel with a string or map longer than its record, in a chunk with a valid CRC."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     claims = [2**32 - 1, 2**31, 1000, 12]
     claim = claims[int(rng.integers(len(claims)))]
     bodies = [
@@ -193,16 +197,16 @@ def lying_definition(rng: np.random.Generator) -> Case:
     i = int(rng.integers(len(blocks)))
     blocks[i] = replace(blocks[i], before=blocks[i].before + records.record(opcode, body))
     truth = Truth(tuple(messages), tuple(messages))
-    return Case(f"lying_definition {opcode} {claim}", assemble(blocks, ending(rng)), truth)
+    return Case(f"oversized_definition {opcode} {claim}", assemble(blocks, draw_ending(rng)), truth)
 
 
-def summary_defines_otherwise(rng: np.random.Generator) -> Case:
-    """The summary, its CRC in order, gives /force another layout than the data: it is refused or read by the data's."""
-    messages, blocks = drawn(rng, everywhere=bool(rng.integers(2)))
+def different_definition_in_the_summary(rng: np.random.Generator) -> Case:
+    """Give /force another layout in a summary with a valid CRC: it is refused, or read with the layout of the data."""
+    messages, blocks = draw_blocks(rng, everywhere=bool(rng.integers(2)))
     swapped = ALL_DEFINITIONS.replace(b"float64 data", b"float32 data", 1)
     how = Ending(definitions=swapped, crc=bool(rng.random() < 0.7))
-    must = tuple(message for message in messages if message.topic != "/force")
-    return Case("summary_defines_otherwise", assemble(blocks, how), Truth(tuple(messages), must))
+    required = tuple(message for message in messages if message.topic != "/force")
+    return Case("different_definition_in_the_summary", assemble(blocks, how), Truth(tuple(messages), required))
 
 
 KINDS = {
@@ -216,7 +220,7 @@ KINDS = {
     two_channels_of_a_topic: 1,
     many_schemas: 0.1,
     many_channels: 0.1,
-    odd_topic: 2,
-    lying_definition: 4,
-    summary_defines_otherwise: 2,
+    unusual_topic: 2,
+    oversized_definition: 4,
+    different_definition_in_the_summary: 2,
 }

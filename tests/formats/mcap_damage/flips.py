@@ -1,8 +1,8 @@
-"""Flipped bits, changed bytes, zeroed sectors, anywhere in a file.
+"""Flipped bits, changed bytes and zeroed sectors, anywhere in a file.
 
-What is to be expected depends on where the damage is: a chunk's content is covered by the chunk's CRC, the summary by
-its own, everything before the data end by the data section's where a writer makes one; messages outside of chunks and
-chunks with the CRC 0 by nothing else.
+The expected result depends on the position of the damage: a chunk's content is covered by the chunk's CRC, the summary
+by its own, and all bytes before the data end by the CRC of the data section if there is one. Messages outside of chunks
+and chunks with the CRC 0 are only covered by the latter.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from tests.formats.mcap_damage.truth import Case, Message, Truth
 
 
 def flipped_bit(rng: np.random.Generator) -> Case:
-    """One bit, anywhere."""
+    """Flip one bit anywhere."""
     log = write(rng, style(rng))
     at = int(rng.integers(len(log.data)))
     return _flipped(log, {at: log.data[at] ^ (1 << int(rng.integers(8)))}, "flipped_bit")
 
 
 def flipped_bit_of_a_kind(rng: np.random.Generator) -> Case:
-    """One bit in a record of a kind that is drawn: small records are hit as often as large ones."""
+    """Flip one bit in a record of a randomly chosen kind, so that small records are hit as often as large ones."""
     log = write(rng, style(rng))
     kinds = sorted({span.opcode for span in log.spans})
     kind = kinds[int(rng.integers(len(kinds)))]
@@ -33,7 +33,7 @@ def flipped_bit_of_a_kind(rng: np.random.Generator) -> Case:
 
 
 def flipped_bit_of_a_frame(rng: np.random.Generator) -> Case:
-    """One bit of a record's opcode or length, or of a chunk's header."""
+    """Flip one bit of a record's opcode or length, or of a chunk's header."""
     log = write(rng, style(rng))
     span = log.spans[int(rng.integers(len(log.spans)))]
     end = span.data_at if span.opcode == records.CHUNK else span.start + 9
@@ -42,27 +42,27 @@ def flipped_bit_of_a_frame(rng: np.random.Generator) -> Case:
 
 
 def changed_byte(rng: np.random.Generator) -> Case:
-    """One byte becomes any other."""
+    """Change one byte to any other value."""
     log = write(rng, style(rng))
     at = int(rng.integers(len(log.data)))
     return _flipped(log, {at: (log.data[at] + int(rng.integers(1, 256))) % 256}, "changed_byte")
 
 
 def changed_bytes(rng: np.random.Generator) -> Case:
-    """Some bytes at several places."""
+    """Change some bytes at several positions."""
     log = write(rng, style(rng))
-    places = rng.integers(len(log.data), size=int(rng.integers(2, 6))).tolist()
-    return _flipped(log, {at: (log.data[at] + int(rng.integers(1, 256))) % 256 for at in places}, "changed_bytes")
+    positions = rng.integers(len(log.data), size=int(rng.integers(2, 6))).tolist()
+    return _flipped(log, {at: (log.data[at] + int(rng.integers(1, 256))) % 256 for at in positions}, "changed_bytes")
 
 
 def zeroed_sector(rng: np.random.Generator) -> Case:
-    """512 bytes that a disk never wrote."""
+    """Set 512 bytes to 0, like a sector that a disk has not written."""
     log = write(rng, style(rng))
     at = int(rng.integers(len(log.data))) // 512 * 512
     return _flipped(log, dict.fromkeys(range(at, min(at + 512, len(log.data))), 0), "zeroed_sector")
 
 
-# A record that no checksum covers may become one of these outside of all chunks: read, and marked as unverified.
+# A record without a checksum may turn into one of these outside of chunks, which are read as unverified.
 _READ_BARE = (records.SCHEMA, records.CHANNEL, records.MESSAGE)
 
 
@@ -77,7 +77,7 @@ def _flipped(log: Log, changes: dict[int, int], kind: str) -> Case:
 
 
 def _truth(log: Log, data: bytes, hit: list[int]) -> Truth:
-    """Every chunk whose record is whole must be given, as long as its definitions can be had."""
+    """Return the truth: every chunk with an undamaged record must be read if its definitions can be read."""
     style = log.style
     spans = [log.span(at) for at in hit]
     in_data = [at for at in hit if at < log.data_end]
@@ -85,49 +85,49 @@ def _truth(log: Log, data: bytes, hit: list[int]) -> Truth:
     begins = any(at < len(records.MAGIC) for at in hit)
     in_data_end = any(log.data_end <= at < log.data_end + 13 for at in hit)
     whole = [span for span in log.spans if span.messages and span not in spans]
-    must = [message for span in whole for message in span.messages]
+    required = [message for span in whole for message in span.messages]
     if not style.chunked:
-        must = _unchunked_must(log, hit)
+        required = _required_without_chunks(log, hit)
     covered = style.chunked and style.crcs
     checked = covered and not any(log.opens(at) and data[at] in _READ_BARE for at in hit)
     if not checked and style.data_crc and any(at < log.data_end + 13 for at in hit):
-        # One wrong bit anywhere and none can be told right, or the CRC itself is damaged.
+        # The CRC of the data does not match, so that all values are doubtful, or the CRC itself is damaged.
         return Truth(log.messages, loss=None, refusable=True, checked=not any(_hides_crc(log, at) for at in hit))
     if not _definitions_known(log, hit):
-        must = []
+        required = []
     return Truth(
         log.messages,
-        tuple(must),
+        tuple(required),
         checked=checked or not in_data,
-        silent=_silent(log, spans, hit),
-        # What no checksum covers may hold a message that lacks the field: an error where the field is asked for.
-        # The data end, damaged, may claim a CRC that was never there.
-        refusable=begins or not must or not (checked or not (in_data or in_data_end)),
+        undetectable=_silent(log, spans, hit),
+        # Bytes without a checksum may form a message without the requested field, which is an error.
+        # A damaged data end may contain a CRC although the file has none.
+        refusable=begins or not required or not (checked or not (in_data or in_data_end)),
         loss=None if in_data or in_summary else False,
         unverified=not covered and not style.data_crc,
     )
 
 
-def _unchunked_must(log: Log, hit: list[int]) -> list[Message]:
-    """Without chunks nothing tells where the next record begins once a length is wrong: what stands before it."""
-    must: list[Message] = []
+def _required_without_chunks(log: Log, hit: list[int]) -> list[Message]:
+    """Return the messages before the first wrong length: without chunks, the start of the next record is unknown."""
+    required: list[Message] = []
     for span in log.spans:
         frame = range(span.start, span.start + 9)
         if any(at in frame for at in hit if at < log.data_end):
             break
         if span.messages and not any(at in span for at in hit):
-            must += span.messages
-    return must
+            required += span.messages
+    return required
 
 
 def _hides_crc(log: Log, at: int) -> bool:
-    """The damage is where the data section's CRC, or the way to it, stands: it may not be found any more."""
+    """Return whether the damage may hide the CRC of the data section: it is in that CRC, or in a record's prefix."""
     span = log.span(at)
     return span is None or at in range(span.start, span.start + 9) or log.data_end <= at < log.data_end + 13
 
 
 def _definitions_known(log: Log, hit: list[int]) -> bool:
-    """The definitions stand in the first chunk (or before the first message), and in the summary if there is one."""
+    """Return whether the definitions can be read: from the first chunk (or before the first message), or a summary."""
     first = next(i for i, span in enumerate(log.spans) if span.messages)
     ends = log.spans[first].end if log.style.chunked else log.spans[first].start
     if not any(len(records.MAGIC) <= at < ends for at in hit):
@@ -138,15 +138,15 @@ def _definitions_known(log: Log, hit: list[int]) -> bool:
 
 
 def _silent(log: Log, spans: list[Span | None], hit: list[int]) -> bool:
-    """Nothing tells that something is gone: a record that turned into an unknown one is passed over, as it should be.
+    """Return whether a loss may be undetectable: a record that became an unknown one must be skipped.
 
-    With a summary its counts tell, with message indexes the one that has lost its chunk.
+    It is detected by the counts of a summary, or by a message index without its chunk.
     """
     style = log.style
     if style.chunked and style.crcs and (style.summary or style.indexed):
         return len(hit) > 1
-    framed = [span for span, at in zip(spans, hit, strict=True) if span is None or at < span.start + 9]
-    return bool(framed) or not style.crcs or not style.chunked
+    hits_prefix = [span for span, at in zip(spans, hit, strict=True) if span is None or at < span.start + 9]
+    return bool(hits_prefix) or not style.crcs or not style.chunked
 
 
 KINDS = {

@@ -1,4 +1,4 @@
-"""All kinds of damage, in the shares in which they are drawn: `cases(seed, count)`."""
+"""All kinds of damage with their shares of the cases: `cases(seed, count)`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from tests.formats.mcap_damage import between, chunks, cuts, definitions, flips, payloads, summaries
+from tests.formats.mcap_damage import chunks, cuts, definitions, flips, inserted_bytes, payloads, summaries
 from tests.formats.mcap_damage.truth import Case
 
 Kind = Callable[[np.random.Generator], Case]
@@ -18,20 +18,20 @@ KINDS: dict[Kind, float] = {
     **chunks.KINDS,
     **definitions.KINDS,
     **payloads.KINDS,
-    **between.KINDS,
+    **inserted_bytes.KINDS,
     **summaries.KINDS,
 }
 
 
 def kind_of(seed: int, number: int) -> tuple[Kind, np.random.Generator]:
-    """The kind of a case, and what it is drawn from."""
+    """Return the kind of a case, and its random generator."""
     shares = np.array(list(KINDS.values()))
     rng = np.random.default_rng([seed, number])
     return list(KINDS)[int(rng.choice(len(KINDS), p=shares / shares.sum()))], rng
 
 
 def cases(seed: int, count: int, first: int = 0) -> Iterator[Case]:
-    """Cases number `first` to `first + count` of a seed; each depends on seed and number alone."""
+    """Yield the cases number `first` to `first + count` of a seed; each depends only on seed and number."""
     for number in range(first, first + count):
         make, rng = kind_of(seed, number)
         yield make(rng)

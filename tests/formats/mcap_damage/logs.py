@@ -1,4 +1,4 @@
-"""Whole files as the `mcap` package writes them, and where everything in them stands."""
+"""Undamaged files of the `mcap` package, with the positions of all records."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _KINDS = {"": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": Compress
 
 @dataclass(frozen=True)
 class Style:
-    """How a file is written."""
+    """The options with which a file is written."""
 
     compression: str = "zstd"
     chunked: bool = True
@@ -40,7 +40,7 @@ class Style:
 
 @dataclass(frozen=True)
 class Span:
-    """A record of the top level: data[start:end]; of a chunk, where its fields stand and the messages it holds."""
+    """A record of the top level: data[start:end]; for a chunk also the positions of its fields, and its messages."""
 
     opcode: int
     start: int
@@ -55,7 +55,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Log:
-    """A whole file, its messages in order, and its records."""
+    """An undamaged file, its messages in order, and its records."""
 
     style: Style
     data: bytes
@@ -64,25 +64,25 @@ class Log:
 
     @property
     def chunks(self) -> list[Span]:
-        """The chunks."""
+        """Return the chunks."""
         return [span for span in self.spans if span.opcode == records.CHUNK]
 
     def span(self, at: int) -> Span | None:
-        """The record in which byte `at` stands; None in the magic bytes."""
+        """Return the record that contains byte `at`; None for the magic bytes."""
         return next((span for span in self.spans if at in span), None)
 
     def opens(self, at: int) -> bool:
-        """Byte `at` is a record's opcode."""
+        """Return whether byte `at` is a record's opcode."""
         return any(span.start == at for span in self.spans)
 
     @property
     def data_end(self) -> int:
-        """Where the data section's end record begins."""
+        """Return the byte where the data end record starts."""
         return next(span.start for span in self.spans if span.opcode == records.DATA_END)
 
 
 def style(rng: np.random.Generator) -> Style:
-    """A way to write: all compressions alike; mostly chunked, with CRCs and a summary, as loggers do."""
+    """Return random options: each compression equally often; usually chunked, with CRCs and a summary, like loggers."""
     compression = ("", "lz4", "zstd")[int(rng.integers(3))]
     chunked = bool(rng.random() < 0.85)
     crcs, data_crc, summary, indexed = (rng.random(4) < (0.8, 0.25, 0.7, 0.85)).tolist()
@@ -90,7 +90,7 @@ def style(rng: np.random.Generator) -> Style:
 
 
 def write(rng: np.random.Generator, style: Style, count: int = 96, chunk_size: int = 700, filler: int = 0) -> Log:
-    """A file of `count` messages in this style; JSON messages carry `filler` random letters more."""
+    """Return a file of `count` messages in this style; JSON messages have `filler` more random letters."""
     messages = ordinary(rng, count)
     if filler:
         messages = [_longer(message, rng, filler) for message in messages]
@@ -126,7 +126,7 @@ def write(rng: np.random.Generator, style: Style, count: int = 96, chunk_size: i
 
 
 def inner(content: bytes) -> Iterator[tuple[int, int, int]]:
-    """(opcode, start, end) of the records in a chunk's content, as far as they are whole."""
+    """Yield (opcode, start, end) of the complete records in a chunk's content."""
     at = 0
     while at + 9 <= len(content):
         opcode, length = struct.unpack_from("<BQ", content, at)
@@ -137,7 +137,7 @@ def inner(content: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def unpacked(compression: str, data: bytes) -> bytes:
-    """What can be decompressed of a piece of a chunk's data, cut off or not."""
+    """Return the decompressed part of a chunk's data, which may be cut off."""
     import lz4.frame
     import zstandard
 
@@ -161,7 +161,7 @@ def _longer(message: Message, rng: np.random.Generator, filler: int) -> Message:
 
 
 def _spans(data: bytes, messages: list[Message]) -> Iterator[Span]:
-    at, given = len(records.MAGIC), 0
+    at, count = len(records.MAGIC), 0
     while at < len(data) - len(records.MAGIC):
         opcode, length = struct.unpack_from("<BQ", data, at)
         end = at + 9 + length
@@ -170,12 +170,12 @@ def _spans(data: bytes, messages: list[Message]) -> Iterator[Span]:
             (name,) = struct.unpack_from("<I", data, name_at)
             data_at = name_at + 4 + name + 8
             content = unpacked(data[name_at + 4 : name_at + 4 + name].decode(), data[data_at:end])
-            held = sum(kind == records.MESSAGE for kind, _, _ in inner(content))
-            yield Span(opcode, at, end, tuple(messages[given : given + held]), name_at, data_at)
-            given += held
+            in_chunk = sum(kind == records.MESSAGE for kind, _, _ in inner(content))
+            yield Span(opcode, at, end, tuple(messages[count : count + in_chunk]), name_at, data_at)
+            count += in_chunk
         elif opcode == records.MESSAGE:
-            yield Span(opcode, at, end, (messages[given],))
-            given += 1
+            yield Span(opcode, at, end, (messages[count],))
+            count += 1
         else:
             yield Span(opcode, at, end)
         at = end

@@ -1,4 +1,4 @@
-"""What the files hold: four topics of different encodings, each value different from all others."""
+"""The messages of the files: four topics with different encodings; all values are different."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from tests.formats.mcap_damage import records
 from tests.formats.mcap_damage.truth import Message
 
-START = 1_000_000_000  # ns: times in seconds then are exact to the ns
+START = 1_000_000_000  # ns; times in seconds are then exact to the ns
 
 
 @dataclass(frozen=True)
 class Definition:
-    """A topic's channel and schema, under the ids by which its messages name them."""
+    """A topic's channel and schema with their ids."""
 
     channel: int
     schema: int
@@ -28,11 +28,11 @@ class Definition:
 
     @property
     def records(self) -> bytes:
-        """Schema and channel record; a schema 0 there is not."""
-        made = records.channel(self.channel, self.schema, self.topic, self.encoding)
+        """Return schema and channel record; only the channel record if the schema id is 0."""
+        channel = records.channel(self.channel, self.schema, self.topic, self.encoding)
         if not self.schema:
-            return made
-        return records.schema(self.schema, self.schema_name, self.schema_encoding, self.schema_data) + made
+            return channel
+        return records.schema(self.schema, self.schema_name, self.schema_encoding, self.schema_data) + channel
 
 
 _STAMPED = b"std_msgs/Header header\nfloat64 value\n" + b"=" * 80
@@ -46,13 +46,13 @@ DEFINITIONS = {
     "/raw": Definition(4, 3, "/raw", "ros1", "std_msgs/Float64", "ros1msg", b"float64 data"),
 }
 TOPICS = tuple(DEFINITIONS)
-# Where /count or /other stands, it stands in the place of /force.
+# /count and /other replace /force.
 CHANNELS = {**{topic: definition.channel for topic, definition in DEFINITIONS.items()}, "/count": 1, "/other": 1}
 ALL_DEFINITIONS = b"".join(definition.records for definition in DEFINITIONS.values())
 
 
 def payload(topic: str, time: int, value: float, big_endian: bool = False) -> bytes:
-    """A value as a message of the topic's encoding."""
+    """Return a value as a payload in the topic's encoding."""
     order = ">" if big_endian else "<"
     kind = b"\0\0\0\0" if big_endian else b"\0\1\0\0"
     if topic == "/force":
@@ -60,7 +60,7 @@ def payload(topic: str, time: int, value: float, big_endian: bool = False) -> by
     if topic == "/state":
         return json.dumps({"note": "up, down", "x": value}).encode()
     if topic == "/axis":
-        # The body is aligned behind the four bytes of the encapsulation: 4 + 4 + 4 + 5 bytes, 7 of padding, 8.
+        # The body is aligned after the four bytes of the encapsulation: 4 + 4 + 4 + 5 bytes, 7 of padding, 8.
         return kind + struct.pack(order + "iII5s7xd", time // 10**9, time % 10**9, 5, b"base\0", value)
     if topic == "/raw":
         return struct.pack("<d", value)
@@ -68,15 +68,15 @@ def payload(topic: str, time: int, value: float, big_endian: bool = False) -> by
 
 
 def ordinary(rng: np.random.Generator, count: int) -> list[Message]:
-    """`count` messages 1 ms apart; every third eight are of /raw alone, so that some chunks hold nothing else."""
-    made = []
+    """Return `count` messages, one per ms; every third group of eight is only /raw, so that some chunks are, too."""
+    messages = []
     for i, value in enumerate(rng.normal(size=count).tolist()):
         topic = "/raw" if i // 8 % 3 == 2 else TOPICS[i % 3]
         time = START + i * 1_000_000
-        made.append(Message(topic, time, payload(topic, time, value), value))
-    return made
+        messages.append(Message(topic, time, payload(topic, time, value), value))
+    return messages
 
 
 def record_of(message: Message, sequence: int = 0) -> bytes:
-    """The message's record."""
+    """Return the message's record."""
     return records.message(CHANNELS[message.topic], message.time, message.payload, sequence)

@@ -1,4 +1,4 @@
-"""Messages that are cut short, of an unknown encoding, or of another kind of CDR: in files that are whole otherwise."""
+"""Messages that are truncated, or have an unknown encoding or another kind of CDR, in otherwise undamaged files."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from tests.formats.mcap_damage import records
 from tests.formats.mcap_damage.assembly import Block, assemble
-from tests.formats.mcap_damage.chunks import drawn, ending
+from tests.formats.mcap_damage.chunks import draw_blocks, draw_ending
 from tests.formats.mcap_damage.messages import ALL_DEFINITIONS, DEFINITIONS, START, payload
 from tests.formats.mcap_damage.truth import Case, Message, Truth, without
 
 
 def _block(tag: bytes, body: bytes) -> bytes:
-    """A field of protobuf with a length, below 128 bytes."""
+    """Return a length-delimited protobuf field of less than 128 bytes."""
     return tag + bytes([len(body)]) + body
 
 
@@ -28,8 +28,8 @@ PROTOBUF_SCHEMA = _block(b"\n", _FILE)
 
 
 def cut_payload(rng: np.random.Generator) -> Case:
-    """Some messages of a topic end too early, at every place alike, or hold a string that claims to be too long."""
-    messages, blocks = drawn(rng)
+    """Truncate some messages of a topic at random bytes, or set the length of their string too large."""
+    messages, blocks = draw_blocks(rng)
     topic = list(DEFINITIONS)[int(rng.integers(4))]
     hit = [message for message in messages if message.topic == topic]
     hit = [hit[i] for i in rng.choice(len(hit), 3, replace=False).tolist()]
@@ -38,9 +38,9 @@ def cut_payload(rng: np.random.Generator) -> Case:
 
 
 def garbled_payload(rng: np.random.Generator) -> Case:
-    """JSON that is none: never a value, always counted."""
-    messages, blocks = drawn(rng)
-    odd = [
+    """Write invalid JSON, which never gives a value and is always counted."""
+    messages, blocks = draw_blocks(rng)
+    variants = [
         b"[1, 2]",
         b"3.5",
         b"{'x': 1}",
@@ -63,13 +63,13 @@ def garbled_payload(rng: np.random.Generator) -> Case:
     ]
     hit = [message for message in messages if message.topic == "/state"]
     hit = [hit[i] for i in rng.choice(len(hit), 2, replace=False).tolist()]
-    changed = {id(message): replace(message, payload=odd[int(rng.integers(len(odd)))]) for message in hit}
+    changed = {id(message): replace(message, payload=variants[int(rng.integers(len(variants)))]) for message in hit}
     return _changed(rng, messages, blocks, changed, "garbled_payload")
 
 
 def other_cdr(rng: np.random.Generator) -> Case:
-    """An encapsulation that aligns or orders otherwise (parameter lists, XCDR2) is refused by message, and counted."""
-    messages, blocks = drawn(rng)
+    """Write another encapsulation (parameter lists, XCDR2), which is refused per message and counted."""
+    messages, blocks = draw_blocks(rng)
     kind = int(rng.choice([2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0xFF]))
     topic = ("/force", "/axis")[int(rng.integers(2))]
     hit = [message for message in messages if message.topic == topic][:4]
@@ -80,8 +80,8 @@ def other_cdr(rng: np.random.Generator) -> Case:
 
 
 def big_endian_cdr(rng: np.random.Generator) -> Case:
-    """Big-endian CDR, all or some messages: read right."""
-    messages, blocks = drawn(rng)
+    """Write all or some messages in big-endian CDR, which must be read."""
+    messages, blocks = draw_blocks(rng)
     share = (0.3, 1.0)[int(rng.integers(2))]
     changed = {
         id(m): replace(m, payload=payload(m.topic, m.time, m.value, big_endian=True))
@@ -89,13 +89,13 @@ def big_endian_cdr(rng: np.random.Generator) -> Case:
         if m.topic in ("/force", "/axis") and rng.random() < share
     }
     blocks = _with(blocks, changed)
-    held = tuple(changed.get(id(message), message) for message in messages)
-    return Case("big_endian_cdr", assemble(blocks, ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    return Case("big_endian_cdr", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
 def long_payload(rng: np.random.Generator) -> Case:
-    """Padding behind a CDR message, white space around JSON: read right."""
-    messages, blocks = drawn(rng)
+    """Append padding to CDR messages, and white space to JSON, which must be ignored."""
+    messages, blocks = draw_blocks(rng)
     changed = {}
     for message in messages:
         if message.topic == "/state":
@@ -103,15 +103,15 @@ def long_payload(rng: np.random.Generator) -> Case:
         elif message.topic != "/raw":
             changed[id(message)] = replace(message, payload=message.payload + bytes(int(rng.integers(0, 4))))
     blocks = _with(blocks, changed)
-    held = tuple(changed.get(id(message), message) for message in messages)
-    return Case("long_payload", assemble(blocks, ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    return Case("long_payload", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
 def unknown_encoding(rng: np.random.Generator) -> Case:
-    """/force is of a message or schema encoding, or has a schema, that is not read; the other topics are."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Give /force an unknown message or schema encoding, or an unknown schema; the other topics must be read."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     known = DEFINITIONS["/force"]
-    odd = [
+    variants = [
         replace(known, encoding="flatbuffer"),
         replace(known, encoding=""),
         replace(known, encoding="CDR"),
@@ -127,52 +127,62 @@ def unknown_encoding(rng: np.random.Generator) -> Case:
         replace(known, encoding="protobuf", schema_encoding="protobuf", schema_data=b"\xff" * 30),
         replace(known, encoding="ros1", schema_encoding="ros1msg", schema_data=b"\0"),
     ]
-    chosen = odd[int(rng.integers(len(odd)))]
+    chosen = variants[int(rng.integers(len(variants)))]
     definitions = ALL_DEFINITIONS.replace(known.records, chosen.records)
     blocks[0] = replace(blocks[0], before=definitions)
     others = tuple(message for message in messages if message.topic != "/force")
-    how = replace(ending(rng), definitions=definitions)
+    how = replace(draw_ending(rng), definitions=definitions)
     name = f"unknown_encoding {chosen.encoding!r} {chosen.schema_encoding!r} {chosen.schema_data[:20]!r}"
     return Case(name, assemble(blocks, how), Truth(tuple(messages), others))
 
 
 def cut_protobuf(rng: np.random.Generator) -> Case:
-    """Protobuf messages, some of them cut in a field; an omitted number is 0, as proto3 has it."""
-    messages, blocks = drawn(rng, everywhere=False)
+    """Write protobuf messages, some of them truncated in a field; an omitted number is 0, as in proto3."""
+    messages, blocks = draw_blocks(rng, everywhere=False)
     schema = records.schema(9, "m.Number", "protobuf", PROTOBUF_SCHEMA)
     definition = schema + records.channel(9, 9, "/count", "protobuf")
-    own, behind = [], b""
+    own, after = [], b""
     for k, value in enumerate(rng.integers(1, 2**40, 8).tolist()):
         whole = b"\x09" + struct.pack("<d", 0.5) + b"\x10" + _varint(value)
         cut = k % 3 == 1
-        # Cut inside the number, or inside the double: between two fields nothing could tell.
+        # Cut in the number or in the double: a cut between two fields cannot be detected.
         body = whole[: int(rng.choice([*range(1, 9), *range(10, len(whole))]))] if cut else whole
-        behind += records.message(9, START + k, body)
+        after += records.message(9, START + k, body)
         own.append(Message("/count", START + k, body, math.nan if cut else float(value)))
-    blocks.append(Block((), definition, behind, blocks[0].compression))
-    how = replace(ending(rng), summary=False)
-    held = (*messages, *own)
-    must = tuple(message for message in held if not math.isnan(message.value))
-    return Case("cut_protobuf", assemble(blocks, how), Truth(held, must))
+    blocks.append(Block((), definition, after, blocks[0].compression))
+    how = replace(draw_ending(rng), summary=False)
+    written = (*messages, *own)
+    required = tuple(message for message in written if not math.isnan(message.value))
+    return Case("cut_protobuf", assemble(blocks, how), Truth(written, required))
 
 
-def odd_numbers(rng: np.random.Generator) -> Case:
-    """NaN, infinities, -0, subnormals and 2^53 + 1 are values like others."""
-    messages, blocks = drawn(rng)
-    odd = [float("nan"), float("inf"), float("-inf"), -0.0, 5e-324, 1.7976931348623157e308, float(2**53), 1e22, 1e-5]
+def special_numbers(rng: np.random.Generator) -> Case:
+    """Write NaN, infinities, -0, subnormals and 2^53 + 1, which must be read."""
+    messages, blocks = draw_blocks(rng)
+    variants = [
+        float("nan"),
+        float("inf"),
+        float("-inf"),
+        -0.0,
+        5e-324,
+        1.7976931348623157e308,
+        float(2**53),
+        1e22,
+        1e-5,
+    ]
     changed = {}
     for message in messages:
         if rng.random() < 0.4:
-            value = odd[int(rng.integers(len(odd)))]
+            value = variants[int(rng.integers(len(variants)))]
             changed[id(message)] = replace(message, value=value, payload=payload(message.topic, message.time, value))
     blocks = _with(blocks, changed)
-    held = tuple(changed.get(id(message), message) for message in messages)
-    return Case("odd_numbers", assemble(blocks, ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    return Case("special_numbers", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
-def odd_times(rng: np.random.Generator) -> Case:
-    """Times that stand still, go back, are 0 or 2^64 - 1: given as they are."""
-    messages, blocks = drawn(rng)
+def unusual_times(rng: np.random.Generator) -> Case:
+    """Write times that repeat, go backwards, are 0 or 2^64 - 1, which must be read unchanged."""
+    messages, blocks = draw_blocks(rng)
     choices = [
         lambda _: START,
         lambda i: START + (64 - i) * 1000,
@@ -185,18 +195,18 @@ def odd_times(rng: np.random.Generator) -> Case:
     which = int(rng.integers(len(choices)))
     changed = {id(m): replace(m, time=choices[which](i)) for i, m in enumerate(messages)}
     blocks = _with(blocks, changed)
-    held = tuple(changed[id(message)] for message in messages)
-    return Case(f"odd_times {which}", assemble(blocks, ending(rng)), Truth(held, held, loss=False))
+    written = tuple(changed[id(message)] for message in messages)
+    return Case(f"unusual_times {which}", assemble(blocks, draw_ending(rng)), Truth(written, written, loss=False))
 
 
 def _changed(
     rng: np.random.Generator, messages: list[Message], blocks: list[Block], changed: dict[int, Message], name: str
 ) -> Case:
-    """Messages whose payload nobody can decode: no value of theirs, and said where their topic is asked for."""
+    """Return a case with payloads that cannot be decoded: they have no value, and are reported with their topic."""
     changed = {key: replace(message, value=math.nan) for key, message in changed.items()}
-    held = tuple(changed.get(id(message), message) for message in messages)
-    must = without(held, changed.values())
-    return Case(name, assemble(_with(blocks, changed), ending(rng)), Truth(held, must))
+    written = tuple(changed.get(id(message), message) for message in messages)
+    required = without(written, changed.values())
+    return Case(name, assemble(_with(blocks, changed), draw_ending(rng)), Truth(written, required))
 
 
 def _with(blocks: list[Block], changed: dict[int, Message]) -> list[Block]:
@@ -211,11 +221,11 @@ def _cut(message: Message, rng: np.random.Generator) -> bytes:
 
 
 def _varint(value: int) -> bytes:
-    made = b""
+    encoded = b""
     while value > 127:
-        made += bytes([value & 127 | 128])
+        encoded += bytes([value & 127 | 128])
         value >>= 7
-    return made + bytes([value])
+    return encoded + bytes([value])
 
 
 KINDS = {
@@ -226,6 +236,6 @@ KINDS = {
     long_payload: 1,
     unknown_encoding: 3,
     cut_protobuf: 1,
-    odd_numbers: 2,
-    odd_times: 2,
+    special_numbers: 2,
+    unusual_times: 2,
 }

@@ -1,4 +1,4 @@
-"""Records of the MCAP specification as bytes, written down here once more: the reader under test has no part in it."""
+"""Write records of the MCAP specification as bytes, independently of the reader under test."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFS
 
 
 def record(opcode: int, body: bytes, claimed: int | None = None) -> bytes:
-    """Opcode, length of the content (or what is claimed), content."""
+    """Return opcode, length of the content (or the false length `claimed`), content."""
     return struct.pack("<BQ", opcode, len(body) if claimed is None else claimed) + body
 
 
 def text(value: str | bytes, claimed: int | None = None) -> bytes:
-    """A string with its length (or what is claimed)."""
+    """Return a string with its length (or the false length `claimed`)."""
     raw = value.encode() if isinstance(value, str) else value
     return struct.pack("<I", len(raw) if claimed is None else claimed) + raw
 
 
 def texts(values: Mapping[str, str], claimed: int | None = None) -> bytes:
-    """A map of strings with its length in bytes."""
+    """Return a map of strings with its length in bytes."""
     body = b"".join(text(key) + text(value) for key, value in values.items())
     return struct.pack("<I", len(body) if claimed is None else claimed) + body
 
@@ -52,7 +52,7 @@ def message(channel_id: int, time: int, payload: bytes, sequence: int = 0, publi
 
 
 def packed(compression: str, content: bytes) -> bytes:
-    """Content, compressed as a writer would."""
+    """Return the compressed content."""
     if compression == "zstd":
         return zstandard.ZstdCompressor(level=1).compress(content)
     if compression == "lz4":
@@ -72,7 +72,7 @@ def chunk(
     extra: bytes = b"",
     named: str | bytes | None = None,
 ) -> bytes:
-    """A chunk; `crc`, uncompressed `size`, `data`, its claimed `data_size` and the compression's name may lie."""
+    """Return a chunk; `crc`, uncompressed `size`, `data`, `data_size` and the compression's name may be false."""
     compressed = packed(compression, content) if data is None else data
     crc = zlib.crc32(content) if crc is None else crc
     body = struct.pack("<QQQI", *times, len(content) if size is None else size, crc)
@@ -95,7 +95,7 @@ def chunk_index(
     compression: str,
     sizes: tuple[int, int],
 ) -> bytes:
-    """`sizes` are the compressed and the uncompressed one."""
+    """Return a chunk index; `sizes` are the compressed and the uncompressed size."""
     table = b"".join(struct.pack("<HQ", number, offset) for number, offset in offsets.items())
     body = struct.pack("<QQQQI", *times, start, length, len(table)) + table
     return record(CHUNK_INDEX, body + struct.pack("<Q", index_length) + text(compression) + struct.pack("<QQ", *sizes))
@@ -123,7 +123,7 @@ def data_end(crc: int = 0, extra: bytes = b"") -> bytes:
 
 
 def ending(summary: bytes, start: int, with_crc: bool = True) -> bytes:
-    """Summary section (beginning at byte `start`), footer and magic bytes."""
+    """Return summary section (starting at byte `start`), footer and magic bytes."""
     body = struct.pack("<QQ", start if summary else 0, 0)
     prefix = struct.pack("<BQ", FOOTER, 20)
     crc = zlib.crc32(summary + prefix + body) if with_crc else 0

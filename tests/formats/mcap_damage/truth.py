@@ -1,17 +1,17 @@
-"""A case: bytes of a file, and what a careful person would read in them."""
+"""A case: the bytes of a file, and the messages and findings that are expected from it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-# The numeric field of every topic; its values are all different, so that a value names its message.
+# The numeric field of every topic; all values are different, so that a value identifies its message.
 FIELDS = {"/force": "data", "/state": "x", "/axis": "value", "/raw": "data", "/count": "count"}
 
 
 @dataclass(frozen=True)
 class Message:
-    """One message as it was written; `time` is its log time [ns], `value` what its field of FIELDS holds."""
+    """A message as written; `time` is its log time [ns], `value` the value of its field in FIELDS."""
 
     topic: str
     time: int
@@ -20,36 +20,37 @@ class Message:
 
     @property
     def field(self) -> str:
-        """The numeric field."""
+        """Return the numeric field."""
         return FIELDS.get(self.topic, "data")
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What may, must and must not come of a file.
+    """The messages and findings that a reader must, may and must not return.
 
-    `held`: what was written and is, or should be, in the file: where any of it is not given, that has to be said.
-    `must`: what has to be given; of `mostly` at least 95 %. Nothing but `held` and `also` may be given, unless no
-    checksum covers what is damaged (`checked` False). `loss`: True where one has to be said, False where none may be;
-    `silent`: nothing in the file tells that something is gone. `refusable`: refusing the whole file is right, too.
-    `unverified`: what is given has to be marked so. `passed_over`: who asks for some topics only need not hear of it.
+    `written`: the messages that the file contains or should contain; if any is missing, a loss must be reported.
+    `required`: the messages that must be read; of `mostly_required` at least 95 %. Only `written` and `optional`
+    messages may be read, unless no checksum covers the damage (`checked` is False). `loss`: True if a loss must be
+    reported, False if it must not; `undetectable`: the file does not show that messages are missing. `refusable`: the
+    whole file may be refused. `unverified`: the messages must be reported as unverified. `skippable`: the loss need not
+    be reported if only some topics are requested.
     """
 
-    held: tuple[Message, ...]
-    must: tuple[Message, ...] = ()
-    mostly: tuple[Message, ...] = ()
-    also: tuple[Message, ...] = ()
+    written: tuple[Message, ...]
+    required: tuple[Message, ...] = ()
+    mostly_required: tuple[Message, ...] = ()
+    optional: tuple[Message, ...] = ()
     loss: bool | None = None
     checked: bool = True
-    silent: bool = False
+    undetectable: bool = False
     refusable: bool = False
     unverified: bool = False
-    passed_over: bool = False
+    skippable: bool = False
 
 
 @dataclass(frozen=True)
 class Case:
-    """A file of a kind of damage; `name` says how it was made."""
+    """A file with a kind of damage; `name` describes the damage."""
 
     name: str
     data: bytes
@@ -57,11 +58,11 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """The kind of damage: the first word of the name."""
+        """Return the kind of damage, which is the first word of the name."""
         return self.name.partition(" ")[0]
 
 
 def without(messages: Iterable[Message], gone: Iterable[Message]) -> tuple[Message, ...]:
-    """The messages that are not among those gone."""
+    """Return the messages without those that are gone."""
     lost = {id(message) for message in gone}
     return tuple(message for message in messages if id(message) not in lost)

@@ -165,7 +165,7 @@ def test_an_unknown_suffix_lists_what_can_be_written(tmp_path):
 def test_a_log_without_a_clock_is_written_only_to_formats_without_one(tmp_path):
     log = tmp_path / "run.csv"
     log.write_text("a,b\n" + "".join(f"{k % 7},{k % 5}\n" for k in range(50)))
-    with pytest.raises(UsageError, match=r"no column of the log looks like its clock, and this container needs one"):
+    with pytest.raises(UsageError, match=r"no column of the log is recognised as its clock, and this container needs"):
         convert(log, tmp_path / "out.mcap")
     assert convert(log, tmp_path / "out.csv").columns == 2
 

@@ -1,1 +1,1 @@
-"""The file around the messages: records, chunks, checksums, and what is left where a file is damaged."""
+"""The container of the messages: records, chunks, checksums, and recovery of damaged files."""

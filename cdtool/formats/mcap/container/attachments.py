@@ -1,4 +1,4 @@
-"""Attachments (op=0x09): looked at in pieces, so that a large one takes no memory."""
+"""Check attachments (op=0x09) in pieces, so that a large attachment does not need memory."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ _LONGEST_TEXT = 1 << 16
 
 def check_attachment(file: FileBytes, at: int, length: int) -> None:
     """Check the attachment record of `length` bytes at byte `at`; raises DamageError."""
-    index, place = _read(file, at, length)
-    place += index.data_size
-    if place + 4 > at + length:
-        raise DamageError("an attachment's data claim more bytes than it has")
-    stated = int.from_bytes(file.read(place, 4), "little")
-    if stated and stated != file.crc(at + PREFIX, place):
-        raise DamageError("the checksum of an attachment does not fit")
+    index, end = _read(file, at, length)
+    end += index.data_size
+    if end + 4 > at + length:
+        raise DamageError("the declared data size of an attachment exceeds its record")
+    stated = int.from_bytes(file.read(end, 4), "little")
+    if stated and stated != file.crc(at + PREFIX, end):
+        raise DamageError("the checksum of an attachment does not match")
 
 
 def attachment_index(file: FileBytes, at: int, length: int) -> AttachmentIndex:
-    """What an index tells of the attachment record of `length` bytes at byte `at`; raises DamageError."""
+    """Return the index of the attachment record of `length` bytes at byte `at`; raises DamageError."""
     return _read(file, at, length)[0]
 
 
 def _read(file: FileBytes, at: int, length: int) -> tuple[AttachmentIndex, int]:
-    """All fields but the data, and where these begin."""
+    """Return all fields except the data, and the byte where the data start."""
     head = file.read(at + PREFIX, min(length - PREFIX, 2 * _LONGEST_TEXT))
-    log_time, place = uint64(head, 0)
-    create_time, place = uint64(head, place)
-    name, place = string(head, place)
-    media_type, place = string(head, place)
-    size, place = uint64(head, place)
-    return AttachmentIndex(at, length, log_time, create_time, size, name, media_type), at + PREFIX + place
+    log_time, offset = uint64(head, 0)
+    create_time, offset = uint64(head, offset)
+    name, offset = string(head, offset)
+    media_type, offset = string(head, offset)
+    size, offset = uint64(head, offset)
+    return AttachmentIndex(at, length, log_time, create_time, size, name, media_type), at + PREFIX + offset

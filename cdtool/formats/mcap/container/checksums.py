@@ -1,7 +1,7 @@
-"""CRC-32 as MCAP uses it (IEEE 802.3, the polynomial of zlib), at the speed of memory.
+"""The CRC-32 of MCAP (IEEE 802.3, the same as zlib's), from ISA-L if it is installed.
 
-ISA-L's takes about a seventh of the time of zlib's (`benchmarks/mcap_reading.py` measures it). Both return the same
-number and release the interpreter lock.
+ISA-L's function needs about a seventh of the time of zlib's (`benchmarks/mcap_reading.py` measures it). Both return the
+same number and release the interpreter lock.
 """
 
 from __future__ import annotations

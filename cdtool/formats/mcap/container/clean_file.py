@@ -1,6 +1,6 @@
-"""Writing what is left of a file: messages byte for byte, in new chunks with indexes, CRCs and a summary.
+"""Write the recovered messages of a file unchanged, in new chunks with indexes, CRCs and a summary.
 
-The records are the `mcap` package's; its writer is not used, as it puts a CRC on all chunks or on none.
+The records are those of the `mcap` package. Its writer is not used because it writes CRCs for all chunks or for none.
 """
 
 from __future__ import annotations
@@ -16,11 +16,14 @@ from cdtool.formats.mcap.container.checksums import crc32
 from cdtool.formats.mcap.container.log import Messages
 from cdtool.formats.mcap.container.records import MAGIC, AttachmentIndex, Metadata
 
-_HEADER = 31  # opcode, length, channel id, sequence, two times: what stands before a payload
+_HEADER = 31  # bytes before a payload: opcode, length, channel id, sequence, two times
 
 
 class CleanFile:
-    """A file under way; `finish` makes it whole. Uncovered chunks carry no CRC, and then neither does the summary."""
+    """An MCAP file that is being written; `finish` completes it.
+
+    Chunks of messages without a CRC are written without a CRC, and in that case the summary, too.
+    """
 
     def __init__(self, file: IO[bytes], profile: str = "") -> None:
         import zstandard
@@ -41,13 +44,13 @@ class CleanFile:
         self._write(written.Header(profile=profile, library="cdtool"))
 
     def add_messages(self, messages: Sequence[Messages], covered: bool) -> None:
-        """One chunk of them, in the order of the file they come from; without a CRC where none covered them."""
+        """Write messages as one chunk, in the order of their file; without a CRC if they are not `covered` by one."""
         builder = RecordBuilder()
-        for item in messages:
-            self._define(item, builder, covered)
+        for channel_messages in messages:
+            self._define(channel_messages, builder, covered)
         content = [_end(builder)]
         offset = len(content[0])
-        entries: dict[int, list[tuple[int, int]]] = {item.stream.id: [] for item in messages}
+        entries: dict[int, list[tuple[int, int]]] = {channel_messages.stream.id: [] for channel_messages in messages}
         for start, length, time, channel, data in _in_file_order(messages):
             content.append(bytes(data[start - _HEADER : start + length]))
             entries[channel].append((time, offset))
@@ -55,19 +58,19 @@ class CleanFile:
         self._chunk(b"".join(content), entries, covered)
 
     def add_attachment(self, record: Iterable[bytes], index: AttachmentIndex) -> None:
-        """An attachment's record as it stood, in pieces, and what an index told of it there."""
+        """Write an attachment's record unchanged, in pieces, and add it to the index; `index` is its previous entry."""
         self._attachments.append(written.AttachmentIndex(**(vars(index) | {"offset": self._file.tell()})))
         for piece in record:
             self._file.write(piece)
 
     def add_metadata(self, metadata: Metadata) -> None:
-        """A metadata record."""
+        """Write a metadata record and add it to the index."""
         at = self._file.tell()
         self._write(written.Metadata(name=metadata.name, metadata=dict(metadata.metadata)))
         self._metadata.append(written.MetadataIndex(offset=at, length=self._file.tell() - at, name=metadata.name))
 
     def finish(self) -> None:
-        """Data end, summary, footer."""
+        """Write data end, summary and footer."""
         self._write(written.DataEnd(data_section_crc=0))
         start = self._file.tell()
         builder = RecordBuilder()
@@ -90,13 +93,13 @@ class CleanFile:
         section = _end(builder) + b"".join(map(_bytes, offsets))
         self._file.write(section)
         end = _bytes(written.Footer(summary_start=start, summary_offset_start=offset_start, summary_crc=0))
-        # The summary's CRC would cover definitions that no CRC covered.
+        # A CRC of the summary would also cover definitions that no CRC covered before.
         crc = 0 if self._unverified else crc32(end[:-4], crc32(section))
         self._file.write(end[:-4] + crc.to_bytes(4, "little") + MAGIC)
 
-    def _define(self, item: Messages, builder: RecordBuilder, covered: bool) -> None:
-        """Schema and channel in the chunk of their first messages, and of the first ones that a CRC covers."""
-        channel, schema = item.stream.channel, item.stream.schema
+    def _define(self, channel_messages: Messages, builder: RecordBuilder, covered: bool) -> None:
+        """Write schema and channel to the chunk of their first messages, and of the first messages with a CRC."""
+        channel, schema = channel_messages.stream.channel, channel_messages.stream.schema
         known = self._covered if covered else self._defined
         if channel.id in known:
             return
@@ -110,7 +113,7 @@ class CleanFile:
 
     def _chunk(self, content: bytes, entries: dict[int, list[tuple[int, int]]], covered: bool) -> None:
         packed = self._compressor.compress(content)
-        times = [time for found in entries.values() for time, _ in found]
+        times = [time for of_channel in entries.values() for time, _ in of_channel]
         span = (min(times), max(times))
         self._times.append(span)
         self._unverified = self._unverified or not covered
@@ -126,11 +129,11 @@ class CleanFile:
             )
         )
         end = self._file.tell()
-        places = {}
-        for channel, found in entries.items():
-            places[channel] = self._file.tell()
-            self._counts[channel] = self._counts.get(channel, 0) + len(found)
-            self._write(written.MessageIndex(channel_id=channel, records=found))
+        offsets = {}
+        for channel, of_channel in entries.items():
+            offsets[channel] = self._file.tell()
+            self._counts[channel] = self._counts.get(channel, 0) + len(of_channel)
+            self._write(written.MessageIndex(channel_id=channel, records=of_channel))
         self._indexes.append(
             written.ChunkIndex(
                 chunk_length=end - at,
@@ -139,7 +142,7 @@ class CleanFile:
                 compressed_size=len(packed),
                 message_end_time=span[1],
                 message_index_length=self._file.tell() - end,
-                message_index_offsets=places,
+                message_index_offsets=offsets,
                 message_start_time=span[0],
                 uncompressed_size=len(content),
             )
@@ -174,11 +177,13 @@ def _end(builder: RecordBuilder) -> bytes:
 
 
 def _in_file_order(messages: Sequence[Messages]) -> Iterable[tuple[int, int, int, int, Any]]:
-    """Start and length of the payload, log time, channel id, memory of every message; all share one piece of memory."""
-    batches = [item.batch for item in messages]
+    """Return payload start and length, log time, channel id and memory of every message; all share one memory block."""
+    batches = [channel_messages.batch for channel_messages in messages]
     starts = np.concatenate([batch.start for batch in batches])
     order = np.argsort(starts, kind="stable")
-    channels = np.repeat([item.stream.id for item in messages], [len(batch) for batch in batches])
+    channels = np.repeat(
+        [channel_messages.stream.id for channel_messages in messages], [len(batch) for batch in batches]
+    )
     lengths = np.concatenate([batch.length for batch in batches])[order].tolist()
     times = np.concatenate([batch.log_time for batch in batches])[order].tolist()
     data = batches[0].data

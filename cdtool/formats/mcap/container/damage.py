@@ -1,11 +1,11 @@
-"""What is wrong with a file, as the readers of its parts raise it."""
+"""Errors that the readers of a file's parts raise for damaged bytes."""
 
 from __future__ import annotations
 
 
 class DamageError(Exception):
-    """Bytes that cannot be what they claim to be; the text is the reason a user sees."""
+    """Bytes that cannot be what they declare; the text is the reason that is displayed to the user."""
 
 
 class RefusedError(DamageError):
-    """Bytes that would grow as only a bomb does: they may be whole, but are not decompressed."""
+    """Bytes that are not decompressed because of their declared size: the file may be a decompression bomb."""

@@ -1,8 +1,8 @@
-"""The data section (section "Data Section" of the specification), from the front to its end, whatever is damaged.
+"""Read the data section (section "Data Section" of the specification) from start to end, also if it is damaged.
 
-What fails its CRC is lost as a whole. After bytes that cannot be a record the next chunk is looked for: in the summary
-where its CRC fits, else by its looks. Of a chunk that the file's end cuts off, what can be decompressed is given, as
-covered by no CRC.
+A chunk whose CRC does not match is lost as a whole. After bytes that cannot be a record, reading continues at the next
+chunk, which is located by the summary if its CRC matches, or else by the consistency of its header. If the file's end
+cuts off a chunk, the part that can be decompressed is returned as not covered by a CRC.
 """
 
 from __future__ import annotations
@@ -13,17 +13,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from cdtool.formats.mcap.container import walk_kernel as why
+from cdtool.formats.mcap.container import walk_kernel
+from cdtool.formats.mcap.container.arena import Arena, MessageBlock, WalkResult
 from cdtool.formats.mcap.container.attachments import check_attachment
+from cdtool.formats.mcap.container.chunk_read_ahead import ChunkReadAhead
 from cdtool.formats.mcap.container.chunks import (
     HEADER_LENGTH,
     LARGEST,
     ChunkHeader,
-    Claims,
+    ClaimedSizes,
     Decompressor,
     chunk_header,
 )
-from cdtool.formats.mcap.container.chunks_ahead import ChunksAhead
 from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
@@ -41,28 +42,27 @@ from cdtool.formats.mcap.container.records import (
     Metadata,
     Schema,
 )
-from cdtool.formats.mcap.container.room import Piece, Room, Walked
-from cdtool.formats.mcap.container.skim import only_message_indexes
-from cdtool.formats.mcap.container.summary import Summary, same_figures
+from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
+from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.fast_path import ChunkReader
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
-_NO_KIND = "a record of kind 0, which there is not"
+_NO_KIND = "a record of kind 0, which does not exist"
 _REASONS = {
-    why.NO_KIND: _NO_KIND,
-    why.TOO_LONG: "a record claims more bytes than its chunk has left",
-    why.SHORT_MESSAGE: "a message shorter than its header",
+    walk_kernel.NO_KIND: _NO_KIND,
+    walk_kernel.TOO_LONG: "a record declares more bytes than are left in its chunk",
+    walk_kernel.SHORT_MESSAGE: "a message shorter than its header",
 }
 _WINDOW = 1 << 20
 
 
 class DataSection:
-    """Its `pieces`, and what was met on the way: chunks by their places, extras, the end record, what is lost.
+    """Reader of the data section, with its chunks by byte, extras, the end record and losses.
 
-    `extras` are (opcode, place, length) of whole attachments and metadata; `other_times` counts chunks whose header
-    tells other times than their messages.
+    `extras` are (opcode, byte, length) of complete attachments and metadata; `other_times` counts chunks whose header
+    has other times than their messages.
     """
 
     def __init__(
@@ -78,26 +78,26 @@ class DataSection:
         self.extras: dict[tuple[int, int, int], None] = {}
         self.end: DataEnd | None = None
         self.end_at = self.other_times = 0
-        self.room = Room(definitions)
+        self.arena = Arena(definitions)
         self._file, self._summary, self._skip = file, summary, skip
         self._following = dict(pairwise(sorted(summary.chunks)))
         self._decompressor = Decompressor()
-        self._ahead = ChunksAhead(file.path, summary, skip, definitions, taker)
+        self._ahead = ChunkReadAhead(file.path, summary, skip, definitions, taker)
         self._window = _SMALLEST_WINDOW
-        self._claims = Claims()
+        self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
 
-    def pieces(self) -> Iterator[Piece]:
-        """All messages that can be had."""
+    def pieces(self) -> Iterator[MessageBlock]:
+        """Yield all messages that can be read."""
         with self._ahead:
             yield from self._records()
-            yield from self.room.flush()
+            yield from self.arena.flush()
 
-    def _records(self) -> Iterator[Piece]:
+    def _records(self) -> Iterator[MessageBlock]:
         at = len(MAGIC)
         if bytes(self._file.read(0, at)) != MAGIC:
-            self.losses.add(Loss(0, min(at, self._file.size), "the file does not begin as an MCAP file"))
+            self.losses.add(Loss(0, min(at, self._file.size), "the file does not start like an MCAP file"))
             self.losses.stopped = self._file.size <= at
         while not self.losses.stopped and self.end is None:
             self.end_at = at
@@ -117,7 +117,7 @@ class DataSection:
                     at = yield from self._outside_chunks(at, length)
                 elif opcode == Chunk.opcode and header is not None:
                     yield from self._chunk(header)
-                    at = self._behind(header)
+                    at = self._after(header)
                 else:
                     self._other(opcode, at, length, head)
                     at += length
@@ -130,104 +130,104 @@ class DataSection:
             self.losses.add(Loss(header.at, 1, f"a chunk is marked as a record of kind {opcode}"))
             return Chunk.opcode
         if opcode == Chunk.opcode and header is None and len(head) == HEADER_LENGTH:
-            raise DamageError("a chunk's compression has no name that there is")
+            raise DamageError("the name of a chunk's compression is damaged")
         return opcode
 
     def _resume(self, at: int, reason: str) -> int:
-        begin, found = self._resync.after(at)
-        behind = self._file.size if found is None else found
-        self.losses.stopped = found is None
-        self.losses.add(Loss(begin, behind - begin, reason))
-        return behind
+        begin, following = self._resync.after(at)
+        end = self._file.size if following is None else following
+        self.losses.stopped = following is None
+        self.losses.add(Loss(begin, end - begin, reason))
+        return end
 
-    def _chunk(self, header: ChunkHeader) -> Iterator[Piece]:
+    def _chunk(self, header: ChunkHeader) -> Iterator[MessageBlock]:
         self._lost = None
         self.chunks[header.at] = header
         if header.at in self._skip:
-            self._resync.proven = header.at + header.length
+            self._resync.verified_to = header.at + header.length
             return
-        self._resync.proven = header.at + 1
+        self._resync.verified_to = header.at + 1
         covered = header.uncompressed_crc != 0
         try:
             header.check()
             self._claims.add(header)
-            if self._ahead.begins(header.at) or not self.room.fits(header.uncompressed_size, covered):
-                yield from self.room.flush()  # before the next group is waited for: it may be taken by these
-                self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered)
-            content = self.room.take(header.uncompressed_size)
+            if self._ahead.begins(header.at) or not self.arena.fits(header.uncompressed_size, covered):
+                yield from self.arena.flush()  # first, because the next group's fast path may learn from these messages
+                self.arena.reset(self._ahead.memory(header.at, header.uncompressed_size), covered)
+            content = self.arena.reserve(header.uncompressed_size)
             taken = self._ahead.taken(header)
-            if taken is None and not self._ahead.holds(header, content):
+            if taken is None and not self._ahead.has_filled(header, content):
                 self._decompressor.read(self._file, header, content)
         except DamageError as fault:
             loss = Loss.of_chunk(header, self._summary, str(fault), refused=isinstance(fault, RefusedError))
             self._lost = self.losses.add(loss)
             return
-        self._resync.proven = header.at + header.length
+        self._resync.verified_to = header.at + header.length
         if taken is not None:
-            yield from self.room.pass_over(len(content), taken)
+            yield from self.arena.add_decoded(len(content), taken)
             times: tuple[int, int] | None = taken.times
         else:
-            walked = yield from self.room.walk(len(content))
+            walked = yield from self.arena.walk(len(content))
             self._note(walked, header.at, len(content))
-            times = walked.times if walked.why == why.DONE else None
+            times = walked.times if walked.reason == walk_kernel.DONE else None
         if times is not None:
             self.other_times += times != (header.message_start_time, header.message_end_time)
 
     def _is_chunk(self, start: int) -> bool:
         return start < self._file.size and self._file.read(start, 1)[0] == Chunk.opcode
 
-    def _behind(self, header: ChunkHeader) -> int:
-        """The next place to look at: the next chunk, where a verified summary has only message indexes before it."""
+    def _after(self, header: ChunkHeader) -> int:
+        """Return the byte after a chunk, or after its message indexes if a verified summary has nothing else there."""
         end, index = header.at + header.length, self._summary.chunks.get(header.at)
-        if self._lost is None and index is not None and self._summary.verified and same_figures(index, header):
+        if self._lost is None and index is not None and self._summary.verified and matches_header(index, header):
             following = self._following.get(header.at)
             if following == end + index.message_index_length and only_message_indexes(self._file, end, following):
                 return following
         return end
 
-    def _cut_chunk(self, header: ChunkHeader) -> Iterator[Piece]:
-        """A chunk that the end of the file cuts off: what lies before the cut."""
+    def _cut_chunk(self, header: ChunkHeader) -> Iterator[MessageBlock]:
+        """Yield the messages before the cut of a chunk that the end of the file cuts off."""
         left = self._file.size - header.data
         loss = Loss.of_chunk(header, self._summary, f"the file ends within a chunk: {left} of {header.size} bytes")
         loss.size, loss.time = self._file.size - header.at, None
         if not header.consistent:
-            raise DamageError(f"a record claims {header.length - PREFIX} bytes where {left} are left")
+            raise DamageError(f"a record declares {header.length - PREFIX} bytes, but only {left} are left")
         header.check()
         self.losses.stopped = True
         self.losses.add(loss)
-        yield from self.room.flush()
-        self.room.renew(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
-        content = self.room.take(header.uncompressed_size)
-        packed = self._file.passing(header.data, left)
+        yield from self.arena.flush()
+        self.arena.reset(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
+        content = self.arena.reserve(header.uncompressed_size)
+        packed = self._file.read_scratch(header.data, left)
         if header.compression:
             try:
-                left = self._decompressor.fill_what_there_is(header, packed, content)
+                left = self._decompressor.fill_available(header, packed, content)
             except DamageError as fault:
                 loss.reason = str(fault)
                 return
         else:
             content[:left] = packed
-        yield from self.room.walk(left)
+        yield from self.arena.walk(left)
 
-    def _outside_chunks(self, at: int, length: int) -> Generator[Piece, None, int]:
-        """Schemas, channels and messages outside of chunks, as many as a window holds; gives the place behind them."""
+    def _outside_chunks(self, at: int, length: int) -> Generator[MessageBlock, None, int]:
+        """Yield the records outside of chunks that fit into a window, and return the byte after them."""
         if length > LARGEST:
-            raise DamageError(f"a record claims {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
+            raise DamageError(f"a record declares {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
         window = self._file.array(at, max(self._window, length))
-        walked = yield from self.room.take_window(window)
-        self._resync.proven = at + walked.at
+        walked = yield from self.arena.take_window(window)
+        self._resync.verified_to = at + walked.at
         self._note(walked, at, len(window))
         self._window = min(4 * self._window, _LARGEST_WINDOW) if 2 * walked.at > len(window) else _SMALLEST_WINDOW
-        if walked.why == why.SHORT_MESSAGE:
-            return self._resume(at + walked.at, _REASONS[walked.why])
+        if walked.reason == walk_kernel.SHORT_MESSAGE:
+            return self._resume(at + walked.at, _REASONS[walked.reason])
         return at + walked.at
 
-    def _note(self, walked: Walked, at: int, size: int) -> None:
-        """What is wrong with records in a chunk or window at byte `at`."""
+    def _note(self, walked: WalkResult, at: int, size: int) -> None:
+        """Add the losses of records in a chunk or window at byte `at`."""
         for fault in walked.faults:
             self.losses.add(Loss(at, 0, f"a definition: {fault}"))
-        if at in self.chunks and walked.why in _REASONS:
-            self.losses.add(Loss(at, size - walked.at, f"in a chunk: {_REASONS[walked.why]}"))
+        if at in self.chunks and walked.reason in _REASONS:
+            self.losses.add(Loss(at, size - walked.at, f"in a chunk: {_REASONS[walked.reason]}"))
 
     def _other(self, opcode: int, at: int, length: int, head: memoryview) -> None:
         self._resync.check(at, length)
@@ -239,7 +239,7 @@ class DataSection:
         body = at + PREFIX
         if opcode == DataEnd.opcode:
             if self._summary.verified and any(self._is_chunk(start) for start in self._summary.chunks if start > at):
-                raise DamageError("the data end before chunks that the summary names")
+                raise DamageError("the data section ends before chunks that the summary names")
             self.end = DataEnd.read(self._file.read(body, min(length - PREFIX, 64)))
         elif opcode in (Attachment.opcode, Metadata.opcode):
             try:
@@ -252,13 +252,14 @@ class DataSection:
             else:
                 self.extras[opcode, at, length] = None
                 if opcode == Attachment.opcode:
-                    self._resync.proven = at + length
+                    self._resync.verified_to = at + length
 
 
 def record_length(at: int, head: memoryview, size: int) -> int:
-    """Return the length of the record at byte `at`, prefix included, as far as that can be believed.
+    """Return the length of the record at byte `at`, including its prefix.
 
-    Section "Records": opcode, length of the content, content. The file has `size` bytes. Raises DamageError.
+    Section "Records": opcode, length of the content, content. The file has `size` bytes. Raises DamageError if the
+    length is impossible.
     """
     left = size - at - PREFIX
     if left < 0:
@@ -267,54 +268,55 @@ def record_length(at: int, head: memoryview, size: int) -> int:
     if head[0] == 0:
         raise DamageError(_NO_KIND)
     if length > left:
-        raise DamageError(f"a record claims {length} bytes where {left} are left")
+        raise DamageError(f"a record declares {length} bytes, but only {left} are left")
     return PREFIX + length
 
 
 class Resync:
-    """Where reading goes on. `proven`: all before it was given, or a CRC proved it; what follows may still be read.
+    """Locates the byte where reading continues after damage.
 
-    A wrong length that no CRC covers leads over whole chunks into the midst of something: these lie before the place
-    where that shows. The way back is bounded, as a file could be made of such lengths.
+    All bytes before `verified_to` were read, or verified by a CRC. A wrong length that no CRC covers may skip complete
+    chunks; they are before the byte where the damage is detected, and after `verified_to`. The number of bytes to go
+    back is limited, because a file may consist of such lengths.
     """
 
     def __init__(self, file: FileBytes, summary: Summary) -> None:
-        self.proven = len(MAGIC)
+        self.verified_to = len(MAGIC)
         self._file = file
         self._known = sorted(summary.chunks) if summary.verified else []
-        self._back = file.size  # bytes that may still be gone back
+        self._back = file.size  # the remaining number of bytes to go back
 
     def check(self, at: int, length: int) -> None:
-        """Raise DamageError where a record, no chunk, reaches over a chunk that a verified summary names."""
-        following = bisect_right(self._known, at)
-        if following < len(self._known) and (place := self._known[following]) < at + length:
-            header = chunk_header(place, self._file.read(place, HEADER_LENGTH))
+        """Raise DamageError if a record other than a chunk overlaps a chunk that a verified summary names."""
+        number = bisect_right(self._known, at)
+        if number < len(self._known) and (following := self._known[number]) < at + length:
+            header = chunk_header(following, self._file.read(following, HEADER_LENGTH))
             if header is not None and header.consistent:
-                raise DamageError(f"a record of {length} bytes reaches over a chunk")
+                raise DamageError(f"a record of {length} bytes overlaps a chunk")
 
     def after(self, at: int) -> tuple[int, int | None]:
-        """Behind byte `at`, which begins no record: from where on bytes are lost, and the next chunk (None: none)."""
-        found = self._next(self.proven)
-        if found is not None and found <= at:
-            self._back -= at - found
-            if found == at or self._back < 0:
-                found = self._next(at + 1)
-        if found is None:
+        """Return the first lost byte and the next chunk (None: no more), if no record starts at byte `at`."""
+        chunk = self._next(self.verified_to)
+        if chunk is not None and chunk <= at:
+            self._back -= at - chunk
+            if chunk == at or self._back < 0:
+                chunk = self._next(at + 1)
+        if chunk is None:
             return at, None
-        begin, self.proven = min(at, self.proven) if found < at else at, found + 1
-        return begin, found
+        begin, self.verified_to = min(at, self.verified_to) if chunk < at else at, chunk + 1
+        return begin, chunk
 
     def _next(self, at: int) -> int | None:
-        place = bisect_left(self._known, at)
-        return self._known[place] if place < len(self._known) else next_chunk(self._file, at)
+        number = bisect_left(self._known, at)
+        return self._known[number] if number < len(self._known) else next_chunk(self._file, at)
 
 
 def next_chunk(file: FileBytes, at: int) -> int | None:
-    """The first place from byte `at` on that looks like a chunk: its sizes and its compression agree."""
+    """Return the first byte from `at` where a chunk may start: its sizes and its compression are consistent."""
     while at < file.size - HEADER_LENGTH:
         window = file.array(at, _WINDOW + HEADER_LENGTH)
-        for place in _candidates(window):
-            header = chunk_header(at + place, window[place : place + HEADER_LENGTH].data)
+        for offset in _candidates(window):
+            header = chunk_header(at + offset, window[offset : offset + HEADER_LENGTH].data)
             if header is not None and header.consistent and header.size <= LARGEST:
                 return header.at
         at += _WINDOW
@@ -322,11 +324,11 @@ def next_chunk(file: FileBytes, at: int) -> int | None:
 
 
 def _candidates(window: Bytes) -> list[int]:
-    """Return where the opcode of a chunk precedes a length below 4 GiB."""
+    """Return the offsets where the opcode of a chunk precedes a length below 4 GiB."""
     last = len(window) - HEADER_LENGTH
     if last <= 0:
         return []
-    fits = window[:last] == Chunk.opcode
+    matches = window[:last] == Chunk.opcode
     for i in range(PREFIX - 4, PREFIX):
-        fits &= window[i : i + last] == 0
-    return [int(place) for place in np.flatnonzero(fits)]
+        matches &= window[i : i + last] == 0
+    return [int(offset) for offset in np.flatnonzero(matches)]

@@ -1,4 +1,4 @@
-"""Schemas (op=0x03) and channels (op=0x04): each id means one thing in a file, or its messages are not read."""
+"""Schemas (op=0x03) and channels (op=0x04): messages with an ambiguous id are not read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class DefinedStream(Stream):
 
 
 class Definitions:
-    """What the ids of a file stand for, as far as it was read. The summary's copies count where its CRC fits."""
+    """The schemas and channels by id, as far as the file was read; copies in a summary with a CRC are also used."""
 
     def __init__(self, summary: Summary) -> None:
         self._schemas = dict(summary.schemas) if summary.verified else {}
@@ -28,24 +28,27 @@ class Definitions:
         self._covered_schemas = set(self._schemas)
         self._covered_channels = set(self._channels)
         self._fallback = summary
-        # Channels (by id) whose meaning changed, and why.
+        # Channels (by id) whose meaning changed, with the reason.
         self.ambiguous: dict[int, str] = {}
         self._ambiguous_schemas: dict[int, str] = {}
         self._streams: dict[int, DefinedStream | DamageError] = {}
-        self._taken: dict[tuple[int, bytes, bool], bytes] = {}
+        self._latest: dict[tuple[int, bytes, bool], bytes] = {}
 
-    def knows(self, opcode: int, body: bytes, covered: bool) -> bool:
-        """True where one more look tells nothing new: writers repeat definitions, and half a million fit into 8 kB."""
+    def is_known(self, opcode: int, body: bytes, covered: bool) -> bool:
+        """Return whether a definition repeats an earlier one.
+
+        Writers repeat definitions, and half a million of them can be compressed to 8 kB.
+        """
         if opcode == Channel.opcode and len(body) > 1 and int.from_bytes(body[:2], "little") in self.ambiguous:
             return True
-        return self._taken.get((opcode, body[:2], covered)) == body
+        return self._latest.get((opcode, body[:2], covered)) == body
 
-    def take(self, opcode: int, body: memoryview, covered: bool) -> None:
-        """One definition of the data section; raises DamageError where its bytes cannot be one."""
-        self._taken[opcode, bytes(body[:2]), covered] = bytes(body)
+    def add(self, opcode: int, body: memoryview, covered: bool) -> None:
+        """Add a definition of the data section; raises DamageError if its bytes are not a definition."""
+        self._latest[opcode, bytes(body[:2]), covered] = bytes(body)
         if opcode == Schema.opcode:
             schema = Schema.read(body)
-            if schema.id == 0:  # invalid, to be ignored
+            if schema.id == 0:  # invalid by the specification, and ignored
                 return
             if self._schemas.setdefault(schema.id, schema) != schema:
                 reason = f"schema {schema.id} '{schema.name}' is defined twice, differently"
@@ -65,21 +68,21 @@ class Definitions:
         self._streams.clear()
 
     def stream(self, channel_id: int) -> DefinedStream:
-        """A channel and its schema; raises DamageError where either is not defined."""
+        """Return a channel and its schema; raises DamageError if one of them is not defined."""
         if channel_id not in self._streams:
             self._streams[channel_id] = self._find(channel_id)
-        found = self._streams[channel_id]
-        if isinstance(found, DamageError):
-            raise found
-        return found
+        stream = self._streams[channel_id]
+        if isinstance(stream, DamageError):
+            raise stream
+        return stream
 
     def streams(self) -> list[DefinedStream]:
-        """All channels that are whole, in the order of their definitions."""
-        found = (self._find(channel) for channel in self._channels | self._fallback.channels)
-        return [stream for stream in found if isinstance(stream, DefinedStream)]
+        """Return all channels that are completely defined, in the order of their definitions."""
+        streams = (self._find(channel) for channel in self._channels | self._fallback.channels)
+        return [stream for stream in streams if isinstance(stream, DefinedStream)]
 
-    def told_otherwise(self) -> list[str]:
-        """Topics whose channel or schema the summary defines otherwise than the data."""
+    def redefined_topics(self) -> list[str]:
+        """Return the topics whose channel or schema differs between the summary and the data section."""
         known = {stream.id: stream for stream in self.streams()}
         return [
             channel.topic
@@ -95,14 +98,14 @@ class Definitions:
         ]
 
     def _find(self, channel_id: int) -> DefinedStream | DamageError:
-        # A definition that was lost with its chunk may still stand in a summary without a CRC.
+        # A definition that is lost with its chunk may exist in a summary without a CRC.
         channel = self._channels.get(channel_id) or self._fallback.channels.get(channel_id)
         if channel is None:
-            return DamageError(f"a message names channel {channel_id}, which is not there")
+            return DamageError(f"a message names channel {channel_id}, which is not defined")
         number = channel.schema_id
         schema = self._schemas.get(number) or self._fallback.schemas.get(number) if number else None
         if number and schema is None:
-            return DamageError(f"channel '{channel.topic}' names schema {number}, which is not there")
+            return DamageError(f"channel '{channel.topic}' names schema {number}, which is not defined")
         covered = channel_id in self._covered_channels and (not number or number in self._covered_schemas)
         definition = ("", "", b"") if schema is None else (schema.encoding, schema.name, schema.data)
         return DefinedStream(channel_id, channel.topic, channel.message_encoding, definition, channel, schema, covered)

@@ -1,4 +1,7 @@
-"""A file as bytes at places: read, never mapped, so that a file that shrinks or a lost drive is an error, no crash."""
+"""Random access to the bytes of a file, by reading.
+
+If the file shrinks or the drive fails, this raises an error; with a memory-mapped file the process would crash.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ _PIECE, _SMALL = 1 << 20, 1 << 12
 
 
 class FileBytes:
-    """`size` bytes, read where they are asked for."""
+    """A file of `size` bytes that can be read at any position."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -33,47 +36,47 @@ class FileBytes:
         self.close()
 
     def close(self) -> None:
-        """Read no more."""
+        """Close the file."""
         self._file.close()
 
     def read(self, at: int, length: int) -> memoryview:
-        """Up to `length` bytes from `at`, fewer only at the file's end."""
+        """Return up to `length` bytes from `at`, fewer only at the file's end."""
         if length > _SMALL:
             return self.array(at, length).data
-        # A chunk has a handful of records' heads around it: each costs a tenth of what an array of its own does.
-        there = max(0, min(length, self.size - at))
+        # Several record prefixes are read per chunk; this is ten times faster than an array for each.
+        available = max(0, min(length, self.size - at))
         self._file.seek(at)
-        found = self._file.read(there)
-        return memoryview(found) if len(found) == there else self.array(at, length).data
+        content = self._file.read(available)
+        return memoryview(content) if len(content) == available else self.array(at, length).data
 
     def array(self, at: int, length: int) -> Bytes:
-        """The same as an array of its own."""
-        room = np.empty(max(0, min(length, self.size - at)), np.uint8)
-        self.read_into(at, room)
-        return room
+        """Return the same as a new array."""
+        target = np.empty(max(0, min(length, self.size - at)), np.uint8)
+        self.read_into(at, target)
+        return target
 
-    def passing(self, at: int, length: int) -> Bytes:
-        """The same in memory that the next call uses again; raises DamageError where the file ends before."""
+    def read_scratch(self, at: int, length: int) -> Bytes:
+        """Return the same in memory that the next call overwrites; raises DamageError if the file ends before."""
         if length > len(self._scratch):
             self._scratch = np.empty(max(length, _PIECE), np.uint8)
         self.read_into(at, self._scratch[:length])
         return self._scratch[:length]
 
-    def read_into(self, at: int, room: Bytes) -> None:
-        """Fill `room` from `at` on; raises DamageError where the file ends before."""
+    def read_into(self, at: int, target: Bytes) -> None:
+        """Fill `target` with the bytes from `at`; raises DamageError if the file ends before."""
         self._file.seek(at)
-        view, filled = room.data, 0
+        view, filled = target.data, 0
         while filled < len(view):
-            got = self._file.readinto(view[filled:])
-            if not got:
+            count = self._file.readinto(view[filled:])
+            if not count:
                 raise DamageError("the file became shorter while it was read")
-            filled += got
+            filled += count
 
     def crc(self, at: int, end: int) -> int:
-        """CRC-32 of the bytes from `at` to `end`."""
-        crc, room = 0, np.empty(_PIECE, np.uint8)
+        """Return the CRC-32 of the bytes from `at` to before `end`."""
+        crc, target = 0, np.empty(_PIECE, np.uint8)
         while at < end:
-            piece = room[: min(_PIECE, end - at)]
+            piece = target[: min(_PIECE, end - at)]
             self.read_into(at, piece)
             crc = crc32(piece, crc)
             at += len(piece)

@@ -1,4 +1,4 @@
-"""A log: its messages piece by piece, and afterwards what was found: what is lost, unverified, or told otherwise."""
+"""Read an MCAP log piece by piece, with findings on losses, unverified messages and inconsistencies."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from cdtool.findings.containers import (
     SummaryDamaged,
     Unverified,
 )
+from cdtool.formats.mcap.container.arena import MessageBlock
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.data_section import DataSection
 from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.losses import Loss
 from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
-from cdtool.formats.mcap.container.room import Piece
-from cdtool.formats.mcap.container.skim import skippable
-from cdtool.formats.mcap.container.summary import read_summary, same_figures
+from cdtool.formats.mcap.container.skippable_chunks import skippable_chunks
+from cdtool.formats.mcap.container.summary import matches_header, read_summary
 from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import NO_BATCH, Batch
 from cdtool.messages.fast_path import ChunkReader, WrittenRows
@@ -40,9 +40,9 @@ _LONGEST_HEADER = 1 << 12
 
 @dataclass(frozen=True)
 class Messages:
-    """Messages of one channel; `covered`: a CRC covers them and what their ids mean.
+    """Messages of one channel; `covered`: a CRC covers them and their definitions.
 
-    They are either a batch or `parts` that a taker made columns of, chunk by chunk.
+    They are either a batch, or `parts` that the fast path has written to columns, chunk by chunk.
     """
 
     stream: DefinedStream
@@ -53,7 +53,7 @@ class Messages:
 
 @dataclass
 class Topic:
-    """All channels of one topic: what the first says of itself, how many have messages, and how many messages."""
+    """All channels of one topic: schema and encoding of the first, numbers of messages and of used channels."""
 
     name: str
     schema: str
@@ -63,12 +63,12 @@ class Topic:
 
 
 class Log:
-    """An MCAP file. `pieces()` has to be run through once; then `topics`, `origin`, `count` and `findings()` hold.
+    """An MCAP file. After all `pieces()` were read, `topics`, `origin`, `count` and `findings()` are valid.
 
-    `wanted` says which topics are asked for: of others messages are counted only, and chunks without any wanted one are
-    passed over where the summary proves right. Without `use_index` every chunk is read, from the front. Unless it is
-    `strict`, a file of which nothing is left, or whose values are known to be wrong, is no error but a finding. A
-    `taker` may make columns of chunks.
+    `wanted` selects topics: messages of other topics are only counted, and chunks without wanted topics are skipped if
+    the summary is verified. Without `use_index` every chunk is read, from the start. If not `strict`, a file without
+    any readable message, or with values that are known to be wrong, is a finding instead of an error. `taker` is the
+    fast path for chunks.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Log:
         self._wanted = wanted or (lambda _: True)
         self._file = FileBytes(path)
         self.summary = read_summary(self._file)
-        self._skip = skippable(self._file, self.summary, self._wanted) if use_index and wanted else {}
+        self._skip = skippable_chunks(self._file, self.summary, self._wanted) if use_index and wanted else {}
         self._definitions = Definitions(self.summary)
         self.section = DataSection(self._file, self.summary, self._definitions, self._skip, taker)
         self.profile = profile_of(self._file)
@@ -94,9 +94,9 @@ class Log:
         self.unverified = 0
 
     def pieces(self) -> Iterator[tuple[Messages, ...]]:
-        """The wanted messages, piece of memory by piece of memory in the file's order, channel by channel in each.
+        """Yield the wanted messages, one memory block after the other in the file's order, channel by channel in each.
 
-        Raises RecordingError where nothing can be had, or where a CRC tells that values are wrong but not which.
+        Raises RecordingError if no message can be read, or if a CRC shows that values are wrong but not which ones.
         """
         with self._file:
             try:
@@ -108,34 +108,34 @@ class Log:
 
     @property
     def count(self) -> int:
-        """Messages that were read."""
+        """Return the number of messages that were read."""
         return sum(self.counts.values())
 
     @property
     def topic_details(self) -> dict[str, TopicDetails]:
-        """What the file says of each topic."""
+        """Return the details of each topic."""
         return {topic.name: TopicDetails(topic.schema, topic.count, topic.encoding) for topic in self.topics.values()}
 
     def expected(self, topic: str) -> int:
-        """How many messages of a topic the summary foretells; 0 where nothing can be relied on."""
+        """Return the number of messages of a topic in the summary; 0 if the summary is not verified."""
         summary = self.summary
         if not summary.verified or summary.statistics is None:
             return 0
         counts = summary.statistics.channel_message_counts
         return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
-    def _usable(self, piece: Piece) -> Iterator[Messages]:
+    def _usable(self, piece: MessageBlock) -> Iterator[Messages]:
         for channel in dict.fromkeys(channel for taken in piece.taken for channel in taken.counts):
             count = sum(taken.counts.get(channel, 0) for taken in piece.taken)
             parts = tuple(taken.parts[channel] for taken in piece.taken if channel in taken.parts)
             yield from self._counted(channel, count, piece.covered, NO_BATCH, parts)
         for channel, batch in piece.batches:
             if channel in piece.cuts:
-                kept = int(np.searchsorted(batch.start, piece.cuts[channel]))
-                if kept < len(batch):
+                unambiguous = int(np.searchsorted(batch.start, piece.cuts[channel]))
+                if unambiguous < len(batch):
                     reason = self._definitions.ambiguous[channel]
-                    self.section.losses.messages[reason] += len(batch) - kept
-                batch = batch.first(kept)
+                    self.section.losses.messages[reason] += len(batch) - unambiguous
+                batch = batch.first(unambiguous)
             if len(batch):
                 yield from self._counted(channel, len(batch), piece.covered, batch)
 
@@ -155,17 +155,17 @@ class Log:
 
     def _finish(self) -> None:
         section = self.section
-        for place in self._skip.keys() & section.chunks.keys():
-            self.counts.update(self._skip[place])
+        for at in self._skip.keys() & section.chunks.keys():
+            self.counts.update(self._skip[at])
         for stream in self._definitions.streams():
             name = stream.topic
             schema = stream.schema.name if stream.schema is not None else "no schema"
             topic = self.topics.setdefault(name, Topic(name, schema, stream.encoding))
             topic.count += self.counts[stream.id]
             topic.channels += bool(self.counts[stream.id])
-        self.origin = section.room.first_time or 0
+        self.origin = section.arena.first_time or 0
         self._check_data_crc()
-        self._look_behind()
+        self._check_appended_data()
         if self._strict and not self.count and section.losses:
             self._raise_nothing_left()
 
@@ -177,81 +177,81 @@ class Log:
             self.unverified = 0
         elif self._strict and self.unverified:
             raise RecordingError(
-                f"{self.path}: the checksum of the data does not fit: values are damaged, and none can be told right",
+                f"{self.path}: the checksum of the data does not match: values are damaged, and it is unknown which",
                 "copy the file again from its source",
             )
         elif self.unverified or not self.section.losses:
-            text = "the checksum of the data section does not fit"
-            text += "" if self.unverified else " (those of the chunks with messages do)"
+            text = "the checksum of the data section does not match"
+            text += "" if self.unverified else " (those of all chunks with messages match)"
             self.section.losses.add(Loss(self.section.end_at, 0, text))
 
-    def _look_behind(self) -> None:
-        """Bytes behind the end: of a file that is joined to it, whose summary is none of this log's."""
+    def _check_appended_data(self) -> None:
+        """Add the bytes after the log's end as a loss: another file was appended, whose summary is not this log's."""
         if not self.summary.problem or self.section.end is None:
             return
         end = end_of_log(self._file, self.section.end_at)
         if end is not None and end < self._file.size:
-            self.section.losses.add(Loss(end, self._file.size - end, "the log ends here: another file joined to it?"))
+            self.section.losses.add(Loss(end, self._file.size - end, "the log ends here: was another file appended?"))
             self.summary = replace(self.summary, problem="")
 
     def _raise_nothing_left(self) -> None:
         losses = self.section.losses
-        place = losses.places[0] if losses.places else Loss(8, 0, next(iter(losses.messages)))
-        reason = " ".join(place.reason.split())[:200]
+        first = losses.entries[0] if losses.entries else Loss(8, 0, next(iter(losses.messages)))
+        reason = " ".join(first.reason.split())[:200]
         raise RecordingError(
-            f"{self.path}: damaged at byte {place.at}, before its first message: {reason}",
+            f"{self.path}: damaged at byte {first.at}, before its first message: {reason}",
             "copy the file again from its source; no message in it can be read",
         )
 
     def findings(self) -> list[Finding]:
-        """What is lost, then what the summary tells otherwise, then what no checksum covers."""
+        """Return findings on losses, then on differences from the summary, then on messages without a checksum."""
         section, statistics = self.section, self.summary.statistics
-        found = section.losses.findings(self.count, self.origin)
+        findings = section.losses.findings(self.count, self.origin)
         if self.summary.problem and not section.losses.stopped:
-            found.append(Finding(SummaryDamaged(self.summary.problem, self.count), severity="loss"))
+            findings.append(Finding(SummaryDamaged(self.summary.problem, self.count), severity="loss"))
         if statistics is not None and statistics.message_count != self.count:
-            found.append(Finding(MessageCountDiffers(statistics.message_count, self.count), severity="loss"))
-        found += self._disagreements()
+            findings.append(Finding(MessageCountDiffers(statistics.message_count, self.count), severity="loss"))
+        findings += self._differences()
         if self.unverified:
-            found.append(Finding(Unverified(self.unverified, self.count), severity="note"))
+            findings.append(Finding(Unverified(self.unverified, self.count), severity="note"))
         for topic in self.topics.values():
             if topic.channels > 1 and self._wanted(topic.name):
-                found.append(Finding(SeveralWriters(topic.channels), topic.name))
+                findings.append(Finding(SeveralWriters(topic.channels), topic.name))
         if not self.count:
-            found.append(Finding(NoMessage()))
-        return found
+            findings.append(Finding(NoMessage()))
+        return findings
 
-    def _disagreements(self) -> list[Finding]:
-        """The summary against the data, where nothing is lost that would explain a difference."""
+    def _differences(self) -> list[Finding]:
+        """Return the differences between summary and data, unless a loss may explain them."""
         section, summary = self.section, self.summary
         if section.losses or summary.problem:
             return []
-        found: list[Finding] = []
+        findings: list[Finding] = []
         chunks = section.chunks
         if summary.chunks:
             missing = len(chunks.keys() - summary.chunks.keys())
             absent = len(summary.chunks.keys() - chunks.keys())
             both = chunks.keys() & summary.chunks.keys()
-            other = sum(not same_figures(summary.chunks[at], chunks[at]) for at in both)
+            other = sum(not matches_header(summary.chunks[at], chunks[at]) for at in both)
             differences = (
                 IndexDisagrees(missing, "not indexed"),
                 IndexDisagrees(absent, "only indexed"),
                 IndexDisagrees(other, "other values"),
             )
-            found += [Finding(item) for item in differences if item.count]
+            findings += [Finding(difference) for difference in differences if difference.count]
         if section.other_times:
-            found.append(Finding(ChunkTimesDiffer(section.other_times)))
+            findings.append(Finding(ChunkTimesDiffer(section.other_times)))
         statistics = summary.statistics
         if statistics is not None and statistics.channel_message_counts:
             stated = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
             read = {channel: count for channel, count in self.counts.items() if count}
             if stated != read and statistics.message_count == self.count:
-                found.append(Finding(ChannelCountsDiffer()))
-        return found + [Finding(DefinedOtherwise(), topic) for topic in self._definitions.told_otherwise()]
+                findings.append(Finding(ChannelCountsDiffer()))
+        return findings + [Finding(DefinedOtherwise(), topic) for topic in self._definitions.redefined_topics()]
 
 
 def profile_of(file: FileBytes) -> str:
-    """Return what the header calls the file's profile, such as `ros2`; empty where it has no header."""
+    """Return the profile that the file's header states, such as `ros2`; empty if there is no header."""
     head = file.read(len(MAGIC), PREFIX)
     length = int.from_bytes(head[1:], "little")
     if len(head) < PREFIX or head[0] != Header.opcode or length > _LONGEST_HEADER:
@@ -263,7 +263,7 @@ def profile_of(file: FileBytes) -> str:
 
 
 def end_of_log(file: FileBytes, at: int) -> int | None:
-    """Where the log ends whose end of data stands at byte `at`: behind the magic bytes that follow its footer."""
+    """Return the end of a log whose data end record is at byte `at`: the byte after the footer and magic bytes."""
     while True:
         head = file.read(at, PREFIX)
         length = PREFIX + int.from_bytes(head[1:], "little")

@@ -1,7 +1,7 @@
-"""The records of an MCAP file, one class each, as the specification's section "Records" lists them.
+"""The records of an MCAP file, one class per record of the specification's section "Records".
 
-`read(body)` takes a record's content, without opcode and length. Bytes behind the last known field are ignored, as the
-specification asks ("Records may be extended by adding new fields at the end"). Times are uint64 ns.
+`read(body)` parses a record's content, without opcode and length. Bytes after the last known field are ignored, as the
+specification requires ("Records may be extended by adding new fields at the end"). Times are uint64 ns.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ PREFIX = 9  # opcode (uint8) and content length (uint64)
 
 
 def wire(read: Read) -> Any:
-    """A field and how it is written."""
+    """Return a dataclass field that `read` parses."""
     return field(metadata={"read": read})
 
 
 class Record:
-    """What all records share: their fields are read in the order in which they stand."""
+    """The base of all records: `read` parses the fields in their order."""
 
     opcode: ClassVar[int]
 
     @classmethod
     def read(cls, body: memoryview) -> Self:
-        """The record whose content `body` is; raises DamageError."""
+        """Return the record with the content `body`; raises DamageError."""
         values, at = [], 0
-        for item in fields(cls):  # type: ignore[arg-type]
-            value, at = item.metadata["read"](body, at)
+        for each in fields(cls):  # type: ignore[arg-type]
+            value, at = each.metadata["read"](body, at)
             values.append(value)
         return cls(*values)
 
@@ -59,7 +59,7 @@ class Header(Record):
 
 @dataclass(frozen=True)
 class Footer(Record):
-    """Footer (op=0x02): the last record. A start of 0: there is no such section; a CRC of 0: it is not available."""
+    """Footer (op=0x02): the last record. A start of 0 means that there is no such section, a CRC of 0 no checksum."""
 
     opcode = 0x02
     summary_start: int = wire(uint64)
@@ -69,7 +69,7 @@ class Footer(Record):
 
 @dataclass(frozen=True)
 class Schema(Record):
-    """Schema (op=0x03): how the messages of a channel are laid out. One with the id 0 is ignored."""
+    """Schema (op=0x03): the layout of a channel's messages. A schema with the id 0 is ignored."""
 
     opcode = 0x03
     id: int = wire(uint16)
@@ -80,7 +80,7 @@ class Schema(Record):
 
 @dataclass(frozen=True)
 class Channel(Record):
-    """Channel (op=0x04): a stream of messages on a topic. The schema 0: there is none."""
+    """Channel (op=0x04): a stream of messages on a topic. The schema id 0 means that there is no schema."""
 
     opcode = 0x04
     id: int = wire(uint16)
@@ -92,7 +92,7 @@ class Channel(Record):
 
 @dataclass(frozen=True)
 class Message(Record):
-    """Message (op=0x05). Many at once are found by `walk_kernel`, which makes no objects of them."""
+    """Message (op=0x05). `walk_kernel` reads many messages at once without creating objects."""
 
     opcode = 0x05
     channel_id: int = wire(uint16)
@@ -104,7 +104,7 @@ class Message(Record):
 
 @dataclass(frozen=True)
 class Chunk(Record):
-    """Chunk (op=0x06): schemas, channels and messages, compressed or not. A CRC of 0: it is not to be checked."""
+    """Chunk (op=0x06): schemas, channels and messages, compressed or not. A CRC of 0 means no checksum."""
 
     opcode = 0x06
     message_start_time: int = wire(uint64)
@@ -126,7 +126,7 @@ class MessageIndex(Record):
 
 @dataclass(frozen=True)
 class ChunkIndex(Record):
-    """Chunk Index (op=0x08): where a chunk and its message indexes stand, and the figures of its header."""
+    """Chunk Index (op=0x08): the position of a chunk and of its message indexes, and the values of its header."""
 
     opcode = 0x08
     message_start_time: int = wire(uint64)
@@ -142,7 +142,7 @@ class ChunkIndex(Record):
 
 @dataclass(frozen=True)
 class Attachment(Record):
-    """Attachment (op=0x09): a file beside the messages. Its CRC covers the fields before it; 0: not to be checked."""
+    """Attachment (op=0x09): an embedded file. The CRC covers the fields before it; 0 means no checksum."""
 
     opcode = 0x09
     log_time: int = wire(uint64)
@@ -155,7 +155,7 @@ class Attachment(Record):
 
 @dataclass(frozen=True)
 class AttachmentIndex(Record):
-    """Attachment Index (op=0x0A): where an attachment stands."""
+    """Attachment Index (op=0x0A): the position of an attachment."""
 
     opcode = 0x0A
     offset: int = wire(uint64)
@@ -169,7 +169,7 @@ class AttachmentIndex(Record):
 
 @dataclass(frozen=True)
 class Statistics(Record):
-    """Statistics (op=0x0B): how much there is of everything."""
+    """Statistics (op=0x0B): the numbers of messages, schemas, channels, attachments, metadata and chunks."""
 
     opcode = 0x0B
     message_count: int = wire(uint64)
@@ -185,7 +185,7 @@ class Statistics(Record):
 
 @dataclass(frozen=True)
 class Metadata(Record):
-    """Metadata (op=0x0C): names and values of the user's."""
+    """Metadata (op=0x0C): a user's names and values."""
 
     opcode = 0x0C
     name: str = wire(string)
@@ -194,7 +194,7 @@ class Metadata(Record):
 
 @dataclass(frozen=True)
 class MetadataIndex(Record):
-    """Metadata Index (op=0x0D): where a metadata record stands."""
+    """Metadata Index (op=0x0D): the position of a metadata record."""
 
     opcode = 0x0D
     offset: int = wire(uint64)
@@ -204,7 +204,7 @@ class MetadataIndex(Record):
 
 @dataclass(frozen=True)
 class SummaryOffset(Record):
-    """Summary Offset (op=0x0E): where the summary's records of one kind stand."""
+    """Summary Offset (op=0x0E): the position of the summary's records of one kind."""
 
     opcode = 0x0E
     group_opcode: int = wire(uint8)
@@ -214,7 +214,7 @@ class SummaryOffset(Record):
 
 @dataclass(frozen=True)
 class DataEnd(Record):
-    """Data End (op=0x0F): the data section's last record, with the CRC of all before it; 0: it is not available."""
+    """Data End (op=0x0F): the last record of the data section, with the CRC of all bytes before it; 0: no checksum."""
 
     opcode = 0x0F
     data_section_crc: int = wire(uint32)

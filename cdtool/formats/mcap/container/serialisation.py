@@ -1,7 +1,7 @@
-"""How values are written (section "Serialization" of the specification).
+"""Readers of serialised values (section "Serialization" of the specification).
 
-A reader takes a record's content and a place in it, and gives the value there and the place behind it. Integers are
-little-endian. What ends before its value does is a DamageError.
+A reader is called with a record's content and an offset; it returns the value there and the offset after it. Integers
+are little-endian. A reader raises DamageError if the content ends within the value.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ uint8, uint16, uint32, uint64 = (_integer(code) for code in "BHIQ")
 
 
 def _prefixed(length: Read) -> Read:
-    """Bytes behind their length."""
+    """Return a reader of bytes that follow their length."""
 
     def read(body: memoryview, at: int) -> tuple[memoryview, int]:
         size, at = length(body, at)
         if size > len(body) - at:
-            raise DamageError(f"a field claims {size} bytes where {len(body) - at} are left")
+            raise DamageError(f"a field declares {size} bytes, but only {len(body) - at} are left")
         return body[at : at + size], at + size
 
     return read
@@ -45,13 +45,13 @@ block, long_block = _prefixed(uint32), _prefixed(uint64)
 
 
 def byte_block(body: memoryview, at: int) -> tuple[bytes, int]:
-    """Bytes behind their length, as a copy."""
+    """Read bytes that follow their length, as a copy."""
     content, at = block(body, at)
     return bytes(content), at
 
 
 def string(body: memoryview, at: int) -> tuple[str, int]:
-    """UTF-8 behind its length; raises DamageError where it is not."""
+    """Read a text that follows its length; raises DamageError if it is not UTF-8."""
     content, at = block(body, at)
     try:
         return str(content, "utf-8"), at
@@ -60,27 +60,27 @@ def string(body: memoryview, at: int) -> tuple[str, int]:
 
 
 def mapping(key: Read, value: Read) -> Read:
-    """Map<key, value>: of a key that comes twice the last counts."""
+    """Return a reader of Map<key, value>; the last value of a repeated key is valid."""
 
     def read(body: memoryview, at: int) -> tuple[dict[Any, Any], int]:
-        held, at = block(body, at)
+        content, at = block(body, at)
         entries, inside = {}, 0
-        while inside < len(held):
-            name, inside = key(held, inside)
-            entries[name], inside = value(held, inside)
+        while inside < len(content):
+            name, inside = key(content, inside)
+            entries[name], inside = value(content, inside)
         return entries, at
 
     return read
 
 
 def index_entries(body: memoryview, at: int) -> tuple[tuple[tuple[int, int], ...], int]:
-    """Array<Tuple<Timestamp, uint64>>."""
-    held, at = block(body, at)
-    if len(held) % 16:
-        raise DamageError(f"a message index of {len(held)} bytes")
-    return tuple(struct.iter_unpack("<QQ", held)), at
+    """Read Array<Tuple<Timestamp, uint64>>."""
+    content, at = block(body, at)
+    if len(content) % 16:
+        raise DamageError(f"a message index of {len(content)} bytes")
+    return tuple(struct.iter_unpack("<QQ", content)), at
 
 
 def rest(body: memoryview, at: int) -> tuple[memoryview, int]:
-    """All bytes up to the record's end."""
+    """Read all bytes to the record's end."""
     return body[at:], len(body)

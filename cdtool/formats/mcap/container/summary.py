@@ -1,6 +1,6 @@
-"""The end of a file (sections "Footer", "Summary Section", "Summary Offset Section"): what it says of the data.
+"""Read the summary at the end of a file (sections "Footer", "Summary Section", "Summary Offset Section").
 
-It is checked against its CRC here, and against the data by `log`. A summary without a CRC is held to be a hint.
+Its CRC is checked here, and `log` compares it with the data. A summary without a CRC is only used as a hint.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _FOOTER = PREFIX + 20  # a footer is never extended
 
 @dataclass(frozen=True)
 class Summary:
-    """The summary's records; `problem` says why there are none, `verified` that their CRC fits."""
+    """The summary's records; `problem` is the reason why there are no records, `verified`: their CRC matches."""
 
     footer: Footer | None = None
     records: tuple[Record, ...] = ()
@@ -42,7 +42,7 @@ class Summary:
 
 
 def read_summary(file: FileBytes) -> Summary:
-    """What stands behind the data; raises nothing: what is wrong is its `problem`."""
+    """Return the summary; damage is returned as its `problem`, without an exception."""
     footer = None
     try:
         footer, at = _footer(file)
@@ -50,12 +50,12 @@ def read_summary(file: FileBytes) -> Summary:
             return Summary(footer)
         start = footer.summary_start
         if not len(MAGIC) <= start <= at or at - start > LARGEST:
-            raise DamageError(f"the footer names byte {start} as the summary's start")
+            raise DamageError(f"the footer states byte {start} as the summary's start")
         section = file.read(start, at - start)
         crc = crc32(file.read(at, PREFIX + 16), crc32(section))
         if footer.summary_crc and crc != footer.summary_crc:
-            raise DamageError("the checksum of the summary does not fit")
-        records = tuple(parsed(section))
+            raise DamageError("the checksum of the summary does not match")
+        records = tuple(parse_records(section))
     except DamageError as fault:
         return Summary(footer, problem=str(fault))
     counts = [record for record in records if isinstance(record, Statistics)]
@@ -70,8 +70,8 @@ def read_summary(file: FileBytes) -> Summary:
     )
 
 
-def same_figures(index: ChunkIndex, header: ChunkHeader) -> bool:
-    """The index of a chunk tells what the chunk's own header tells."""
+def matches_header(index: ChunkIndex, header: ChunkHeader) -> bool:
+    """Return whether the index of a chunk has the same values as the chunk's header."""
     return (
         index.chunk_length == header.length
         and index.compressed_size == header.size
@@ -82,25 +82,25 @@ def same_figures(index: ChunkIndex, header: ChunkHeader) -> bool:
     )
 
 
-def parsed(section: memoryview) -> Iterator[Record]:
-    """The known records of a piece of a file, one after the other; raises DamageError."""
+def parse_records(section: memoryview) -> Iterator[Record]:
+    """Yield the known records of a part of a file; raises DamageError."""
     at = 0
     while at < len(section):
-        opcode, length = framed(section[at:])
+        opcode, length = read_prefix(section[at:])
         if opcode in KINDS:
             yield KINDS[opcode].read(section[at + PREFIX : at + PREFIX + length])
         at += PREFIX + length
 
 
-def framed(rest: memoryview) -> tuple[int, int]:
-    """Opcode and content length of the record with which `rest` begins; raises DamageError where it is not whole."""
+def read_prefix(rest: memoryview) -> tuple[int, int]:
+    """Return opcode and content length of the record at the start of `rest`; raises DamageError if it is incomplete."""
     if len(rest) < PREFIX:
         raise DamageError(f"the file ends within a record: {len(rest)} bytes are left")
     opcode, length = rest[0], int.from_bytes(rest[1:PREFIX], "little")
     if opcode == 0:
-        raise DamageError("a record of kind 0, which there is not")
+        raise DamageError("a record of kind 0, which does not exist")
     if length > len(rest) - PREFIX:
-        raise DamageError(f"a record claims {length} bytes where {len(rest) - PREFIX} are left")
+        raise DamageError(f"a record declares {length} bytes, but only {len(rest) - PREFIX} are left")
     return opcode, length
 
 
@@ -108,7 +108,7 @@ def _footer(file: FileBytes) -> tuple[Footer, int]:
     at = file.size - _FOOTER - len(MAGIC)
     end = file.read(max(0, at), file.size)
     if at < len(MAGIC) or bytes(end[-len(MAGIC) :]) != MAGIC:
-        raise DamageError("the file does not end as an MCAP file")
-    if end[0] != Footer.opcode or framed(end[: -len(MAGIC)])[1] != _FOOTER - PREFIX:
+        raise DamageError("the file does not end like an MCAP file")
+    if end[0] != Footer.opcode or read_prefix(end[: -len(MAGIC)])[1] != _FOOTER - PREFIX:
         raise DamageError("the file does not end with a footer")
     return Footer.read(end[PREFIX:]), at

@@ -1,4 +1,4 @@
-"""Compiled walk over records (section "Records" of the specification): messages into arrays, then sorted by channel."""
+"""Compiled walk over records (section "Records" of the specification), and sorting of messages by channel."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy.typing as npt
 from cdtool.instructions import prefetch
 from cdtool.kernels import kernel
 
-# Why a walk ended.
+# Reasons of the end of a walk.
 DONE, FULL, OTHER_KIND, NO_KIND, TOO_LONG, SHORT_MESSAGE = range(6)
 
-_AHEAD = 1024  # bytes: some records
+_PREFETCH = 1024  # distance of prefetching [bytes]: some records
 
 Bytes = npt.NDArray[np.uint8]
 _Array = npt.NDArray[Any]
@@ -38,11 +38,11 @@ def walk(
     definitions: int,
     others: _Array,
 ) -> tuple[int, int, int, int]:
-    """The records in data[at:end]: messages into arrays from `messages` on, schemas and channels into `others`.
+    """Write the messages in data[at:end] to arrays, from row `messages`, and schemas and channels to `others`.
 
-    A row of `others` (m, 3) is opcode, start and length of the content. Returns how many messages and others there are
-    now, where the walk ended, and why. At the top level a record of any other kind ends it; in a chunk, where there
-    should be none, it is passed over.
+    A row of `others` (m, 3) is opcode, start and length of the content. Return the number of messages, the number of
+    others, the byte where the walk ended, and the reason. At the top level a record of any other kind ends the walk; in
+    a chunk, which must not contain such records, it is skipped.
     """
     why = DONE
     while at < end:
@@ -63,7 +63,7 @@ def walk(
             why = TOO_LONG
             break
         body = at + 9
-        prefetch(data, at + _AHEAD)
+        prefetch(data, at + _PREFETCH)
         if opcode == 5:
             if size < np.uint64(22):
                 why = SHORT_MESSAGE
@@ -102,7 +102,10 @@ def sort_by_channel(
     log_time_out: _Array,
     place: _Array,
 ) -> None:
-    """Counting sort, stable; `place` holds where each channel's messages begin, by its id, and then where they end."""
+    """Sort messages by channel (stable counting sort).
+
+    `place` is, by channel id, the first row of a channel's messages; it is changed to the row after its last message.
+    """
     for i in range(len(channel)):
         k = place[channel[i]]
         place[channel[i]] = k + 1

@@ -1,8 +1,8 @@
-"""Commas and points that may be decimal marks or something else: where that stays open, a table is refused.
+"""Commas and points with two possible meanings: a table is refused if its rows do not decide between them.
 
-Commas may part cells, or be decimal marks of numbers without quotes. Points may be decimal marks, or part thousands: a
-column of `998`, `999`, `1.000` may be read in two ways. Where no number of the sample shows which, the rows behind it
-are looked through for the first that does.
+A comma may separate cells, or be the decimal mark of a number without quotes. A point may be a decimal mark or a
+thousands separator: a column of `998`, `999`, `1.000` can be read in two ways. If no number of the sample decides, the
+rows after the sample are searched for the first one that does.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from cdtool.formats.csv.text import Bytes
 _EXPONENT = r"[eE][+-]?[0-9]+"
 _PADDED = re.compile(rf"0[0-9]+(?:{_EXPONENT})?|[0-9]+{_EXPONENT}")
 _FRACTION = re.compile(rf"[0-9]+(?:{_EXPONENT})?")
-# Before a decimal comma: digits, perhaps in groups. Behind a comma that parts thousands: the next group.
+# Before a decimal comma: digits, perhaps in groups. After a comma as thousands separator: the next group.
 _WHOLE_PART = re.compile(r"[+-]?(?:[0-9]+|[1-9][0-9]{0,2}(?:[.'\u00a0\u202f ][0-9]{3})+)")
 _FIRST_GROUP, _GROUP = re.compile(r"[+-]?[1-9][0-9]{0,2}"), re.compile(r"[0-9]{3}(?:\.[0-9]*)?")
 
 _HINT = (
     'pin decimal = "," and separator = "semicolon" in [csv] if it is one number, '
-    'separator = "comma" if it is two cells; or save the table with semicolons'
+    'separator = "comma" if they are two cells; or save the table with semicolons'
 )
 _WHOLE = re.compile(r"[+-]?(?:0|[1-9][0-9]*)")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}\.[0-9]{3}")
 _MARKED = re.compile(r"[.,'][0-9]")
-# So many numbers such as `1.234`, and none that is otherwise: no other is waited for.
+# After this many numbers such as `1.234` without any other, the search ends.
 _ENOUGH = 1000
 _ROWS_HELD = 2000
 
@@ -46,50 +46,53 @@ _ROWS_HELD = 2000
 def refuse_commas_that_may_be_decimal(
     path: Path, data: Sequence[tuple[Line, list[str]]], kinds: str, separator: str, named: bool
 ) -> None:
-    """Without a header, `0,05` may be two cells or 0.05: what looks like a fraction cut off by its comma is refused.
+    """Raise RecordingError if a row without a header may be one number: `0,05` may be two cells or 0.05.
 
-    `named`: a comment above holds one word, perhaps the name of one column.
+    `named`: a comment above the rows is a single word, perhaps the name of one column.
     """
     if separator != ",":
         return
     pairs = kinds == "NN" and _may_be_one(data)
     points = not pairs and any("." in cell for _, row in data for i, cell in enumerate(row) if kinds[i] == "N")
-    wrong = next(
+    ambiguous = next(
         ((line, row, i) for line, row in data for i in range(1, len(row)) if _is_fraction(data, kinds, row, i, points)),
         None,
     )
-    if wrong is None and pairs and (named or (len(data) > 2 and not _is_counted(data))):
-        wrong = (*data[0], 1)
-    if wrong is not None:
-        line, row, i = wrong
+    if ambiguous is None and pairs and (named or (len(data) > 2 and not _is_counter(data))):
+        ambiguous = (*data[0], 1)
+    if ambiguous is not None:
+        line, row, i = ambiguous
         raise RecordingError(
-            f"{path}: line {line.number}: '{row[i - 1]},{row[i]}' is one number (decimal comma) or two cells",
+            f"{path}: line {line.number}: '{row[i - 1]},{row[i]}' may be one number (decimal comma) or two cells",
             _HINT,
         )
 
 
 def _is_fraction(data: Sequence[tuple[Line, list[str]]], kinds: str, row: Sequence[str], i: int, points: bool) -> bool:
-    """Digits behind zeros, or with an exponent, after a number; three or six in each row after a time of day."""
+    """Return whether cell `i` may be the decimals of the cell before it.
+
+    After a number: digits with leading zeros, or with an exponent. After a time of day: 3, 6 or 9 digits in all rows.
+    """
     if kinds[i] != "N":
         return False
     if kinds[i - 1] == "N":
         if row[i].startswith("0") and _GROUP.fullmatch(row[i]) and _FIRST_GROUP.fullmatch(row[i - 1]):
             return True
         return not points and _PADDED.fullmatch(row[i]) is not None
-    if kinds[i - 1] != "T" or ":" not in row[i - 1] or row is not data[0][1]:  # asked once: it is of all rows
+    if kinds[i - 1] != "T" or ":" not in row[i - 1] or row is not data[0][1]:  # once: the test is of all rows
         return False
     digits = {len(cells[i]) if cells[i].isdigit() else 0 for _, cells in data}
     return len(digits) == 1 and digits <= {3, 6, 9}
 
 
 def _may_be_one(data: Sequence[tuple[Line, list[str]]]) -> bool:
-    """True if each row of two cells may be one number: `1,5`, `-3,07e+00`, `1.234,5` or `1,234.5`."""
+    """Return whether each row of two cells may be one number: `1,5`, `-3,07e+00`, `1.234,5` or `1,234.5`."""
     decimals = all(_WHOLE_PART.fullmatch(row[0]) and _FRACTION.fullmatch(row[1]) for _, row in data)
     return decimals or all(_FIRST_GROUP.fullmatch(row[0]) and _GROUP.fullmatch(row[1]) for _, row in data)
 
 
-def _is_counted(data: Sequence[tuple[Line, list[str]]]) -> bool:
-    """True if the first column goes up in equal steps, as a counter or a clock does, and the second changes."""
+def _is_counter(data: Sequence[tuple[Line, list[str]]]) -> bool:
+    """Return whether the first column rises in equal steps, like a counter or a clock, and the second one changes."""
     first = [cells[0].replace(".", "") for _, cells in data]
     if not all(cell.isdigit() for cell in first) or len({cells[1] for _, cells in data}) == 1:
         return False
@@ -100,7 +103,10 @@ def _is_counted(data: Sequence[tuple[Line, list[str]]]) -> bool:
 def refuse_one_column_of_decimals(
     path: Path, rows: Sequence[tuple[Line, list[str]]], head: Head, data: Sequence[tuple[Line, list[str]]]
 ) -> None:
-    """One name or number over lines such as `1,5`: one column with a decimal comma, or two without names."""
+    """Raise RecordingError if one name or number is above lines such as `1,5`.
+
+    Such lines may be one column with a decimal comma, or two columns without names.
+    """
     above = [(line, cells) for line, cells in rows if line.number < head.first.number]
     if head.names is not None or not above or len(above[-1][1]) != 1:
         return
@@ -108,60 +114,63 @@ def refuse_one_column_of_decimals(
     if kind(word) != "N" and not _may_be_one(data):
         return
     raise RecordingError(
-        f"{path}: line {head.first.number} ({head.first.text[:40]!r}) is one number (decimal comma) or two cells; "
+        f"{path}: line {head.first.number} ({head.first.text[:40]!r}) may be one number (decimal comma) or two cells; "
         f"line {above[-1][0].number} has one ({word[:40]!r})",
         _HINT,
     )
 
 
-def settled_marks(dialect: Dialect) -> Marks:
-    """The marks by all rows of a table whose sample shows no decimal mark; raises RecordingError where two fit."""
+def resolve_marks(dialect: Dialect) -> Marks:
+    """Return the marks by all rows of a table whose sample has no decimal mark.
+
+    Raises RecordingError if the rows can be read in two ways.
+    """
     pins, path = dialect.pins, dialect.text.path
-    seen: list[tuple[str, int]] = []
+    numbers: list[tuple[str, int]] = []
     points: dict[int, tuple[str, int]] = {}
     for text, line, column in _marked_cells(dialect):
         if _MARKED.search(text) is None:
             continue
-        seen.append((text, line))
-        if _GROUPED.fullmatch(text) is None or len(seen) == _ENOUGH:
-            break  # this one decides, or no more are waited for
+        numbers.append((text, line))
+        if _GROUPED.fullmatch(text) is None or len(numbers) == _ENOUGH:
+            break  # this number decides, or enough of them were seen
         points.setdefault(column, (text, line))
-    marks = find_marks(path, seen, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
+    marks = find_marks(path, numbers, dialect.separator if dialect.width > 1 else "", pins.decimal, pins.thousands)
     if marks.sure or marks.decimal != ".":
         return marks
     for column, (text, line) in points.items():
         whole = next((cells[column] for cells in _first_rows(dialect) if _WHOLE.fullmatch(cells[column])), None)
         if whole is not None:
             raise RecordingError(
-                f"{path}: line {line}, column '{dialect.names[column]}': '{text}' beside '{whole}' is "
+                f"{path}: line {line}, column '{dialect.names[column]}': '{text}' next to '{whole}' may be "
                 f"{text.replace('.', '')} (thousands) or {text} (decimal point)",
-                'pin decimal = "," if it parts thousands, or decimal = ".", in [csv] of the machine file',
+                'pin decimal = "," if the point separates thousands, or decimal = ".", in [csv] of the machine file',
             )
     return marks
 
 
 def _marked_cells(dialect: Dialect) -> Iterator[tuple[str, int, int]]:
-    """Cells of columns of numbers with a mark between digits, their lines and columns, in the file's order."""
+    """Yield cells with a mark between digits in columns of numbers, with line and column, in the file's order."""
     line, end = dialect.first_line, dialect.text.line_end
     marks = b".'" if dialect.separator == "," else b".,'"
     for block, size in dialect.text.blocks(dialect.offset):
         counted = 0
         if any(block.find(letter, 0, size) >= 0 for letter in marks):
-            for place in _numbers(np.frombuffer(block, np.uint8, size), marks, dialect.separator).tolist():
-                if place < counted:  # of the same line
+            for at in _marks_in_numbers(np.frombuffer(block, np.uint8, size), marks, dialect.separator).tolist():
+                if at < counted:  # in the same line
                     continue
-                first, last = block.rfind(end, 0, place) + 1, block.find(end, place)
+                first, last = block.rfind(end, 0, at) + 1, block.find(end, at)
                 line += block.count(end, counted, first)
                 counted = last
                 for column, cell in enumerate(_cells(dialect, bytes(block[first:last]))):
-                    # A last line that is not ended may be cut off: `1.0` may have been `1.000`.
+                    # A last line without a line end may be cut off: `1.0` may have been `1.000`.
                     if dialect.kinds[column] in "NM" and (last < size or _GROUPED.fullmatch(cell)):
                         yield cell, line, column
         line += block.count(end, counted, size)
 
 
-def _numbers(data: Bytes, marks: bytes, separator: str) -> Integers:
-    """Where marks stand within what is a number from border to border: not in the seconds of a time, nor in a date."""
+def _marks_in_numbers(data: Bytes, marks: bytes, separator: str) -> Integers:
+    """Return the bytes of marks within numbers that fill a cell: not in the seconds of a time, nor in a date."""
     borders = separator.encode() + b'" \t\r\n'
     other = np.flatnonzero((data < ord("0")) | (data > ord("9")))
     letters = data[other]
@@ -169,20 +178,20 @@ def _numbers(data: Bytes, marks: bytes, separator: str) -> Integers:
     begun = np.append(True, _is_one_of(borders + b"+-")[letters][:-1])
     digits = np.diff(other, append=len(data)) - 1
     ended = np.append(_is_one_of(borders + b"eE")[letters][1:], True)
-    parted = np.append(mark[1:], False) & (digits == 3)
-    found: Integers = other[mark & begun & (digits > 0) & (ended | parted)]
-    return found
+    grouped = np.append(mark[1:], False) & (digits == 3)
+    places: Integers = other[mark & begun & (digits > 0) & (ended | grouped)]
+    return places
 
 
 def _is_one_of(letters: bytes) -> npt.NDArray[np.bool_]:
-    """For each byte whether it is one of these."""
+    """Return a table (256,) that states for each byte whether it is one of `letters`."""
     table = np.zeros(256, dtype=bool)
     table[list(letters)] = True
     return table
 
 
 def _cells(dialect: Dialect, raw: bytes) -> list[str]:
-    """The cells of a row; none of any other line."""
+    """Return the cells of a row; empty for any other line."""
     text = dialect.text.decode(raw)
     cells = [] if begins_comment(text, dialect.comment) else split_line(text, dialect.separator)
     return cells if len(cells) == dialect.width else []

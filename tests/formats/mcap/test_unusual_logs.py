@@ -1,4 +1,4 @@
-"""Logs that are whole and yet odd: clocks that run back, several writers of a topic, joined files, misfits."""
+"""Undamaged but unusual logs: backward clocks, several writers of a topic, appended files, wrong definitions."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def wanted(*fields, joints=("axis",), clock="log", named=True):
 
 
 def write(path, messages, schema=FORCE, encoding="cdr", channels=1):
-    """Messages (channel number, log time [ns], payload) of topic /a; `channels` write to it."""
+    """Write messages (channel number, log time [ns], payload) of topic /a with this number of `channels`."""
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=200)
         writer.start("ros2")
         number = writer.register_schema("a/msg/A", "ros2msg", schema.encode()) if encoding == "cdr" else 0
-        made = [writer.register_channel("/a", encoding, number, {"publisher": str(i)}) for i in range(channels)]
+        writers = [writer.register_channel("/a", encoding, number, {"publisher": str(i)}) for i in range(channels)]
         for channel, time, payload in messages:
-            writer.add_message(made[channel], time, payload, time)
+            writer.add_message(writers[channel], time, payload, time)
         writer.finish()
     return path
 
@@ -50,39 +50,39 @@ def json_state(names, position):
     return json.dumps({"name": names, "position": position}).encode()
 
 
-def told_of(source):
+def facts_above_notes(source):
     return [finding.fact for finding in source.findings if finding.severity != "note"]
 
 
-@pytest.mark.parametrize(("late", "told"), [(2, "note"), (300, "warning")])
+@pytest.mark.parametrize(("late", "severity"), [(2, "note"), (300, "warning")])
 @pytest.mark.parametrize("survey", [True, False])
-def test_stamps_that_run_back_are_told_with_the_message(tmp_path, late, told, survey):
+def test_backward_stamps_are_reported_with_the_message(tmp_path, late, severity, survey):
     times = [1000 + i for i in range(400)]
     times[350] -= late
     path = write(tmp_path / "log.mcap", [(0, time * MS, cdr(float(i), 0.0)) for i, time in enumerate(times)])
     source = Mcap().columns(path, None if survey else wanted(("/a", "force")))
-    (finding,) = [item for item in source.findings if isinstance(item.fact, OutOfOrder)]
-    assert finding.severity == told
+    (finding,) = [finding for finding in source.findings if isinstance(finding.fact, OutOfOrder)]
+    assert finding.severity == severity
     back = pytest.approx((late - 1) / 1e3)
-    assert finding.fact == OutOfOrder(1, 400, back, set_back=told == "warning", worst=350)
+    assert finding.fact == OutOfOrder(1, 400, back, set_back=severity == "warning", worst=350)
 
 
-def test_stamps_in_order_are_not_told(tmp_path):
+def test_stamps_in_order_are_not_reported(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, (5 + i // 2) * MS, cdr(float(i), 0.0)) for i in range(50)])
-    assert not told_of(Mcap().columns(path))
+    assert not facts_above_notes(Mcap().columns(path))
 
 
-def test_two_channels_of_a_topic_are_told(tmp_path):
+def test_two_channels_of_a_topic_are_reported(tmp_path):
     messages = [(i % 2, i * MS, cdr(float(i), 0.0)) for i in range(20)]
     path = write(tmp_path / "log.mcap", messages, channels=2)
     for source in (Mcap().columns(path), Mcap().columns(path, wanted(("/a", "force")))):
-        assert told_of(source) == [SeveralWriters(2)]
+        assert facts_above_notes(source) == [SeveralWriters(2)]
     path = write(tmp_path / "log.mcap", [(0, time, payload) for _, time, payload in messages], channels=2)
-    assert not told_of(Mcap().columns(path))
+    assert not facts_above_notes(Mcap().columns(path))
 
 
 @pytest.mark.parametrize("every", [1, 3])
-def test_a_message_longer_than_its_definition_is_not_read_as_if_it_fitted(tmp_path, every):
+def test_a_message_longer_than_its_definition_is_not_read(tmp_path, every):
     payloads = [cdr(float(i), 1.0) if i % every else cdr(1e9, float(i), 1.0) for i in range(30)]
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i, payload in enumerate(payloads)])
     if every == 1:
@@ -91,11 +91,11 @@ def test_a_message_longer_than_its_definition_is_not_read_as_if_it_fitted(tmp_pa
         return
     source = Mcap().columns(path, wanted(("/a", "force")))
     assert source.columns["/a force"].values.tolist() == [float(i) for i in range(30) if i % every]
-    fact = told_of(source)[0]
+    fact = facts_above_notes(source)[0]
     assert isinstance(fact, UndecodableMessages) and (fact.count, fact.messages) == (10, 30)
 
 
-def test_up_to_three_bytes_of_padding_are_none_of_the_message(tmp_path):
+def test_up_to_three_bytes_of_padding_are_ignored(tmp_path):
     payloads = [cdr(float(i), 1.0) + bytes(i % 4) for i in range(30)]
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i, payload in enumerate(payloads)])
     assert Mcap().columns(path, wanted(("/a", "force"))).columns["/a force"].values.tolist() == list(range(30))
@@ -109,45 +109,45 @@ def test_other_encapsulations_are_refused(tmp_path, head):
         Mcap().columns(path, wanted(("/a", "force")))
 
 
-def test_names_decide_for_a_single_joint_too(tmp_path):
+def test_names_also_select_a_single_joint(tmp_path):
     payloads = [json_state(["grip"], [-99.0]) if i % 2 else json_state(["arm"], [float(i)]) for i in range(10)]
     path = write(tmp_path / "log.mcap", [(0, i * MS, each) for i, each in enumerate(payloads)], encoding="json")
     with pytest.raises(RecordingError, match="its messages name grip, not 'arm'"):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("arm",)))
-    found = Mcap().columns(path, wanted(("/a", "position[arm]"), joints=("arm",)))
-    assert found.columns["/a position[arm]"].values.tolist() == [0.0, 2.0, 4.0, 6.0, 8.0]
+    source = Mcap().columns(path, wanted(("/a", "position[arm]"), joints=("arm",)))
+    assert source.columns["/a position[arm]"].values.tolist() == [0.0, 2.0, 4.0, 6.0, 8.0]
 
 
-def test_a_joint_that_nobody_named_may_be_called_anything(tmp_path):
+def test_a_joint_without_a_name_may_have_any_name_in_messages(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["motor"], [1.0])) for i in range(3)], encoding="json")
-    found = Mcap().columns(path, wanted(("/a", "position[:]"), named=False))
-    assert found.columns["/a position[:]"].values.tolist() == [[1.0]] * 3
+    source = Mcap().columns(path, wanted(("/a", "position[:]"), named=False))
+    assert source.columns["/a position[:]"].values.tolist() == [[1.0]] * 3
 
 
-def test_other_numbers_of_names_than_elements_are_refused(tmp_path):
+def test_different_numbers_of_names_and_elements_are_refused(tmp_path):
     payload = json_state(["a", "b", "c"], [1.0, 2.0])
     path = write(tmp_path / "log.mcap", [(0, i * MS, payload) for i in range(3)], encoding="json")
     with pytest.raises(RecordingError, match="3 names for 2 elements, so the names cannot be assigned"):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("b", "a")))
 
 
-def test_an_index_of_other_digits_than_ascii_is_a_name(tmp_path):
+def test_an_index_with_non_ascii_digits_is_a_name(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["a"], [1.0])) for i in range(3)], encoding="json")
     with pytest.raises(RecordingError, match="no message names this joint"):
         Mcap().columns(path, wanted(("/a", "position[\u00b2]")))
 
 
-def test_a_file_joined_behind_the_end_is_told_and_not_blamed_on_the_summary(tmp_path):
+def test_a_file_appended_to_a_log_is_reported_and_not_as_a_false_summary(tmp_path):
     first, second = tmp_path / "a.mcap", tmp_path / "b.mcap"
     small_file(first)
     small_file(second, messages=30)
-    size, behind = first.stat().st_size, second.stat().st_size
+    size, after = first.stat().st_size, second.stat().st_size
     first.write_bytes(first.read_bytes() + second.read_bytes())
-    (fact,) = told_of(Mcap().columns(first))
-    assert fact == DamagedAt(size, "the log ends here: another file joined to it?", LostBytes(behind))
+    (fact,) = facts_above_notes(Mcap().columns(first))
+    assert fact == DamagedAt(size, "the log ends here: was another file appended?", LostBytes(after))
 
 
-def test_what_is_recovered_keeps_the_profile(tmp_path):
+def test_a_recovered_file_has_the_profile_of_its_source(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, cdr(float(i), 0.0)) for i in range(50)])
     path.write_bytes(path.read_bytes()[:-100])
     recover(path, tmp_path / "clean.mcap")

@@ -1,4 +1,4 @@
-"""Signals that end a program do so between two calls of a library, never inside what it calls."""
+"""Termination signals are handled between two calls of a library, and never in its callbacks."""
 
 from __future__ import annotations
 
@@ -9,45 +9,45 @@ import numpy as np
 import pytest
 
 from cdtool.formats import hdf5_writing
-from cdtool.formats.hdf5_writing import held_signals
+from cdtool.formats.hdf5_writing import deferred_signals
 from cdtool.workflows.convert.converting import convert
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_waits_until_it_is_delivered_or_the_end(number):
+def test_a_signal_is_deferred_to_its_delivery_or_the_end_of_the_context(number):
     def end(*_: object) -> None:
         raise KeyboardInterrupt
 
     before = signal.signal(number, end)
     try:
         reached = []
-        with pytest.raises(KeyboardInterrupt), held_signals():
+        with pytest.raises(KeyboardInterrupt), deferred_signals():
             signal.raise_signal(number)
-            reached.append("behind the signal")
-        with pytest.raises(KeyboardInterrupt), held_signals() as deliver:
+            reached.append("after the signal")
+        with pytest.raises(KeyboardInterrupt), deferred_signals() as deliver:
             signal.raise_signal(number)
             deliver()
-            reached.append("behind its delivery")
-        assert reached == ["behind the signal"]
+            reached.append("after its delivery")
+        assert reached == ["after the signal"]
         assert signal.getsignal(number) is end
     finally:
         signal.signal(number, before)
 
 
-def test_a_signal_that_is_ignored_stays_so_and_another_thread_holds_none():
+def test_an_ignored_signal_stays_ignored_and_another_thread_defers_none():
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
-        with held_signals() as deliver:
+        with deferred_signals() as deliver:
             signal.raise_signal(signal.SIGTERM)
             deliver()
         assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
         seen = []
 
-        def elsewhere() -> None:
-            with held_signals():
+        def other_thread() -> None:
+            with deferred_signals():
                 seen.append(signal.getsignal(signal.SIGTERM))
 
-        thread = threading.Thread(target=elsewhere)
+        thread = threading.Thread(target=other_thread)
         thread.start()
         thread.join()
         assert seen == [signal.SIG_IGN]
@@ -56,19 +56,19 @@ def test_a_signal_that_is_ignored_stays_so_and_another_thread_holds_none():
 
 
 @pytest.mark.parametrize("call", [1, 5, 8])
-def test_an_interruption_while_hdf5_writes_is_one_and_leaves_nothing(tmp_path, monkeypatch, call):
+def test_an_interruption_while_hdf5_writes_leaves_no_file(tmp_path, monkeypatch, call):
     pytest.importorskip("h5py")
     rows = "\n".join(f"{k * 0.001:.3f},{value}" for k, value in enumerate(np.sin(np.arange(500) / 50.0)))
     (tmp_path / "log.csv").write_text(f"time [s],torque [N m]\n{rows}\n", encoding="utf-8")
-    write, calls = hdf5_writing._Disk.write, []
+    write, calls = hdf5_writing._CheckedFile.write, []
 
-    def struck(self: hdf5_writing._Disk, data: object) -> int:
+    def interrupted(self: hdf5_writing._CheckedFile, data: object) -> int:
         calls.append(data)
         if len(calls) == call:
             signal.raise_signal(signal.SIGINT)
         return write(self, data)
 
-    monkeypatch.setattr(hdf5_writing._Disk, "write", struck)
+    monkeypatch.setattr(hdf5_writing._CheckedFile, "write", interrupted)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""The ways in which a file is read: survey, wanted channels, and the container's records, streamed and by the index."""
+"""Readers of a file: survey, wanted channels, and the container's records, streamed and by the index."""
 
 from __future__ import annotations
 
@@ -16,69 +16,69 @@ from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.source import Source
 from tests.formats.mcap_damage.truth import FIELDS, Message
 
-# What tells messages apart: topic and value, or topic and payload.
+# The identity of a message: topic and value, or topic and payload.
 Key = tuple[str, bytes]
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What a way gave: (key, time [s]) of every message, findings, or why it refused. `topics`: what was asked for.
+    """The result of a reader: (key, time [s]) of every message and findings, or the refusal; `topics` were requested.
 
-    `origin` [s] has been added to the times, and its resolution is theirs.
+    `origin` [s] was added to the times, which therefore have its resolution.
     """
 
-    given: tuple[tuple[Key, float], ...] = ()
+    messages: tuple[tuple[Key, float], ...] = ()
     findings: tuple[Finding, ...] = ()
     refusal: RecordingError | None = None
     topics: tuple[str, ...] | None = None
     origin: float = 0.0
 
-    def says(self, *words: str) -> bool:
-        """A finding has one of the words."""
+    def mentions(self, *words: str) -> bool:
+        """Return whether a finding contains one of the words."""
         return any(word in finding.message for finding in self.findings for word in words)
 
     @property
     def lossy(self) -> bool:
-        """It said that something is lost."""
+        """Return whether a loss is reported."""
         return self.refusal is not None or any(finding.severity == "loss" for finding in self.findings)
 
 
-Way = Callable[[Path, tuple[str, ...]], Reading]
+Reader = Callable[[Path, tuple[str, ...]], Reading]
 
 
 def value_key(message: Message) -> Key:
-    """Topic and value to the bit; one NaN is as good as another."""
+    """Return topic and value as bytes; all NaN are equal."""
     return message.topic, _bits(message.value)
 
 
 def payload_key(message: Message) -> Key:
-    """Topic and payload."""
+    """Return topic and payload."""
     return message.topic, message.payload
 
 
 def survey(path: Path, topics: tuple[str, ...]) -> Reading:
-    """Every numeric field."""
+    """Read every numeric field."""
     return _refusable(lambda: _of_source(Mcap().columns(path)))
 
 
 def wanted(path: Path, topics: tuple[str, ...]) -> Reading:
-    """The field of some topics."""
+    """Read the fields of some topics."""
     sources = tuple(ChannelSource("speed", topic=topic, field=FIELDS.get(topic, "data")) for topic in topics)
-    asked = ChannelMap(TimeSource(), sources, ("axis",), topics=True)
-    return _refusable(lambda: _of_source(Mcap().columns(path, asked), topics), topics)
+    channels = ChannelMap(TimeSource(), sources, ("axis",), topics=True)
+    return _refusable(lambda: _of_source(Mcap().columns(path, channels), topics), topics)
 
 
 def streamed(path: Path, topics: tuple[str, ...]) -> Reading:
-    """The payloads of all messages, from the front."""
+    """Read the payloads of all messages, from the start of the file."""
     return _refusable(lambda: _of_log(Log(path, use_index=False)))
 
 
 def indexed(path: Path, topics: tuple[str, ...]) -> Reading:
-    """The payloads of some topics, chunks without them being passed over."""
+    """Read the payloads of some topics, skipping chunks without them."""
     return _refusable(lambda: _of_log(Log(path, topics.__contains__), topics), topics)
 
 
-WAYS: dict[Way, Callable[[Message], Key]] = {
+READERS: dict[Reader, Callable[[Message], Key]] = {
     survey: value_key,
     wanted: value_key,
     streamed: payload_key,
@@ -94,23 +94,23 @@ def _refusable(read: Callable[[], Reading], topics: tuple[str, ...] | None = Non
 
 
 def _of_source(source: Source, topics: tuple[str, ...] | None = None) -> Reading:
-    given: list[tuple[Key, float]] = []
+    read: list[tuple[Key, float]] = []
     for name, column in source.columns.items():
         topic, _, field = name.rpartition(" ")
         if field == FIELDS.get(topic, field) and column.time is not None:
             keys: Iterable[Key] = ((topic, _bits(value)) for value in column.values.tolist())
-            given += zip(keys, (column.time + source.origin).tolist(), strict=True)
-    return Reading(tuple(given), source.findings, topics=topics, origin=source.origin)
+            read += zip(keys, (column.time + source.origin).tolist(), strict=True)
+    return Reading(tuple(read), source.findings, topics=topics, origin=source.origin)
 
 
 def _of_log(log: Log, topics: tuple[str, ...] | None = None) -> Reading:
-    given: list[tuple[Key, float]] = []
+    read: list[tuple[Key, float]] = []
     for piece in log.pieces():
         for messages in piece:
             batch, topic = messages.batch, messages.stream.topic
             rows = zip(batch.start.tolist(), batch.length.tolist(), batch.log_time.tolist(), strict=True)
-            given += (((topic, bytes(batch.data[at : at + size])), time / 1e9) for at, size, time in rows)
-    return Reading(tuple(given), tuple(log.findings()), topics=topics)
+            read += (((topic, bytes(batch.data[at : at + size])), time / 1e9) for at, size, time in rows)
+    return Reading(tuple(read), tuple(log.findings()), topics=topics)
 
 
 def _bits(value: float) -> bytes:

@@ -1,4 +1,4 @@
-"""The piece of memory under way: decompressed chunks side by side, and the table of their messages."""
+"""The memory that is being filled: consecutive decompressed chunks, and the table of their messages."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.formats.mcap.container import walk_kernel as why
+from cdtool.formats.mcap.container import walk_kernel
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
@@ -17,11 +17,11 @@ from cdtool.messages.fast_path import ChunkRows
 
 
 @dataclass(frozen=True)
-class Piece:
-    """Messages in one piece of memory, channel by channel.
+class MessageBlock:
+    """Messages in one memory block, channel by channel.
 
-    `covered`: a CRC covers the bytes; `cuts`: channels whose definition changes at a place of `data`. `taken`: chunks
-    whose messages are columns already; then there are no batches.
+    `covered`: a CRC covers the bytes. `cuts` maps channels whose definition changes to the offset in `data` where it
+    changes. `taken` are chunks whose messages the fast path has read; then there are no batches.
     """
 
     data: Bytes
@@ -32,17 +32,17 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Walked:
-    """Where a walk ended and why (walk_kernel), the log times' span [ns] where it is known, and definitions' faults."""
+class WalkResult:
+    """End and reason of a walk (walk_kernel), the span of log times [ns] if known, and faults of definitions."""
 
     at: int
-    why: int
+    reason: int
     times: tuple[int, int] | None
     faults: tuple[str, ...]
 
 
-class Room:
-    """Memory that is filled, walked and handed out: `flush` leaves it to those who got it."""
+class Arena:
+    """Memory that is filled with chunks, walked for messages, and yielded as blocks."""
 
     def __init__(self, definitions: Definitions) -> None:
         self.first_time: int | None = None  # log time [ns] of the file's first message
@@ -55,78 +55,78 @@ class Room:
         self._taken: list[ChunkRows] = []
 
     def fits(self, size: int, covered: bool) -> bool:
-        """`size` more bytes can lie beside what is there, and a CRC covers both or neither."""
+        """Return whether `size` more bytes have space, and a CRC covers both these and earlier bytes, or neither."""
         return self._covered == covered and size <= len(self._data) - self._used
 
-    def take(self, size: int) -> Bytes:
-        """Memory for the next chunk; it counts once `walk` is told of it."""
+    def reserve(self, size: int) -> Bytes:
+        """Return memory for the next chunk, which is part of the arena after a call of `walk`."""
         return self._data[self._used : self._used + size]
 
-    def renew(self, memory: Bytes, covered: bool) -> None:
-        """Start again with `memory`, once what is there was handed out."""
+    def reset(self, memory: Bytes, covered: bool) -> None:
+        """Start again with `memory`, after `flush`."""
         self._data, self._covered = memory, covered
 
-    def pass_over(self, size: int, taken: ChunkRows) -> Iterator[Piece]:
-        """The next `size` bytes are a chunk whose messages are columns already."""
+    def add_decoded(self, size: int, taken: ChunkRows) -> Iterator[MessageBlock]:
+        """Add the next `size` bytes as a chunk whose messages the fast path has read."""
         if self._table.count:
-            yield from self._hand_out()
+            yield from self._blocks()
         self._taken.append(taken)
         self._used += size
 
-    def walk(self, size: int, top_level: bool = False) -> Generator[Piece, None, Walked]:
-        """Take the records of the next `size` bytes; gives a Walked. Hands out pieces where the table is full."""
+    def walk(self, size: int, top_level: bool = False) -> Generator[MessageBlock, None, WalkResult]:
+        """Add the messages of the next `size` bytes; yield blocks if the table is full, and return the result."""
         if self._taken:
-            yield from self._hand_out()
+            yield from self._blocks()
         at, end, before = self._used, self._used + size, self._table.count
         faults: list[str] = []
         emptied = False
         while True:
             at, reason, definitions = self._table.walk(self._data, at, end, top_level)
             faults += self._define(definitions)
-            if reason != why.FULL:
+            if reason != walk_kernel.FULL:
                 break
             emptied = True
-            yield from self._hand_out()
+            yield from self._blocks()
         times = None if emptied else self._table.times(before)
         begin, self._used = self._used, end
-        return Walked(at - begin, reason, times, tuple(faults))
+        return WalkResult(at - begin, reason, times, tuple(faults))
 
-    def take_window(self, window: Bytes) -> Generator[Piece, None, Walked]:
-        """Start again with records that stand in the file itself, outside of chunks; gives a Walked."""
+    def take_window(self, window: Bytes) -> Generator[MessageBlock, None, WalkResult]:
+        """Start again with records outside of chunks; yield their blocks, and return the result of the walk."""
         yield from self.flush()
         self._data, self._covered = window, False
         walked = yield from self.walk(len(window), top_level=True)
         yield from self.flush()
         return walked
 
-    def flush(self) -> Iterator[Piece]:
-        """Hand out what is there."""
-        yield from self._hand_out()
+    def flush(self) -> Iterator[MessageBlock]:
+        """Yield the messages in memory, and release the memory."""
+        yield from self._blocks()
         self._data, self._used, self._cuts = np.empty(0, np.uint8), 0, {}
 
     def _define(self, definitions: list[tuple[int, int, int]]) -> Iterator[str]:
-        """Take definitions and note where a channel's changes; gives what is wrong with them."""
+        """Add definitions, note where a channel's definition changes, and yield the faults of definitions."""
         data = self._data.data
         for opcode, start, size in definitions:
             body = data[start : start + size]
-            if self._definitions.knows(opcode, bytes(body), self._covered):
+            if self._definitions.is_known(opcode, bytes(body), self._covered):
                 continue
             before = set(self._definitions.ambiguous)
             try:
-                self._definitions.take(opcode, body, self._covered)
+                self._definitions.add(opcode, body, self._covered)
             except DamageError as fault:
                 yield str(fault)
             self._cuts.update(dict.fromkeys(set(self._definitions.ambiguous) - before, start))
 
-    def _hand_out(self) -> Iterator[Piece]:
+    def _blocks(self) -> Iterator[MessageBlock]:
         if self._taken:
             taken, self._taken = tuple(self._taken), []
             if self.first_time is None or self.first_time >= NO_DATE:
                 self.first_time = taken[0].first_time
-            yield Piece(self._data, (), self._covered, {}, taken)
+            yield MessageBlock(self._data, (), self._covered, {}, taken)
         if not self._table.count:
             return
         if self.first_time is None or self.first_time >= NO_DATE:
             self.first_time = self._table.first_time()
         cuts = {channel: self._cuts.get(channel, 0) for channel in self._definitions.ambiguous}
-        yield Piece(self._data, tuple(self._table.by_channel(self._data)), self._covered, cuts)
+        yield MessageBlock(self._data, tuple(self._table.by_channel(self._data)), self._covered, cuts)

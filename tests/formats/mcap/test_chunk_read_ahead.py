@@ -1,4 +1,4 @@
-"""Chunks decompressed ahead, side by side: the same messages, losses and findings as one after the other."""
+"""Chunks that are read ahead have the same messages, losses and findings as chunks read one by one."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import gc
 import numpy as np
 import pytest
 
-from cdtool.formats.mcap.container import chunks_ahead
+from cdtool.formats.mcap.container import chunk_read_ahead
+from cdtool.formats.mcap.container.chunk_read_ahead import Buffers
 from cdtool.formats.mcap.container.chunks import Decompressor
-from cdtool.formats.mcap.container.chunks_ahead import Buffers
 from cdtool.formats.mcap.container.log import Log
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
@@ -18,55 +18,55 @@ ONE_CORE, MANY = 1, 4
 
 @pytest.fixture
 def cores(monkeypatch):
-    """Sets how many cores there seem to be."""
+    """Return a function that sets the number of usable cores."""
 
     def to(count):
-        monkeypatch.setattr(chunks_ahead, "usable_cores", lambda: count)
+        monkeypatch.setattr(chunk_read_ahead, "usable_cores", lambda: count)
 
     return to
 
 
 @pytest.fixture
 def read_in_turn(monkeypatch):
-    """Places of the chunks that were read when their turn came, and of those read ahead."""
-    places = {True: [], False: []}
-    reading, filling = Decompressor.read, chunks_ahead.ChunksAhead._fill
+    """Yield the offsets of the chunks that were read one by one (False) and read ahead (True)."""
+    offsets = {True: [], False: []}
+    reading, filling = Decompressor.read, chunk_read_ahead.ChunkReadAhead._fill
     threads = []
 
     def fill(self, index, content):
         threads.append(index.chunk_start_offset)
         return filling(self, index, content)
 
-    def read_chunk(self, file, header, room):
-        places[header.at in threads].append(header.at)
-        return reading(self, file, header, room)
+    def read_chunk(self, file, header, target):
+        offsets[header.at in threads].append(header.at)
+        return reading(self, file, header, target)
 
-    monkeypatch.setattr(chunks_ahead.ChunksAhead, "_fill", fill)
+    monkeypatch.setattr(chunk_read_ahead.ChunkReadAhead, "_fill", fill)
     monkeypatch.setattr(Decompressor, "read", read_chunk)
-    return places
+    return offsets
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("joined", [1, 2000, 10**6])
-def test_every_chunk_is_read_once_and_ahead(tmp_path, monkeypatch, cores, read_in_turn, compression, joined):
+def test_every_chunk_is_read_once_and_read_ahead(tmp_path, monkeypatch, cores, read_in_turn, compression, joined):
     path = tmp_path / "log.mcap"
     sent = small_file(path, compression)
-    monkeypatch.setattr(chunks_ahead, "JOINED", joined)
+    monkeypatch.setattr(chunk_read_ahead, "JOINED", joined)
     cores(MANY)
-    found, findings, log = read(path)
-    assert found == sent
+    messages, findings, log = read(path)
+    assert messages == sent
     assert not findings
     assert sorted(read_in_turn[True]) == sorted(log.summary.chunks)
     assert not read_in_turn[False]
 
 
-def test_on_one_core_and_without_a_checked_summary_nothing_is_read_ahead(tmp_path, cores, read_in_turn):
+def test_on_one_core_or_without_a_verified_summary_nothing_is_read_ahead(tmp_path, cores, read_in_turn):
     path = tmp_path / "log.mcap"
     sent = small_file(path)
     cores(ONE_CORE)
     assert read(path)[0] == sent
     whole = bytearray(path.read_bytes())
-    whole[-12:-8] = bytes(4)  # the summary's CRC: 0, there is none
+    whole[-12:-8] = bytes(4)  # the summary's CRC: 0, no checksum
     path.write_bytes(whole)
     cores(MANY)
     assert read(path)[0] == sent
@@ -76,32 +76,34 @@ def test_on_one_core_and_without_a_checked_summary_nothing_is_read_ahead(tmp_pat
 @pytest.mark.parametrize("compression", COMPRESSIONS)
 @pytest.mark.parametrize("damage", ["content", "crc", "no crc", "size", "opcode", "time"])
 @pytest.mark.parametrize("joined", [1, 2000, 10**6])
-def test_a_damaged_chunk_is_lost_as_it_is_without(tmp_path, monkeypatch, cores, compression, damage, joined):
+def test_a_damaged_chunk_is_lost_with_and_without_reading_ahead(
+    tmp_path, monkeypatch, cores, compression, damage, joined
+):
     path = tmp_path / "log.mcap"
     small_file(path, compression)
-    places = sorted(Log(path).summary.chunks)
-    monkeypatch.setattr(chunks_ahead, "JOINED", joined)
+    offsets = sorted(Log(path).summary.chunks)
+    monkeypatch.setattr(chunk_read_ahead, "JOINED", joined)
     whole = path.read_bytes()
-    # Where it stands in the record: opcode 1 and length 8 bytes, two times, size, CRC.
+    # Offsets in the record: opcode 1 and length 8 bytes, two times, size, CRC.
     offset, count = {"content": (70, 1), "crc": (33, 1), "no crc": (33, 4), "size": (25, 1), "opcode": (0, 1)}.get(
         damage, (9, 1)
     )
-    for place in (places[0], places[len(places) // 2], places[-1]):
+    for start in (offsets[0], offsets[len(offsets) // 2], offsets[-1]):
         changed = bytearray(whole)
-        at = place + offset
+        at = start + offset
         changed[at : at + count] = bytes(count) if damage == "no crc" else bytes([changed[at] ^ 0x41])
         path.write_bytes(changed)
         cores(ONE_CORE)
-        found, findings, log = read(path)
+        messages, findings, log = read(path)
         cores(MANY)
         again = read(path)
-        assert again[0] == found
+        assert again[0] == messages
         assert again[1] == findings
         assert again[2].unverified == log.unverified
         assert findings
 
 
-def test_memory_is_used_again_only_when_nothing_refers_to_it():
+def test_memory_is_reused_only_if_nothing_refers_to_it():
     buffers = Buffers(1 << 22)
     first = buffers.take(100)
     assert len(first) == 1 << 22 and first.ctypes.data % (2 << 20) == 0
@@ -118,10 +120,10 @@ def test_memory_is_used_again_only_when_nothing_refers_to_it():
     assert buffers.take(100).ctypes.data != address  # a memoryview refers to it, too
     del view
     gc.collect()
-    kept = [buffers.take(100) for _ in range(3)]
-    assert address in {each.ctypes.data for each in kept}
+    arrays = [buffers.take(100) for _ in range(3)]
+    assert address in {each.ctypes.data for each in arrays}
 
 
-def test_more_than_a_buffer_holds_is_given_as_it_is_asked_for():
+def test_memory_larger_than_a_buffer_is_allocated_in_the_requested_size():
     large = Buffers(1 << 22).take(5 << 20)
     assert large.shape == (5 << 20,) and large.dtype == np.uint8

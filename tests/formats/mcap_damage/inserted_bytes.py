@@ -1,4 +1,4 @@
-"""Between, before and behind the records: garbage, unknown records, other files, nothing at all."""
+"""Files with inserted bytes: garbage, unknown records and other files between, before or after the records."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 
 from tests.formats.mcap_damage import records
 from tests.formats.mcap_damage.assembly import Block, Ending, assemble, blocks_of
-from tests.formats.mcap_damage.chunks import COMPRESSIONS, drawn, ending
+from tests.formats.mcap_damage.chunks import COMPRESSIONS, draw_blocks, draw_ending
 from tests.formats.mcap_damage.messages import ALL_DEFINITIONS, ordinary
 from tests.formats.mcap_damage.truth import Case, Message, Truth
 
 
 def garbage_between_chunks(rng: np.random.Generator) -> Case:
-    """Random bytes between two chunks: every chunk can still be had."""
-    messages, blocks = drawn(rng, everywhere=True)
+    """Insert random bytes between two chunks: every chunk can still be read."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     junk = [
         rng.bytes(int(rng.integers(1, 400))),
         bytes(int(rng.integers(1, 400))),
@@ -31,14 +31,14 @@ def garbage_between_chunks(rng: np.random.Generator) -> Case:
     junk_kind = int(rng.integers(len(junk)))
     parts: list[Block | bytes] = list(blocks)
     parts.insert(int(rng.integers(1, len(parts) + 1)), junk[junk_kind])
-    # The first bytes may make an unknown record that ends where the next one begins: that can be no loss.
+    # The bytes may be an unknown record that ends where the next record starts, which is not a loss.
     truth = Truth(tuple(messages), tuple(messages), loss=True if junk_kind in (1, 2, 3, 6, 8, 9, 11) else None)
-    return Case(f"garbage_between_chunks {junk_kind}", assemble(parts, ending(rng)), truth)
+    return Case(f"garbage_between_chunks {junk_kind}", assemble(parts, draw_ending(rng)), truth)
 
 
 def unknown_records(rng: np.random.Generator) -> Case:
-    """Records of kinds that there are not yet (or of the user's), between chunks and in them: passed over."""
-    messages, blocks = drawn(rng, everywhere=bool(rng.integers(2)))
+    """Insert records of future or private kinds, between chunks and in them: they are skipped."""
+    messages, blocks = draw_blocks(rng, everywhere=bool(rng.integers(2)))
     kinds = [0x10, 0x20, 0x7F, 0x80, 0xC3, 0xFF]
 
     def unknown() -> bytes:
@@ -48,15 +48,15 @@ def unknown_records(rng: np.random.Generator) -> Case:
     for block in blocks:
         if rng.random() < 0.5:
             parts.append(unknown() + (unknown() if rng.random() < 0.3 else b""))
-        behind = unknown() if rng.random() < 0.5 else b""
-        parts.append(Block(block.messages, block.before, behind, block.compression))
+        after = unknown() if rng.random() < 0.5 else b""
+        parts.append(Block(block.messages, block.before, after, block.compression))
     truth = Truth(tuple(messages), tuple(messages), loss=False)
-    return Case("unknown_records", assemble(parts, ending(rng)), truth)
+    return Case("unknown_records", assemble(parts, draw_ending(rng)), truth)
 
 
 def extended_records(rng: np.random.Generator) -> Case:
-    """Records with further fields at their end, as a later version of the format may have: read without them."""
-    messages, blocks = drawn(rng)
+    """Append fields to records, as a later version of the format may do: the known fields are read."""
+    messages, blocks = draw_blocks(rng)
     more = rng.bytes(int(rng.integers(1, 40)))
     definitions = b""
     for opcode, body in _split(ALL_DEFINITIONS):
@@ -65,54 +65,54 @@ def extended_records(rng: np.random.Generator) -> Case:
         Block(block.messages, definitions if block.before else b"", b"", block.compression) for block in blocks
     ]
     parts.insert(1, records.record(records.METADATA, records.text("a") + records.texts({"b": "c"}) + more))
-    how = ending(rng)
+    how = draw_ending(rng)
     how = Ending(how.summary, how.crc, how.data_crc, definitions)
     return Case("extended_records", assemble(parts, how), Truth(tuple(messages), tuple(messages), loss=False))
 
 
 def bare_messages(rng: np.random.Generator) -> Case:
-    """Messages outside of chunks beside chunks: given, and marked as unverified."""
-    messages, blocks = drawn(rng, everywhere=True)
+    """Insert messages outside of chunks: they are read, and reported as unverified."""
+    messages, blocks = draw_blocks(rng, everywhere=True)
     parts: list[Block | bytes] = list(blocks)
     i = int(rng.integers(1, len(blocks)))
     parts[i] = blocks[i].content
-    how = ending(rng)
-    # The summary counts them, or does not: its figure is then another than what is read.
+    how = draw_ending(rng)
+    # The summary may not count them; then its count differs from the number that is read.
     truth = Truth(tuple(messages), tuple(messages), unverified=not how.data_crc)
     return Case("bare_messages", assemble(parts, how), truth)
 
 
 def trailing_garbage(rng: np.random.Generator) -> Case:
-    """Bytes behind the end of the file."""
-    messages, blocks = drawn(rng)
+    """Append bytes after the end of the file."""
+    messages, blocks = draw_blocks(rng)
     junk = [rng.bytes(int(rng.integers(1, 300))), bytes(int(rng.integers(1, 5000))), records.MAGIC, b"\n"]
-    data = assemble(blocks, ending(rng)) + junk[int(rng.integers(len(junk)))]
+    data = assemble(blocks, draw_ending(rng)) + junk[int(rng.integers(len(junk)))]
     return Case("trailing_garbage", data, Truth(tuple(messages), tuple(messages)))
 
 
 def no_last_magic(rng: np.random.Generator) -> Case:
-    """The magic bytes at the end are missing or others."""
-    messages, blocks = drawn(rng)
-    data = assemble(blocks, ending(rng))[:-8] + (b"", b"\x89MCAP1\r\n", bytes(8))[int(rng.integers(3))]
+    """Remove or change the magic bytes at the end."""
+    messages, blocks = draw_blocks(rng)
+    data = assemble(blocks, draw_ending(rng))[:-8] + (b"", b"\x89MCAP1\r\n", bytes(8))[int(rng.integers(3))]
     return Case("no_last_magic", data, Truth(tuple(messages), tuple(messages), loss=True))
 
 
 def two_files(rng: np.random.Generator) -> Case:
-    """Two files, one behind the other, whose channel ids stand for different topics: the first is given, or all."""
+    """Join two files whose channel ids have different topics: the first file, or both, are read."""
     first = ordinary(rng, 32)
     second = [Message("/count", m.time, m.payload, m.value) for m in ordinary(rng, 32) if m.topic == "/force"]
     compression = COMPRESSIONS[int(rng.integers(3))]
     other = records.schema(1, "other/msg/Float64", "ros2msg", b"float64 count")
     other += records.channel(1, 1, "/count", "cdr")
     block = Block(tuple(second), other, compression=compression)
-    data = assemble(blocks_of(first, 8, compression), ending(rng))
+    data = assemble(blocks_of(first, 8, compression), draw_ending(rng))
     data += assemble([block], Ending(definitions=other))
     truth = Truth((*first, *second), tuple(first))
     return Case("two_files", data, truth)
 
 
-def nothing(rng: np.random.Generator) -> Case:
-    """Files without a message: empty, magic bytes only, a header only, all but messages, other formats."""
+def no_content(rng: np.random.Generator) -> Case:
+    """Return a file without messages: empty, only magic bytes, only a header, without messages, or another format."""
     files = [
         b"",
         records.MAGIC[:5],
@@ -132,19 +132,19 @@ def nothing(rng: np.random.Generator) -> Case:
         records.MAGIC + records.record(records.SCHEMA, b"", 2**40) + b"abc",
     ]
     i = int(rng.integers(len(files)))
-    return Case(f"nothing {i}", files[i], Truth((), loss=True, refusable=True))
+    return Case(f"no_content {i}", files[i], Truth((), loss=True, refusable=True))
 
 
 def no_message(rng: np.random.Generator) -> Case:
-    """A whole file without a message: no loss."""
+    """Return a complete file without a message, which is not a loss."""
     parts: list[Block | bytes] = [] if rng.random() < 0.5 else [Block((), ALL_DEFINITIONS)]
-    return Case("no_message", assemble(parts, ending(rng)), Truth((), loss=False))
+    return Case("no_message", assemble(parts, draw_ending(rng)), Truth((), loss=False))
 
 
 def attachments(rng: np.random.Generator) -> Case:
-    """Attachments, one with a wrong CRC, one whose name lies about its length: no message is lost with them."""
-    messages, blocks = drawn(rng)
-    odd = [
+    """Insert an attachment, perhaps with a wrong CRC or a false length of its name: no message is lost."""
+    messages, blocks = draw_blocks(rng)
+    variants = [
         records.attachment("a.txt", b"abc"),
         records.attachment("a.txt", b"abc", crc=5),
         records.attachment("a.txt", b"abc", crc=0),
@@ -154,21 +154,21 @@ def attachments(rng: np.random.Generator) -> Case:
         records.record(records.METADATA, b"\xff"),
         records.metadata("m", {"k": "v" * 1000}),
     ]
-    i = int(rng.integers(len(odd)))
+    i = int(rng.integers(len(variants)))
     parts: list[Block | bytes] = list(blocks)
-    parts.insert(int(rng.integers(len(parts) + 1)), odd[i])
+    parts.insert(int(rng.integers(len(parts) + 1)), variants[i])
     loss = False if i in (0, 2, 7) else None
     truth = Truth(tuple(messages), tuple(messages), loss=loss)
-    return Case(f"attachments {i}", assemble(parts, ending(rng)), truth)
+    return Case(f"attachments {i}", assemble(parts, draw_ending(rng)), truth)
 
 
 def _split(data: bytes) -> list[tuple[int, bytes]]:
-    found, at = [], 0
+    parts, at = [], 0
     while at < len(data):
         length = int.from_bytes(data[at + 1 : at + 9], "little")
-        found.append((data[at], data[at + 9 : at + 9 + length]))
+        parts.append((data[at], data[at + 9 : at + 9 + length]))
         at += 9 + length
-    return found
+    return parts
 
 
 KINDS = {
@@ -179,7 +179,7 @@ KINDS = {
     trailing_garbage: 1,
     no_last_magic: 1,
     two_files: 2,
-    nothing: 2,
+    no_content: 2,
     no_message: 1,
     attachments: 2,
 }

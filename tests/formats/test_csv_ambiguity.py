@@ -1,4 +1,4 @@
-"""What may be read in two ways is refused with both readings, and each reading can be pinned."""
+"""Tables that can be read in two ways are refused with both readings, and each reading can be pinned."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
 from tests.noted_times import noted
 
-BEYOND = 19_000  # rows that fill more than the sample
+BEYOND = 19_000  # rows, more than the sample has
 
 
 def rows(values, separator=";", first=0) -> str:
@@ -20,7 +20,7 @@ def rows(values, separator=";", first=0) -> str:
 
 
 def pinned(path, **pins) -> np.ndarray:
-    """The last of the columns, read with these pins and a rate."""
+    """Return the last column, read with these pins and a rate."""
     wanted = ChannelMap(TimeSource(rate=1.0), (ChannelSource("torque", (pins.pop("column", 1),)),), ("a",))
     source = Csv().columns(path, replace(wanted, pins=TablePins(**pins)))
     return next(iter(source.columns.values())).values
@@ -30,9 +30,9 @@ THOUSANDS = ["997", "998", "999", "1.000", "1.001"]
 
 
 @pytest.mark.parametrize("separator", ["\t", ";", "|", " ", ","], ids=["tab", "semicolon", "pipe", "blank", "comma"])
-def test_whole_numbers_beside_points_before_three_digits_are_refused_and_can_be_pinned(log, separator):
+def test_whole_numbers_with_points_before_three_digits_are_refused_and_can_be_pinned(log, separator):
     path = log(f"t{separator}pos\n" + rows(THOUSANDS, separator))
-    with pytest.raises(RecordingError, match=r"line 5, column 'pos': '1\.000' beside '997' is 1000 .* or 1\.000 "):
+    with pytest.raises(RecordingError, match=r"line 5, column 'pos': '1\.000' next to '997' may be 1000 .* or 1\.000 "):
         Csv().columns(path)
     assert pinned(path, decimal=".").tolist() == [997, 998, 999, 1.0, 1.001]
     if separator != ",":
@@ -40,9 +40,9 @@ def test_whole_numbers_beside_points_before_three_digits_are_refused_and_can_be_
             assert pinned(path, **pin).tolist() == [997, 998, 999, 1000, 1001]
 
 
-def test_a_point_that_comes_only_behind_the_sample_is_refused_too(log):
+def test_an_ambiguous_point_after_the_sample_is_also_refused(log):
     table = "t;pos\n" + rows([900] * BEYOND) + rows(["1.000", "1.001"], first=BEYOND)
-    with pytest.raises(RecordingError, match=rf"line {BEYOND + 2}, column 'pos': '1\.000' beside '900'"):
+    with pytest.raises(RecordingError, match=rf"line {BEYOND + 2}, column 'pos': '1\.000' next to '900'"):
         Csv().columns(log(table))
 
 
@@ -50,7 +50,7 @@ def test_a_point_that_comes_only_behind_the_sample_is_refused_too(log):
     ("cell", "value"), [("1,5", 1.5), ("1.25", 1.25), ("0.125", 0.125), ("1'234", 1234.0), ("1.234.567", 1234567.0)]
 )
 @pytest.mark.parametrize("stamp", ["", "12:00:00.125;", "03.04.2025;"], ids=["plain", "times", "dates"])
-def test_the_first_number_with_a_mark_behind_the_sample_decides(log, cell, value, stamp):
+def test_the_first_number_with_a_mark_after_the_sample_decides(log, cell, value, stamp):
     table = (
         ("s;" if stamp else "") + "t;x\n" + "".join(f"{stamp}{i};900\n" for i in range(BEYOND)) + f"{stamp}1;{cell}\n"
     )
@@ -58,12 +58,12 @@ def test_the_first_number_with_a_mark_behind_the_sample_decides(log, cell, value
 
 
 @pytest.mark.parametrize("other", ["0.125", "1.5", "12.25", "1.5e3", "-0.250"])
-def test_one_decimal_anywhere_makes_all_points_decimal(log, other):
+def test_one_decimal_number_makes_all_points_decimal(log, other):
     table = "t;a;b\n" + "".join(f"{i};{value};7\n" for i, value in enumerate(THOUSANDS)) + f"9;1;{other}\n"
     assert Csv().columns(log(table)).columns["a"].values.tolist()[:5] == [997, 998, 999, 1.0, 1.001]
 
 
-def test_a_sum_below_whole_numbers_does_not_make_them_doubtful(log):
+def test_a_sum_below_whole_numbers_does_not_make_them_ambiguous(log):
     source = Csv().columns(log("t;a\n" + rows(range(400, 430)) + "Sum;12.435\n"))
     assert source.columns["a"].values.tolist() == list(range(400, 430))
 
@@ -91,7 +91,7 @@ def test_one_column_of_numbers_with_commas_is_never_read_as_two(log, head, cells
         Csv().columns(log(head + "\n".join(cells) + "\n"))
 
 
-def test_one_column_of_decimal_commas_is_read_as_its_refusal_says(log):
+def test_one_column_of_decimal_commas_is_read_with_the_pins_of_its_error(log):
     path = log("force\n" + "\n".join(["1,5", "-2,25", "7,0"]) + "\n")
     assert pinned(path, column=0, decimal=",", separator=";").tolist() == [1.5, -2.25, 7.0]
     assert pinned(path, column=1, separator=",").tolist() == [5, 25, 0]
@@ -99,12 +99,12 @@ def test_one_column_of_decimal_commas_is_read_as_its_refusal_says(log):
 
 @pytest.mark.parametrize("above", ["990.000\n997.700", "997.700", "-1", "nan"])
 def test_a_number_above_rows_of_two_cells_is_a_row_of_the_same_column(log, above):
-    with pytest.raises(RecordingError, match=r"line [34]: '1,005\.400' is one number .* or two cells"):
+    with pytest.raises(RecordingError, match=r"line [34]: '1,005\.400' may be one number .* or two cells"):
         Csv().columns(log(f"F0\n{above}\n1,005.400\n1,013.100\n1,020.800\n"))
 
 
 @pytest.mark.parametrize("blank", ["\u00a0", "\u202f"])
-def test_a_blank_that_does_not_break_parts_no_cells(log, blank):
+def test_a_non_breaking_space_does_not_separate_cells(log, blank):
     source = Csv().columns(log("".join(f"1{blank}00{i},5 {i}\n" for i in range(5))))
     assert source.columns["0"].values.tolist() == [1000.5 + i for i in range(5)]
     assert list(source.columns) == ["0", "1"]
@@ -113,36 +113,38 @@ def test_a_blank_that_does_not_break_parts_no_cells(log, blank):
 @pytest.mark.parametrize("mark", [":", "."])
 def test_milliseconds_without_zeros_are_refused_where_they_would_run_backward(log, mark):
     stamps = [f"12:00:00{mark}{ms}" for ms in (8, 9, 10, 99, 100)]
-    with pytest.raises(RecordingError, match=rf"column 't': '10' behind '12:00:00{mark}9' is 0\.10 s or 10 ms"):
+    with pytest.raises(RecordingError, match=rf"column 't': '10' after '12:00:00{mark}9' may be 0\.10 s or 10 ms"):
         Csv().columns(log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps)))
 
 
-def test_parts_of_a_second_without_their_last_zeros_are_read(log):
+def test_fractions_of_a_second_without_trailing_zeros_are_read(log):
     stamps = [f"2025-04-03T12:00:00.{part}+02:00" for part in ("1", "15", "2", "25", "3")]
     source = Csv().columns(log("t;x\n" + "".join(f"{stamp};1\n" for stamp in stamps)))
     assert source.columns["t"].values == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2])
 
 
-def test_two_pairs_of_digits_are_minutes_or_seconds_unless_one_proves_it(log, machine):
+def test_two_pairs_of_digits_are_refused_unless_a_cell_shows_whether_they_are_minutes(log, machine):
     path = log("t;x\n" + "".join(f"00:0{i};1\n" for i in range(5)))
-    with pytest.raises(RecordingError, match=r"'00:01' is 00:01:00 \(%H:%M\) or 00:00:01 \(%M:%S\.%f\) .*time_format"):
+    with pytest.raises(
+        RecordingError, match=r"'00:01' may be 00:01:00 \(%H:%M\) or 00:00:01 \(%M:%S\.%f\) .*time_format"
+    ):
         Csv().columns(path)
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n[csv]\n'
     for pattern, step in (("%H:%M", 60), ("%M:%S", 1)):
         wanted = machine(channels + f'time_format = "{pattern}"\n').columns
         assert Csv().columns(path, wanted).columns["t"].values.tolist() == [step * i for i in range(5)]
-    proven = Csv().columns(log("t;x\n" + "".join(f"23:5{i};1\n24:0{i};1\n" for i in range(3))))
-    assert proven.columns["t"].values.tolist()[:2] == [23 * 60 + 50, 24 * 60]
-    beside = Csv().columns(log("d;t;x\n" + "".join(f"2025-04-03;12:0{i};1\n" for i in range(3))))
-    assert beside.columns["t"].values.tolist() == [60 * i for i in range(3)]
+    minutes = Csv().columns(log("t;x\n" + "".join(f"23:5{i};1\n24:0{i};1\n" for i in range(3))))
+    assert minutes.columns["t"].values.tolist()[:2] == [23 * 60 + 50, 24 * 60]
+    with_days = Csv().columns(log("d;t;x\n" + "".join(f"2025-04-03;12:0{i};1\n" for i in range(3))))
+    assert with_days.columns["t"].values.tolist() == [60 * i for i in range(3)]
 
 
 @pytest.mark.parametrize(
     "line",
     ["-" * 200_000 + "x", "[" + " " * 20_000 + "x", "=" * 99_999 + "|x", "-" * 50_000 + "x" + "-" * 50_000],
-    ids=["dashes", "bracket", "double dashes", "dashes about a letter"],
+    ids=["dashes", "bracket", "double dashes", "dashes around a letter"],
 )
-def test_a_long_line_of_one_letter_is_read_or_refused_by_its_number(log, line):
+def test_a_long_line_of_one_letter_is_read_or_refused_with_its_number(log, line):
     path = log(f"t;x\n0;1.5\n{line}\n1;2.5\n" if line[0] != "[" else f"t;{line};x\n{line};;[N]\n0;0;1\n1;0;2\n")
     with noted(3.0):
         try:

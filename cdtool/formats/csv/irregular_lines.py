@@ -1,4 +1,4 @@
-"""Lines of a table that are not plain: rows written in an unusual way, lines to skip and name, errors."""
+"""Lines of a table that the compiled loop cannot read: rows with unusual notation, lines to be skipped, errors."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from cdtool.findings.tables import (
     UnreadCells,
     WordsBelowRows,
 )
-from cdtool.formats.csv.cells import STAMP_LIKE, holds_numbers, kind, number, split_line
+from cdtool.formats.csv.cells import STAMP_LIKE, has_numbers, kind, number, split_line
 from cdtool.formats.csv.dialect import Dialect, quoted
 from cdtool.formats.csv.lines import begins_comment, is_ruler
 from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
 from cdtool.plain_text import counted
 
-# A survey keeps a column of numbers with so many cells that are none, or with this share of the rows.
+# A survey reads a column of numbers with up to this many unreadable cells, or up to this share of the rows.
 _FEW, _SHARE = 3, 0.05
 
 
 @dataclass(frozen=True)
-class OddLine:
-    """A line of a block (from 0), the row that is kept for it, its bytes; `unfinished`: the file ends in it."""
+class IrregularLine:
+    """A line of a block (from 0), the row that is reserved for it, and its bytes; `unfinished`: the file ends in it."""
 
     line: int
     row: int
@@ -44,16 +44,17 @@ class OddLine:
 
 
 @dataclass
-class OddLines:
-    """What became of the lines that are not plain.
+class IrregularLines:
+    """Reader of the lines that the compiled loop cannot read.
 
-    `targets` (width,) is which column goes where, as the loop over the plain ones has it: a column that is left out
-    later is left out there too.
-    With `survey` a cell that cannot be read is missing, and a loss; a column with many of them is left out, no error.
-    `unread` are these cells by column, each with its line. `dropped` are the rows of a block that are not rows, with
-    their lines; `left_out` the columns that are not numeric, with why; `cut_line` is the half-written last line (0:
-    none); `ends_skipped`: the last line, which has no line end, is skipped and no row. `blank` are lines that hold
-    nothing, `empty` those of them that are rows, `words` (row, line, text) are perhaps a footer.
+    `targets` (width,) is the destination of each column, shared with the compiled loop: a column that is left out here
+    is left out there, too. With `survey` an unreadable cell is a missing value and a loss, and a column with many
+    unreadable cells is left out; without it an unreadable cell is an error.
+
+    `unread` are the unreadable cells by column, with their lines. `dropped` are the reserved rows of a block that are
+    not rows, with their lines. `left_out` are the columns that are not numeric, with the finding. `cut_line` is the
+    incomplete last line (0: none); `ends_skipped`: the last line has no line end but is skipped. `blank` are blank
+    lines, `empty` those of them that are rows, and `words` (row, line, text) may be the first line of a footer.
     """
 
     path: Path
@@ -70,55 +71,58 @@ class OddLines:
     empty: list[int] = field(default_factory=list)
     words: tuple[int, int, str] | None = None
 
-    def take(self, item: OddLine, first_line: int, rows: Rows) -> None:
-        """Read one line into `rows`, in the file's order; `first_line` is that of its block."""
-        line = first_line + item.line
-        if self._is_skipped(item, line):
-            self.ends_skipped = item.unfinished
+    def read(self, irregular: IrregularLine, first_line: int, rows: Rows) -> None:
+        """Read one line into `rows`; lines come in the file's order. `first_line` is the first line of its block."""
+        line = first_line + irregular.line
+        if self._is_skipped(irregular, line):
+            self.ends_skipped = irregular.unfinished
             return
-        if item.unfinished and line > self.dialect.first_line:
-            self._drop(item, line)
+        if irregular.unfinished and line > self.dialect.first_line:
+            self._drop(irregular, line)
             self.cut_line = line
         else:
-            self._judge(item, line, rows)
+            self._read_row(irregular, line, rows)
 
     def findings(self, last_line: int) -> list[Finding]:
-        """What was skipped, each kind once; blank lines behind the last row are not worth a word."""
-        found = list(self.left_out.values())
-        found += [self._unread(column) for column in self.unread if column not in self.left_out]
+        """Return the findings on skipped lines, one per kind; blank lines after the last row are not reported."""
+        findings = list(self.left_out.values())
+        findings += [self._unread(column) for column in self.unread if column not in self.left_out]
         if self.empty:
-            found.append(Finding(BlankRows(tuple(self.empty))))
+            findings.append(Finding(BlankRows(tuple(self.empty))))
         blank = [line for line in self.blank if line < last_line]
         if blank and self.dialect.width == 1 and 2 * len(blank) < last_line - self.dialect.first_line:
-            found.append(Finding(BlankSamples(tuple(blank)), severity="loss"))
+            findings.append(Finding(BlankSamples(tuple(blank)), severity="loss"))
         elif blank:
-            found.append(Finding(BlankLines(tuple(blank)), severity="note"))
+            findings.append(Finding(BlankLines(tuple(blank)), severity="note"))
         for kind_of_lines, lines in self.skipped.items():
             is_loss = kind_of_lines is NulLines
-            found.append(Finding(kind_of_lines(tuple(lines)), severity="loss" if is_loss else "note"))
-        return found
+            findings.append(Finding(kind_of_lines(tuple(lines)), severity="loss" if is_loss else "note"))
+        return findings
 
-    def _drop(self, item: OddLine, line: int, as_what: type[SkippedLines] | None = None) -> None:
-        self.dropped[item.row] = line
-        if as_what is not None:
-            self.skipped.setdefault(as_what, []).append(line)
+    def _drop(self, irregular: IrregularLine, line: int, fact: type[SkippedLines] | None = None) -> None:
+        self.dropped[irregular.row] = line
+        if fact is not None:
+            self.skipped.setdefault(fact, []).append(line)
 
-    def _is_skipped(self, item: OddLine, line: int) -> bool:
-        text = self.dialect.text.decode(item.text).rstrip("\r")
+    def _is_skipped(self, irregular: IrregularLine, line: int) -> bool:
+        text = self.dialect.text.decode(irregular.text).rstrip("\r")
         if self._is_comment(text):
-            self._drop(item, line, CommentLines)
-        elif text.strip() in {told.strip() for told in self.dialect.header_text}:
-            self._drop(item, line, HeaderLines)
+            self._drop(irregular, line, CommentLines)
+        elif text.strip() in {header.strip() for header in self.dialect.header_text}:
+            self._drop(irregular, line, HeaderLines)
         elif is_ruler(text):
-            self._drop(item, line, DrawnLines)
-        elif b"\0" in item.text:
-            self._drop(item, line, NulLines)
+            self._drop(irregular, line, DrawnLines)
+        elif b"\0" in irregular.text:
+            self._drop(irregular, line, NulLines)
         else:
             return False
         return True
 
     def _is_comment(self, text: str) -> bool:
-        """A line of full width in a table without comments is a row, unless it is one that was made a comment."""
+        """Return whether a line is a comment.
+
+        In a table without comments a line of full width is a row, unless it is a commented row.
+        """
         mark = self.dialect.comment
         if not begins_comment(text, mark):
             return False
@@ -126,30 +130,28 @@ class OddLines:
         cells = split_line(rest, self.dialect.separator)
         return self.dialect.commented or len(cells) != self.dialect.width or rest[:1] == " " or kind(cells[0]) != "X"
 
-    def _judge(self, item: OddLine, line: int, rows: Rows) -> None:
-        text = self.dialect.text.decode(item.text).rstrip("\r")
+    def _read_row(self, irregular: IrregularLine, line: int, rows: Rows) -> None:
+        text = self.dialect.text.decode(irregular.text).rstrip("\r")
         if "\r" in text:
             raise RecordingError(
-                f"{self.path}: line {line} holds a carriage return: line ends are mixed",
+                f"{self.path}: line {line} contains a carriage return: line ends are mixed",
                 "save the file again with one kind of line end",
             )
         if text.count('"') % 2:
-            raise RecordingError(
-                f"{self.path}: line {line} is no line of a table: a quote is not closed", "are the quotes in pairs?"
-            )
+            raise RecordingError(f"{self.path}: line {line} has a quote that is not closed", "write quotes in pairs")
         cells = split_line(text, self.dialect.separator)
         if len(cells) != self.dialect.width or self.words is not None:
-            self._not_a_row(item, line, cells, text)
+            self._skip_footer(irregular, line, cells, text)
             return
         for column, target in enumerate(self.targets.tolist()):
             if target != LEFT:
-                self._cell(rows, item.row, line, column, cells[column])
+                self._read_cell(rows, irregular.row, line, column, cells[column])
 
-    def _not_a_row(self, item: OddLine, line: int, cells: list[str], text: str) -> None:
-        """Words below the rows are a footer, if nothing but words follows; anything else is a row of another width."""
-        if len(cells) == 1 and self.dialect.width > 1 and kind(cells[0]) == "X" and not holds_numbers(text):
-            self._drop(item, line, WordsBelowRows)
-            self.words = self.words or (item.row, line, text)
+    def _skip_footer(self, irregular: IrregularLine, line: int, cells: list[str], text: str) -> None:
+        """Skip a line of words, which is a footer if only words follow; raise RecordingError for any other line."""
+        if len(cells) == 1 and self.dialect.width > 1 and kind(cells[0]) == "X" and not has_numbers(text):
+            self._drop(irregular, line, WordsBelowRows)
+            self.words = self.words or (irregular.row, line, text)
             return
         if self.words is not None:
             self._refuse_words(*self.words[1:])
@@ -160,9 +162,9 @@ class OddLines:
         )
 
     def end_block(self, rows: range) -> dict[int, int]:
-        """Return those of a block's rows that are dropped, with their lines, and forget them.
+        """Return the dropped rows of a block with their lines, and clear them.
 
-        Raises RecordingError where a row follows words that would be a footer.
+        Raises RecordingError if a row follows words that would be a footer.
         """
         dropped, self.dropped = self.dropped, {}
         if self.words is not None:
@@ -179,7 +181,7 @@ class OddLines:
             "repair or remove the line; pin comment in [csv] if such lines are comments",
         )
 
-    def _cell(self, rows: Rows, row: int, line: int, column: int, cell: str) -> None:
+    def _read_cell(self, rows: Rows, row: int, line: int, column: int, cell: str) -> None:
         target = int(self.targets[column])
         if target == EMPTY:
             if cell:
@@ -214,17 +216,17 @@ class OddLines:
             self.left_out[column] = Finding(NotNumeric(name, *unread[0], _advice(self.dialect, unread[0][1])))
 
     def _unreadable(self, line: int, column: int, target: int, cell: str) -> RecordingError:
-        """A cell of a wanted column that cannot be read."""
-        found = self.dialect.stamped.get(column)
-        what, hint = "is not a number", str(_advice(self.dialect, cell))
-        if found is not None and target <= STAMP:
-            what = f"is no time written as {found.layouts[0].pattern}"
-        elif found is not None and STAMP_LIKE.fullmatch(cell):
-            what, hint = "is a date or time, not a number", "of the channels only time may be one"
+        """Return the error for an unreadable cell of a wanted column."""
+        layouts = self.dialect.stamped.get(column)
+        problem, hint = "is not a number", str(_advice(self.dialect, cell))
+        if layouts is not None and target <= STAMP:
+            problem = f"is not a time with the layout {layouts.layouts[0].pattern}"
+        elif layouts is not None and STAMP_LIKE.fullmatch(cell):
+            problem, hint = "is a date or time, not a number", "only the channel time may be a date or time"
         elif STAMP_LIKE.fullmatch(cell):
-            what = "is not a number, nor a date or time in a layout that is known"
+            problem = "is not a number, nor a date or time with a known layout"
         where = f"line {line}, column '{self.dialect.names[column]}'"
-        return RecordingError(f"{self.path}: {where}: {cell[:60]!r} {what}", hint)
+        return RecordingError(f"{self.path}: {where}: {cell[:60]!r} {problem}", hint)
 
     def _unread(self, column: int) -> Finding:
         cells = self.unread[column]
@@ -242,13 +244,13 @@ class OddLines:
 
 
 def not_numeric(name: str, line: int, cell: str) -> Finding:
-    """A column that is left out of a survey."""
+    """Return the note on a column that a survey leaves out."""
     advice = CellAdvice("time") if STAMP_LIKE.fullmatch(cell) else None
     return Finding(NotNumeric(name, line, cell, advice), severity="note")
 
 
 def _advice(dialect: Dialect, cell: str) -> CellAdvice:
-    """What to do about a cell that cannot be read."""
+    """Return the advice on a cell that cannot be read."""
     if STAMP_LIKE.fullmatch(cell):
         return CellAdvice("time")
     if any(letter.isdigit() for letter in cell):

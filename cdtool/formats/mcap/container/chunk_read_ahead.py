@@ -1,0 +1,268 @@
+"""Read chunks ahead: decompress and check chunks of the summary in several threads before they are needed.
+
+Groups of chunks are consecutive in one memory block, so that columns are gathered from many messages at once. A group
+is used only if all its chunks are correct and have the same headers as the data section. Otherwise its chunks are read
+again one by one, and damage is reported then.
+"""
+
+from __future__ import annotations
+
+import mmap
+import weakref
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from cdtool.cores import usable_cores
+from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, ChunkHeader, Decompressor, chunk_header
+from cdtool.formats.mcap.container.damage import DamageError
+from cdtool.formats.mcap.container.definitions import Definitions
+from cdtool.formats.mcap.container.file_bytes import FileBytes
+from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
+from cdtool.formats.mcap.container.summary import Summary, matches_header
+from cdtool.formats.mcap.container.walk_kernel import Bytes
+from cdtool.messages.fast_path import ChunkReader, ChunkRows
+
+_LARGE_PAGE = 2 << 20
+_MOST_FREE = 3
+# The size of a group [bytes] (writers make chunks of slightly more than one MiB). Larger groups exceed the processor's
+# cache; with smaller ones the effort per group dominates.
+JOINED = 14 << 20
+_LARGEST = 16 << 20  # chunks beyond this size are read one by one
+_GROUPS_AHEAD = 1
+_MOST_THREADS = 4
+_SUBMITTED = 3  # chunks per task of a thread: submitting a task costs as much as a tenth of a chunk
+# In a message index the prefix, the channel's id and the length precede the entries; each is a time and an offset.
+_BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
+
+
+class Buffers:
+    """Memory for decompressed chunks, in large pages; it is reused when nothing refers to it.
+
+    Arrays have `size` bytes, a multiple of a large page; larger ones are allocated separately. Messages are far apart,
+    and a page of 4 KiB contains few of them: with small pages, address translation needs a quarter of the time of
+    decompressing and half of the time of gathering.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self._free: list[mmap.mmap] = []
+
+    def take(self, size: int) -> Bytes:
+        """Return an uninitialised array of at least `size` bytes."""
+        if size > self.size:
+            return np.empty(size, np.uint8)
+        memory = self._free.pop() if self._free else _large_pages(self.size)
+        whole: Bytes = np.frombuffer(memory, np.uint8)
+        # Every view refers to `whole`, which therefore exists as long as any of them.
+        weakref.finalize(whole, self._give_back, memory)
+        start = -whole.ctypes.data % _LARGE_PAGE
+        return whole[start : start + self.size]
+
+    def _give_back(self, memory: mmap.mmap) -> None:
+        if len(self._free) < _MOST_FREE:
+            self._free.append(memory)
+
+
+def _large_pages(size: int) -> mmap.mmap:
+    memory = mmap.mmap(-1, size + _LARGE_PAGE)
+    if hasattr(mmap, "MADV_HUGEPAGE"):  # Linux
+        memory.madvise(mmap.MADV_HUGEPAGE)
+    return memory
+
+
+# The first use of memory costs as much time as decompressing into it: buffers are kept for the next logs.
+_BUFFERS = Buffers(JOINED)
+
+
+@dataclass(frozen=True)
+class _CheckedChunk:
+    """A checked chunk: its header, and either its messages, if the fast path has read them, or its address."""
+
+    header: ChunkHeader
+    address: int = 0
+    taken: ChunkRows | None = None
+
+
+class _Reader:
+    """The file, decompressor and buffer of one thread."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = FileBytes(path)
+        self.decompressor = Decompressor()
+        self._buffer = np.empty(0, np.uint8)
+
+    def buffer(self, size: int) -> Bytes:
+        """Return memory that is reused for each chunk, so that it stays in the processor's cache."""
+        if size > len(self._buffer):
+            self._buffer = np.empty(size, np.uint8)
+        return self._buffer[:size]
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Memory for a group of chunks, and the future result of each; None if the chunk must be read again."""
+
+    memory: Bytes
+    chunks: tuple[Future[list[_CheckedChunk | None]], ...]
+
+
+class ChunkReadAhead:
+    """Reads ahead the chunks of a `summary` with a CRC, except those at the bytes `skip`.
+
+    The fast path (`taker`) is applied to each chunk as long as no id in `definitions` is ambiguous.
+    """
+
+    def __init__(
+        self, path: Path, summary: Summary, skip: Container[int], definitions: Definitions, taker: ChunkReader | None
+    ) -> None:
+        self._path, self._definitions, self._taker = path, definitions, taker
+        chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
+        self._rows = expected_rows(chunks) if taker is not None else {}
+        threads = min(usable_cores(), _MOST_THREADS, len(chunks))
+        self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
+        self._following = dict(pairwise(self._groups))
+        self._started: dict[int, _Group] = {}
+        self._checked: dict[ChunkHeader, _CheckedChunk] = {}
+        self._threads = ThreadPoolExecutor(threads, "chunks") if threads > 1 else None
+        self._readers: SimpleQueue[_Reader] = SimpleQueue()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._threads is not None:
+            self._threads.shutdown(cancel_futures=True)
+        while not self._readers.empty():
+            self._readers.get().file.close()
+
+    def begins(self, at: int) -> bool:
+        """Return whether the chunk at byte `at` is the first of a group, which has its own memory."""
+        return at in self._groups
+
+    def memory(self, at: int, size: int) -> Bytes:
+        """Return memory of at least `size` bytes for the chunk at byte `at`; for the first of a group, the group's."""
+        self._checked = {}
+        if at not in self._groups:
+            return _BUFFERS.take(size)
+        for earlier in [start for start in self._started if start < at]:
+            del self._started[earlier]
+        following: int | None = at
+        # The fast path must learn from the first group before the next ones are started.
+        learning = self._taker is not None and at == next(iter(self._groups))
+        for _ in range(1 if learning else 1 + _GROUPS_AHEAD):
+            if following is not None and following not in self._started:
+                self._started[following] = self._start(self._groups[following])
+            following = self._following.get(following) if following is not None else None
+        group = self._started.pop(at)
+        chunks = [chunk for future in group.chunks for chunk in future.result()]
+        if not all(chunks) or len(group.memory) < size:
+            return _BUFFERS.take(size)
+        self._checked = {chunk.header: chunk for chunk in chunks if chunk is not None}
+        return group.memory
+
+    def has_filled(self, header: ChunkHeader, content: Bytes) -> bool:
+        """Return whether `content` is the checked chunk with this header."""
+        chunk = self._checked.get(header)
+        return chunk is not None and chunk.address == content.ctypes.data
+
+    def taken(self, header: ChunkHeader) -> ChunkRows | None:
+        """Return the messages of the chunk with this header; None if the fast path has not read them."""
+        chunk = self._checked.get(header)
+        return None if chunk is None or self._definitions.ambiguous else chunk.taken
+
+    def _start(self, chunks: list[ChunkIndex]) -> _Group:
+        assert self._threads is not None
+        memory = _BUFFERS.take(sum(index.uncompressed_size for index in chunks))
+        targets, end = [], 0
+        for index in chunks:
+            start, end = end, end + index.uncompressed_size
+            targets.append((index, memory[start:end]))
+        tasks = [targets[i : i + _SUBMITTED] for i in range(0, len(targets), _SUBMITTED)]
+        return _Group(memory, tuple(self._threads.submit(self._fill_all, task) for task in tasks))
+
+    def _fill_all(self, targets: list[tuple[ChunkIndex, Bytes]]) -> list[_CheckedChunk | None]:
+        return [self._fill(index, content) for index, content in targets]
+
+    def _fill(self, index: ChunkIndex, content: Bytes) -> _CheckedChunk | None:
+        at = index.chunk_start_offset
+        try:
+            reader = self._reader()
+        except OSError:
+            return None
+        try:
+            header = chunk_header(at, reader.file.read(at, HEADER_LENGTH))
+            if header is None or not header.uncompressed_crc or not matches_header(index, header):
+                return None
+            header.check()
+            if self._taker is None or not self._taker.ready or at not in self._rows:
+                reader.decompressor.read(reader.file, header, content)
+                return _CheckedChunk(header, content.ctypes.data)
+            buffer = reader.buffer(len(content))
+            reader.decompressor.read(reader.file, header, buffer)
+            taken = self._taker.take(buffer, self._rows[at], self._is_known)
+            if taken is not None:
+                return _CheckedChunk(header, taken=taken)
+            content[:] = buffer
+            return _CheckedChunk(header, content.ctypes.data)
+        except (DamageError, OSError):
+            return None
+        finally:
+            self._readers.put(reader)
+
+    def _is_known(self, opcode: int, body: bytes) -> bool:
+        return self._definitions.is_known(opcode, body, covered=True)
+
+    def _reader(self) -> _Reader:
+        try:
+            return self._readers.get_nowait()
+        except Empty:
+            return _Reader(self._path)
+
+
+def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
+    """Yield groups of chunks; the first group is a single chunk, from which the fast path learns."""
+    group: list[ChunkIndex] = []
+    size = most = 0
+    for index in chunks:
+        if group and size + index.uncompressed_size > most:
+            yield group
+            group, size, most = [], 0, JOINED
+        if index.uncompressed_size <= _LARGEST:
+            group.append(index)
+            size += index.uncompressed_size
+    if group:
+        yield group
+
+
+def expected_rows(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]]:
+    """Return the expected row numbers of the messages, by the chunk's byte and the channel's id.
+
+    A row number is the position of a message among all messages of its channel in these chunks. They follow from the
+    lengths of the message indexes, which have 16 bytes per message of a channel and whose positions are in the chunk's
+    index (section "Chunk Index"). The result ends before the first chunk whose message indexes have impossible lengths.
+    """
+    expected: dict[int, Mapping[int, range]] = {}
+    before: Counter[int] = Counter()
+    for index in chunks:
+        indexes = sorted((at, channel) for channel, at in index.message_index_offsets.items())
+        indexes_end = index.chunk_start_offset + index.chunk_length + index.message_index_length
+        rows = {}
+        for (at, channel), (end, _) in pairwise((*indexes, (indexes_end, 0))):
+            count, rest = divmod(end - at - _BEFORE_ENTRIES, _ENTRY)
+            if count < 0 or rest:
+                return expected
+            rows[channel] = range(before[channel], before[channel] + count)
+            before[channel] += count
+        expected[index.chunk_start_offset] = rows
+    return expected
