@@ -22,10 +22,6 @@ from tests.language.texts import markdown_prose, python_prose
 
 ROOT = Path(__file__).parents[2]
 
-# Folders and files still to be rewritten; everywhere else each phrase is refused. Entries are removed, never added:
-# a test fails for an entry without a hit.
-TO_REWRITE: tuple[str, ...] = ()
-
 _EXEMPT = re.compile(r"(?:#|<!--) language: (?!-->)\S+")
 
 
@@ -83,26 +79,13 @@ def check(names: Iterable[str], root: Path = ROOT) -> list[Hit]:
     return hits
 
 
-def is_to_rewrite(name: str) -> bool:
-    """Whether the file is listed in TO_REWRITE."""
-    return any(is_listed(name, entry) for entry in TO_REWRITE)
-
-
-def is_listed(name: str, entry: str) -> bool:
-    """Whether an entry of TO_REWRITE covers the file: as itself, by its folder, or as "folder/*.py" next to others."""
-    if "/*" in entry:
-        folder, _, ending = entry.rpartition("/*")
-        return name.rpartition("/")[0] == folder and name.endswith(ending)
-    return name == entry or name.startswith(f"{entry}/")
-
-
 def files_of(path: Path) -> list[Path]:
     """Return the file itself, or the Python and Markdown files below a folder in order of their names."""
     return sorted(file for file in path.rglob("*") if file.suffix in (".py", ".md")) if path.is_dir() else [path]
 
 
 def main(arguments: list[str], root: Path = ROOT) -> int:
-    """Print the hits in the given files or folders, or in all files not in TO_REWRITE; return the exit status."""
+    """Print the hits in the given files or folders, or in all files; return the exit status."""
     if arguments:
         given = [Path(argument).resolve() for argument in arguments]
         if unknown := [str(path) for path in given if not path.exists()]:
@@ -110,7 +93,7 @@ def main(arguments: list[str], root: Path = ROOT) -> int:
             return 2
         names = [file.relative_to(root).as_posix() for path in given for file in files_of(path)]
     else:
-        names = [name for name in versioned_files(root) if not is_to_rewrite(name)]
+        names = versioned_files(root)
     hits = check(names, root)
     for hit in hits:
         print(hit)

@@ -1,4 +1,4 @@
-"""No refused phrase is in the project's texts, except where a file is listed as still to be rewritten."""
+"""No refused phrase is in the project's texts."""
 
 from __future__ import annotations
 
@@ -12,12 +12,9 @@ import pytest
 
 from tests.language.checker import (
     ROOT,
-    TO_REWRITE,
     Hit,
     check,
     hits_in,
-    is_listed,
-    is_to_rewrite,
     main,
     versioned_files,
 )
@@ -48,14 +45,9 @@ def test_the_phrase_is_not_found_in_its_allowed_example(name):
     assert not list(hits_in(PHRASES[name].allowed, ".md", "page.md", [PHRASES[name]]))
 
 
-def test_no_rewritten_file_has_a_refused_phrase():
-    refused = [str(hit) for hit in all_hits() if not is_to_rewrite(hit.file)]
+def test_no_file_has_a_refused_phrase():
+    refused = [str(hit) for hit in all_hits()]
     assert not refused, "\n".join(refused)
-
-
-@pytest.mark.parametrize("entry", TO_REWRITE)
-def test_what_is_still_to_be_rewritten_still_has_refused_phrases(entry):
-    assert any(is_listed(hit.file, entry) for hit in all_hits()), f"take {entry} out of TO_REWRITE"
 
 
 def test_strings_docstrings_comments_and_names_are_searched():
