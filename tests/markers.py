@@ -9,12 +9,14 @@
 
 from __future__ import annotations
 
-import ast
-import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+import dis
+import inspect
+import sys
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
 
 import pytest
 
@@ -25,6 +27,7 @@ SLOW_TESTS = Path(__file__).with_name("slow_tests.txt")
 ROOT = Path(__file__).parents[1]
 MODULES = {"selenium": "browser", "subprocess": "external"}
 """What a test uses -> its marker."""
+NOTHING = ModuleType("nothing")
 
 
 def mark(items: Iterable[pytest.Item]) -> None:
@@ -47,100 +50,63 @@ def slow_tests(path: Path = SLOW_TESTS) -> list[str]:
 
 @cache
 def markers_of(module: str, function: str) -> frozenset[str]:
-    """Return the markers of a test function from the names used by it, its fixtures and the functions of tests/."""
-    if not _relevant().intersection([module, *_conftests(module)]):
-        return frozenset()
-    return frozenset(MODULES[name] for name in _reached(module, function) if name in MODULES)
-
-
-@cache
-def _relevant() -> set[str]:
-    """Return the modules of tests/ that name one of `MODULES`, directly or through another module."""
-    texts = {
-        ".".join(file.relative_to(ROOT).with_suffix("").parts): file.read_text(encoding="utf-8")
-        for file in Path(__file__).parent.rglob("*.py")
-    }
-    del texts[__name__]
-    found, words = set(), set(MODULES)
-    while words:
-        named = re.compile(rf"\b({'|'.join(words)})\b")
-        new = {module for module, text in texts.items() if module not in found and named.search(text)}
-        found, words = found | new, {module.rpartition(".")[2] for module in new}
-    return found
+    """Return the markers of a function of an imported module, from the names used by its code and its fixtures."""
+    return frozenset(MODULES[name] for name in _reached(module, function))
 
 
 def _reached(module: str, name: str) -> set[str]:
-    """Return the names of modules outside tests/ that a name of a module reaches."""
+    """Return the modules of MODULES that a name of a module reaches through functions and fixtures of tests/."""
     found, seen, waiting = set(), set(), [(module, name)]
     while waiting:
         place = waiting.pop()
-        if place in seen:
+        names = vars(sys.modules.get(place[0], NOTHING))
+        if place in seen or place[1] not in names:
             continue
         seen.add(place)
-        text = _names(place[0])
-        found |= text.outside.get(place[1], set())
-        waiting += [(place[0], used) for used in text.uses.get(place[1], ())]
-        if place[1] in text.imported:
-            imported = text.imported[place[1]]
-            whole = ".".join(imported)
-            waiting += [imported] if _file(whole) is None else [(whole, used) for used in _names(whole).uses]
-        elif place[1] not in text.uses:
-            waiting += [(conftest, place[1]) for conftest in _conftests(place[0])]
+        value = _unwrapped(names[place[1]])
+        home = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None) or place[0]
+        library = home.partition(".")[0]
+        if library in MODULES:
+            found.add(library)
+        elif library == "tests":
+            for code in _codes(value):
+                found |= _imported(code) & MODULES.keys()
+                waiting += _used(code, home)
     return found
 
 
-@dataclass(frozen=True)
-class _Names:
-    """Return the names of a module: the names that each definition uses, and its imports."""
-
-    uses: Mapping[str, set[str]] = field(default_factory=dict)
-    outside: Mapping[str, set[str]] = field(default_factory=dict)
-    imported: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-
-
-@cache
-def _names(module: str) -> _Names:
-    file = _file(module)
-    if file is None:
-        return _Names()
-    uses: dict[str, set[str]] = {}
-    outside: dict[str, set[str]] = {}
-    imported: dict[str, tuple[str, str]] = {}
-    for node in ast.parse(file.read_text(encoding="utf-8")).body:
-        names, stored, imports = _parts(node)
-        libraries = {(base or name).partition(".")[0] for base, name, _ in imports}
-        imported |= {known: (base, name) for base, name, known in imports if base.startswith("tests")}
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            stored = {node.name}
-        elif isinstance(node, ast.ImportFrom | ast.Import):
-            stored = {known for _, _, known in imports}
-        for defined in stored:
-            uses.setdefault(defined, set()).update(names)
-            outside.setdefault(defined, set()).update(libraries)
-    return _Names(uses, outside, imported)
-
-
-def _parts(node: ast.stmt) -> tuple[set[str], set[str], list[tuple[str, str, str]]]:
-    """Return the names a statement uses (a parameter is a fixture), the names it binds, and (from, name, as)."""
-    names, stored, imports = set(), set(), []
-    for part in ast.walk(node):
-        if isinstance(part, ast.Name):
-            (stored if isinstance(part.ctx, ast.Store) else names).add(part.id)
-        elif isinstance(part, ast.arg):
-            names.add(part.arg)
-        elif isinstance(part, ast.ImportFrom | ast.Import):
-            base = getattr(part, "module", None) or ""
-            imports += [(base, item.name, (item.asname or item.name).partition(".")[0]) for item in part.names]
-    return names, stored, imports
-
-
-def _file(module: str) -> Path | None:
-    """Return the file of a module of tests/; a package's is empty, and modules outside tests/ are not searched."""
-    file = ROOT.joinpath(*module.split(".")).with_suffix(".py")
-    return file if file.is_file() else None
-
-
-def _conftests(module: str) -> list[str]:
-    """Return the conftest modules that apply to a module, the nearest first."""
+def _used(code: CodeType, module: str) -> Iterator[tuple[str, str]]:
+    """Yield as (module, name) what a code uses: names of its module, of modules that these are, and fixtures."""
+    names = vars(sys.modules[module])
+    for name in code.co_names:
+        yield module, name
+        if isinstance(names.get(name), ModuleType) and names[name].__name__.startswith("tests."):
+            yield from ((names[name].__name__, attribute) for attribute in code.co_names)
     parts = module.split(".")[:-1]
-    return [".".join([*parts[:count], "conftest"]) for count in range(len(parts), 0, -1)]
+    conftests = [".".join([*parts[:count], "conftest"]) for count in range(len(parts), 0, -1)]
+    for fixture in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]:
+        yield from ((place, fixture) for place in (module, *conftests))
+
+
+def _imported(code: CodeType) -> set[str]:
+    """Return the libraries that a code imports."""
+    if not any(name.partition(".")[0] in MODULES for name in code.co_names):  # nearly always
+        return set()
+    return {step.argval.partition(".")[0] for step in dis.get_instructions(code) if step.opname == "IMPORT_NAME"}
+
+
+def _unwrapped(value: Any) -> Any:
+    """Return the function within its decorators, fixtures and hypothesis included."""
+    value = inspect.unwrap(value) if callable(value) else value
+    drawn = getattr(getattr(value, "hypothesis", None), "inner_test", None)
+    return value if drawn is None else inspect.unwrap(drawn)
+
+
+def _codes(value: Any) -> Iterator[CodeType]:
+    """Yield the codes of a function or of the methods of a class, those nested in them included."""
+    functions = map(_unwrapped, vars(value).values()) if isinstance(value, type) else [value]
+    waiting = [function.__code__ for function in functions if isinstance(function, FunctionType)]
+    while waiting:
+        code = waiting.pop()
+        yield code
+        waiting += [constant for constant in code.co_consts if isinstance(constant, CodeType)]

@@ -4,6 +4,9 @@
 tests.project.slow_tests times.xml` prints the tests missing from the list, those listed without need and those that no
 longer exist, and exits with status 1 if a test is missing. `--write` corrects the list.
 
+The first test that needs a shared fixture takes the time of its set-up. So measure the quick tests alone after that
+(`-m "not slow"`), and add those that are slow now: `python -m tests.project.slow_tests quick.xml --add`.
+
 A test is slow if all cases of its function, set-up included, together take longer than the bound of tests/markers.py. A
 listed one stays until it takes less than half of that, so that runs on different machines do not alternate the list.
 """
@@ -42,14 +45,15 @@ def corrected(listed: Sequence[str], took: Mapping[str, float | None], bound: fl
     return sorted(slow | stay)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Compare the list with the report; return 1 if a slow test is not listed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("report", type=Path, help="what pytest wrote with --junitxml, of the whole suite")
+    parser.add_argument("report", type=Path, help="what pytest wrote with --junitxml")
+    parser.add_argument("--add", action="store_true", help="add the slow tests of a run of the quick tests to the list")
     parser.add_argument("--write", action="store_true", help="correct tests/slow_tests.txt")
-    chosen = parser.parse_args()
-    listed, took = slow_tests(), durations(chosen.report)
-    wanted = corrected(listed, took)
+    chosen = parser.parse_args(arguments)
+    listed, took = slow_tests(SLOW_TESTS), durations(chosen.report)
+    wanted = sorted({*listed, *corrected([], took)}) if chosen.add else corrected(listed, took)
     lacking, needless = sorted(set(wanted) - set(listed)), sorted(set(listed) - set(wanted))
     for name in lacking:
         print(f"not listed: {name} took {took[name]:.2f} s")
@@ -57,7 +61,7 @@ def main() -> int:
         print(f"listed, but {'took less than half of the bound' if name in took else 'there is no such test'}: {name}")
     fast = sum(seconds or 0.0 for name, seconds in took.items() if name not in wanted)
     print(f"{len(took)} test functions, {len(wanted)} of them slow; the others together took {fast:.0f} s")
-    if chosen.write:
+    if chosen.write or chosen.add:
         SLOW_TESTS.write_text(HEAD.format(bound=BOUND_S) + "\n".join(wanted) + "\n", encoding="utf-8")
         return 0
     return int(bool(lacking))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+from types import ModuleType
 
 import pytest
 
 from tests.markers import ROOT, markers_of, slow_tests
 from tests.project import marker_samples
+from tests.project import slow_tests as slow_tests_script
 from tests.project.covered_lines import shares
 from tests.project.slow_tests import corrected, durations
 
@@ -33,10 +35,19 @@ def test_a_marker_follows_from_what_a_test_and_its_fixtures_use(function, marker
     assert markers_of("tests.project.marker_samples", function) == markers
 
 
-def test_what_a_test_imports_from_another_module_of_the_tests_counts_too():
-    # Pytest's own fixtures are not analysed, and for a module imported as a whole everything counts.
-    assert markers_of("tests.whole_runs.test_full_disk", "table") == frozenset()
-    assert markers_of("tests.project.test_markers", "marker_samples") == {"external", "browser"}
+def uses_another_module() -> object:
+    return marker_samples.starts_a_program()
+
+
+def names_a_module_that_it_does_not_use(script: ModuleType) -> object:
+    return script.subprocess
+
+
+def test_what_a_test_uses_of_another_module_of_the_tests_counts_too():
+    assert markers_of(__name__, "uses_another_module") == {"external"}
+    assert markers_of(__name__, "names_a_module_that_it_does_not_use") == frozenset()
+    # Pytest's own fixtures are not analysed.
+    assert markers_of("tests.project.marker_samples", "tmp_path") == frozenset()
     assert marker_samples.starts_nothing(ROOT) == ROOT
 
 
@@ -69,3 +80,13 @@ def test_the_list_adds_tests_above_the_bound_and_drops_those_below_half(tmp_path
 def test_the_covered_share_counts_only_lines_that_the_full_suite_runs():
     full = {"cli/a.py": {1, 2, 3, 4}, "b.py": {1, 2}}
     assert shares({"cli/a.py": {1, 2, 3, 9}}, full) == {"cli": (3, 4), ".": (0, 2)}
+
+
+def test_the_slow_tests_of_a_run_of_the_quick_ones_are_added_and_no_other_line_changes(tmp_path, monkeypatch, capsys):
+    report, listed = tmp_path / "quick.xml", tmp_path / "slow_tests.txt"
+    report.write_text(REPORT, encoding="utf-8")
+    listed.write_text("# a comment\ntests/z/test_y.py::test_not_in_this_run\n", encoding="utf-8")
+    monkeypatch.setattr(slow_tests_script, "SLOW_TESTS", listed)
+    assert slow_tests_script.main([str(report), "--add"]) == 0
+    assert slow_tests(listed) == ["tests/a/test_b.py::test_cases", "tests/z/test_y.py::test_not_in_this_run"]
+    assert "not listed: tests/a/test_b.py::test_cases took 0.70 s" in capsys.readouterr().out
