@@ -98,7 +98,7 @@ def choose_format(path: Path) -> Format:
 
 
 def survey(path: Path) -> Source:
-    """Return all numeric columns of a log, its rows in memory, and its warnings; raises RecordingError."""
+    """Return all numeric columns of a log with their rows, and its warnings; raises RecordingError."""
     return join_pieces(log_pieces(path), sort=True) if path.is_dir() else choose_format(path).columns(path)
 
 

@@ -127,12 +127,12 @@ class ChunkReader(Protocol):
     """Reads chunks on the fast path; called by several threads at once."""
 
     @property
-    def ready(self) -> bool:
+    def is_ready(self) -> bool:
         """True if layouts are known."""
         ...
 
-    def take(
-        self, content: npt.NDArray[np.uint8], rows: Mapping[int, range], knows: IsKnownDefinition
+    def read(
+        self, content: npt.NDArray[np.uint8], rows: Mapping[int, range], is_known: IsKnownDefinition
     ) -> ChunkRows | None:
         """Return all messages of a chunk; None if one does not match its layout, or a definition is not known.
 

@@ -98,8 +98,8 @@ class Mcap:
 
 def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
     names = {source.topic for source in wanted.sources}
-    taker = UniformChunkReader(publish=wanted.time.clock == "publish")
-    log = Log(path, names.__contains__, taker=taker)
+    chunk_reader = UniformChunkReader(publish=wanted.time.clock == "publish")
+    log = Log(path, names.__contains__, chunk_reader=chunk_reader)
     topics = wanted_topics(
         path, wanted, partial(TopicColumns, expected={topic: log.expected(topic) for topic in names})
     )
@@ -113,21 +113,21 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
             else:
                 topic.add(messages.stream, messages.batch)
         if any(not messages.parts for messages in piece):
-            taker.learn(_bound(log, topics))
+            chunk_reader.learn(_bindings(log, topics))
     return mapped_source_of(log, wanted, topics)[0]
 
 
-def _bound(log: Log, topics: Mapping[str, TopicColumns]) -> dict[int, Binding]:
-    """Return, by id, the channels that uniform chunks may contain: wanted ones with a layout, and unwanted ones."""
+def _bindings(log: Log, topics: Mapping[str, TopicColumns]) -> dict[int, Binding]:
+    """Return, by id, the channels that uniform chunks may contain: wanted ones with a row layout, and unwanted ones."""
     channels = log.summary.channels.values()
     channels_per_topic = Counter(channel.topic for channel in channels)
-    bound: dict[int, Binding] = {}
+    bindings: dict[int, Binding] = {}
     for channel in channels:
         if channel.topic not in topics:
-            bound[channel.id] = None
+            bindings[channel.id] = None
         elif channels_per_topic[channel.topic] == 1 and (of_channel := topics[channel.topic].binding(channel.id)):
-            bound[channel.id] = of_channel
-    return bound
+            bindings[channel.id] = of_channel
+    return bindings
 
 
 def _origin(path: Path, log: Log) -> int:
@@ -169,13 +169,13 @@ class MappedFields:
                 start = first
             for messages in piece:
                 topic = topics[messages.stream.topic]
-                taken = topic.decode(messages.stream, messages.batch)
-                if taken is None or not len(taken[0]):
+                decoded = topic.decode(messages.stream, messages.batch)
+                if decoded is None or not len(decoded[0]):
                     continue
-                start = int(taken[0][0]) if start is None else start
-                for text in taken[1]:
+                start = int(decoded[0][0]) if start is None else start
+                for text in decoded[1]:
                     if (name := f"{topic.topic} {text}") in self._fields:
-                        of_field = self._piece(name, text, taken, start)
+                        of_field = self._piece(name, text, decoded, start)
                         if of_field.rows:
                             yield of_field
         source, self.origin = mapped_source_of(log, self.wanted, topics)
@@ -184,10 +184,10 @@ class MappedFields:
             return source
         return replace(source, origin=float(self._converted.get("cdtool.origin_s", "0")))
 
-    def _piece(self, name: str, text: str, taken: BatchValues, origin: int) -> Piece:
+    def _piece(self, name: str, text: str, decoded: BatchValues, origin: int) -> Piece:
         """Return one field of a batch's messages, without the messages that do not name its joints."""
-        stamps, (values, other) = taken[0], taken[1][text]
-        exact = None if self._converted is None else taken[1][EXACT_TIME][0]
+        stamps, (values, other) = decoded[0], decoded[1][text]
+        exact = None if self._converted is None else decoded[1][EXACT_TIME][0]
         if other is not None:
             stamps = stamps[~other]
             values, exact = (None if each is None else each[~other] for each in (values, exact))

@@ -1,8 +1,8 @@
 """The fast path for chunks whose messages all have the layout of earlier messages: whole chunks become columns.
 
-The decoders derive a recipe per channel from its first messages. If a chunk matches the recipes, the thread that has
-decompressed it writes its values directly into the columns; any other chunk is decoded message by message, after which
-the recipes may change.
+The decoders derive a row layout per channel from its first messages. If a chunk matches the layouts, the thread that
+has decompressed it writes its values directly into the columns; any other chunk is decoded message by message, after
+which the layouts may change.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ _KINDS = {"f": kernel.SINGLE, "i": kernel.SIGNED_INTEGER, "u": kernel.UNSIGNED_I
 
 @dataclass(frozen=True, eq=False)
 class _Tables:
-    """The recipes as arrays for the kernel; `bound` keeps references to the columns whose addresses they contain."""
+    """The row layouts as arrays for the kernel; `bindings` keep references to the columns, whose addresses they use."""
 
-    bound: Mapping[int, Binding]
+    bindings: Mapping[int, Binding]
     slots: IntArray
     bounds: IntArray
     compared: Words
@@ -46,36 +46,36 @@ class _Tables:
 
 
 class UniformChunkReader:
-    """A ChunkReader (fast_path.py) of uniform chunks; `publish`: its times are publish times, not log times."""
+    """A ChunkReader (fast_path.py) of uniform chunks; `publish`: times are publish times instead of log times."""
 
     def __init__(self, publish: bool = False) -> None:
         self._time = kernel.PUBLISH_TIME if publish else kernel.LOG_TIME
         self._tables: _Tables | None = None
         self._mismatches = 0
 
-    def learn(self, bound: Mapping[int, Binding]) -> None:
-        """Set the layouts of channels, by id; chunks with any other channel are not taken."""
-        given_up = self._mismatches >= _MOST_MISMATCHES or not any(bound.values())
-        self._tables = None if given_up else _tables(bound)
+    def learn(self, bindings: Mapping[int, Binding]) -> None:
+        """Set the row layouts of channels, by id; chunks with any other channel are not read."""
+        given_up = self._mismatches >= _MOST_MISMATCHES or not any(bindings.values())
+        self._tables = None if given_up else _tables(bindings)
 
     @property
-    def ready(self) -> bool:
-        """Return whether there are recipes."""
+    def is_ready(self) -> bool:
+        """True if row layouts are known."""
         return self._tables is not None
 
-    def take(self, content: ByteArray, rows: Mapping[int, range], knows: IsKnownDefinition) -> ChunkRows | None:
+    def read(self, content: ByteArray, rows: Mapping[int, range], is_known: IsKnownDefinition) -> ChunkRows | None:
         """Return all messages of a chunk; None if a message does not match, or if a definition is not known."""
         tables = self._tables
         if tables is None:
             return None
-        taken = self._take(tables, content, rows, knows)
-        self._mismatches = max(0, self._mismatches + (1 if taken is None else -1))
-        return taken
+        chunk = self._read(tables, content, rows, is_known)
+        self._mismatches = max(0, self._mismatches + (1 if chunk is None else -1))
+        return chunk
 
-    def _take(
-        self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], knows: IsKnownDefinition
+    def _read(
+        self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], is_known: IsKnownDefinition
     ) -> ChunkRows | None:
-        claimed = _claimed_rows(tables.bound, rows)
+        claimed = _claimed_rows(tables.bindings, rows)
         if claimed is None:
             return None
         first, limits = claimed
@@ -104,49 +104,49 @@ class UniformChunkReader:
             if reason == kernel.DEFINITION:
                 begin = at + kernel.PREFIX
                 opcode, end = int(content[at]), begin + int.from_bytes(content[at + 1 : begin].tobytes(), "little")
-                if not knows(opcode, content[begin:end].tobytes()):
+                if not is_known(opcode, content[begin:end].tobytes()):
                     return None
                 at = end
         earliest, latest, first_time = times.tolist()
         if reason != kernel.DONE or earliest > latest or latest >= kernel.NO_DATE:
             return None
         counts, parts = {}, {}
-        for (channel, bound), begin, end, limit, stamp in zip(
-            tables.bound.items(), first.tolist(), reached.tolist(), limits.tolist(), last.tolist(), strict=True
+        for (channel, binding), begin, end, limit, stamp in zip(
+            tables.bindings.items(), first.tolist(), reached.tolist(), limits.tolist(), last.tolist(), strict=True
         ):
-            if bound is not None and end < limit:
+            if binding is not None and end < limit:
                 return None
             if end > begin:
                 counts[channel] = end - begin
-                if bound is not None:
-                    parts[channel] = WrittenRows(bound[1], slice(begin, end), stamp < kernel.NO_DATE)
+                if binding is not None:
+                    parts[channel] = WrittenRows(binding[1], slice(begin, end), stamp < kernel.NO_DATE)
         return ChunkRows(counts, parts, (earliest, latest), first_time)
 
 
-def _claimed_rows(bound: Mapping[int, Binding], rows: Mapping[int, range]) -> tuple[Words, Words] | None:
+def _claimed_rows(bindings: Mapping[int, Binding], rows: Mapping[int, range]) -> tuple[Words, Words] | None:
     """Return first row and end of each channel's messages; None if its columns do not have as many free rows."""
-    first, limits = np.zeros(len(bound), np.uint64), np.zeros(len(bound), np.uint64)
-    for slot, (channel, each) in enumerate(bound.items()):
-        if each is not None and channel in rows:
-            free = each[1].free
+    first, limits = np.zeros(len(bindings), np.uint64), np.zeros(len(bindings), np.uint64)
+    for slot, (channel, binding) in enumerate(bindings.items()):
+        if binding is not None and channel in rows:
+            free = binding[1].free
             if rows[channel].start < free.start or rows[channel].stop > free.stop:
                 return None
             first[slot], limits[slot] = rows[channel].start, rows[channel].stop
     return first, limits
 
 
-def _tables(bound: Mapping[int, Binding]) -> _Tables:
-    slots = np.full(max(bound, default=-1) + 1, -1, np.int64)
-    bounds = np.zeros((len(bound), kernel.BOUNDS), np.int64)
-    stamps = np.zeros(len(bound), np.uint64)
-    template: list[MessageTemplate] = []
+def _tables(bindings: Mapping[int, Binding]) -> _Tables:
+    slots = np.full(max(bindings, default=-1) + 1, -1, np.int64)
+    bounds = np.zeros((len(bindings), kernel.BOUNDS), np.int64)
+    stamps = np.zeros(len(bindings), np.uint64)
+    templates: list[MessageTemplate] = []
     numbers: list[Words] = []
     compared = end = 0
-    for slot, (channel, each) in enumerate(bound.items()):
+    for slot, (channel, binding) in enumerate(bindings.items()):
         slots[channel] = slot
-        if each is None:
+        if binding is None:
             continue
-        layout, destination = each
+        layout, destination = binding
         stamps[slot] = destination.stamps.ctypes.data
         stamp = (-1, 0) if layout.stamp is None else (layout.stamp.at, layout.stamp.signed)
         numbers.append(_numbers(layout, destination))
@@ -154,15 +154,15 @@ def _tables(bound: Mapping[int, Binding]) -> _Tables:
         end += len(numbers[-1])
         places = compared, compared + len(layout.template.compared), begin, others, end
         bounds[slot] = layout.template.shortest, layout.template.longest, *places, *stamp
-        template.append(layout.template)
+        templates.append(layout.template)
         compared = places[1]
     return _Tables(
-        dict(bound),
+        dict(bindings),
         slots,
         bounds,
-        np.concatenate([each.compared for each in template]),
-        np.concatenate([each.mask for each in template]),
-        np.concatenate([each.pattern for each in template]),
+        np.concatenate([template.compared for template in templates]),
+        np.concatenate([template.mask for template in templates]),
+        np.concatenate([template.pattern for template in templates]),
         np.concatenate(numbers),
         stamps,
     )

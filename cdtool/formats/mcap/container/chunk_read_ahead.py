@@ -118,15 +118,20 @@ class _Group:
 class ChunkReadAhead:
     """Reads ahead the chunks of a `summary` with a CRC, except those at the bytes `skip`.
 
-    The fast path (`taker`) is applied to each chunk as long as no id in `definitions` is ambiguous.
+    The fast path (`chunk_reader`) is applied to each chunk as long as no id in `definitions` is ambiguous.
     """
 
     def __init__(
-        self, path: Path, summary: Summary, skip: Container[int], definitions: Definitions, taker: ChunkReader | None
+        self,
+        path: Path,
+        summary: Summary,
+        skip: Container[int],
+        definitions: Definitions,
+        chunk_reader: ChunkReader | None,
     ) -> None:
-        self._path, self._definitions, self._taker = path, definitions, taker
+        self._path, self._definitions, self._chunk_reader = path, definitions, chunk_reader
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
-        self._rows = expected_rows(chunks) if taker is not None else {}
+        self._rows = expected_rows(chunks) if chunk_reader is not None else {}
         threads = min(usable_cores(), _MOST_THREADS, len(chunks))
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
         self._following = dict(pairwise(self._groups))
@@ -159,7 +164,7 @@ class ChunkReadAhead:
             del self._started[earlier]
         following: int | None = at
         # The fast path must learn from the first group before the next ones are started.
-        learning = self._taker is not None and at == next(iter(self._groups))
+        learning = self._chunk_reader is not None and at == next(iter(self._groups))
         for _ in range(1 if learning else 1 + _GROUPS_AHEAD):
             if following is not None and following not in self._started:
                 self._started[following] = self._start(self._groups[following])
@@ -205,12 +210,12 @@ class ChunkReadAhead:
             if header is None or not header.uncompressed_crc or not matches_header(index, header):
                 return None
             header.check()
-            if self._taker is None or not self._taker.ready or at not in self._rows:
+            if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
                 reader.decompressor.read(reader.file, header, content)
                 return _CheckedChunk(header, content.ctypes.data)
             buffer = reader.buffer(len(content))
             reader.decompressor.read(reader.file, header, buffer)
-            taken = self._taker.take(buffer, self._rows[at], self._is_known)
+            taken = self._chunk_reader.read(buffer, self._rows[at], self._is_known)
             if taken is not None:
                 return _CheckedChunk(header, taken=taken)
             content[:] = buffer

@@ -71,7 +71,7 @@ class DataSection:
         summary: Summary,
         definitions: Definitions,
         skip: Mapping[int, object],
-        taker: ChunkReader | None,
+        chunk_reader: ChunkReader | None,
     ) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}
@@ -82,7 +82,7 @@ class DataSection:
         self._file, self._summary, self._skip = file, summary, skip
         self._following = dict(pairwise(sorted(summary.chunks)))
         self._decompressor = Decompressor()
-        self._ahead = ChunkReadAhead(file.path, summary, skip, definitions, taker)
+        self._ahead = ChunkReadAhead(file.path, summary, skip, definitions, chunk_reader)
         self._window = _SMALLEST_WINDOW
         self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)

@@ -67,8 +67,8 @@ class Log:
 
     `wanted` selects topics: messages of other topics are only counted, and chunks without wanted topics are skipped if
     the summary is verified. Without `use_index` every chunk is read, from the start. If not `strict`, a file without
-    any readable message, or with values that are known to be wrong, is a finding instead of an error. `taker` is the
-    fast path for chunks.
+    any readable message, or with values that are known to be wrong, is a finding instead of an error. `chunk_reader` is
+    the fast path for chunks.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Log:
         wanted: Callable[[str], bool] | None = None,
         use_index: bool = True,
         strict: bool = True,
-        taker: ChunkReader | None = None,
+        chunk_reader: ChunkReader | None = None,
     ) -> None:
         self.path = path
         self._strict = strict
@@ -86,7 +86,7 @@ class Log:
         self.summary = read_summary(self._file)
         self._skip = skippable_chunks(self._file, self.summary, self._wanted) if use_index and wanted else {}
         self._definitions = Definitions(self.summary)
-        self.section = DataSection(self._file, self.summary, self._definitions, self._skip, taker)
+        self.section = DataSection(self._file, self.summary, self._definitions, self._skip, chunk_reader)
         self.profile = profile_of(self._file)
         self.counts: Counter[int] = Counter()
         self.topics: dict[str, Topic] = {}
