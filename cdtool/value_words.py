@@ -1,8 +1,10 @@
-"""Values and errors from a file as words for a message, without Python notation."""
+"""Values and errors of a file as words for a message, without Python notation; errors of a plug-in with their place."""
 
 from __future__ import annotations
 
 import re
+import traceback
+from pathlib import Path
 from typing import Any
 
 from cdtool.plain_text import counted, digits, shorten
@@ -44,3 +46,9 @@ def fault_in_words(fault: Exception) -> str:
     if match := _NO_NUMBER.fullmatch(str(fault)):
         return f"{match[1]} is not a number"
     return str(fault)
+
+
+def fault_and_place(fault: Exception) -> str:
+    """Return an exception of a plug-in with the file and line that raised it."""
+    frame = traceback.extract_tb(fault.__traceback__)[-1]
+    return f"{fault!r} in {Path(frame.filename).name}, line {frame.lineno}"

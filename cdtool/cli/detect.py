@@ -73,6 +73,7 @@ def detect(
             if advance:
                 advance(i, len(logs))
     if not run.done:
+        print_skipped((), run.findings)
         for item in run.skipped:
             print_error(CdtoolError(item.reason))
         leave(facts=[Fact.NOTHING_USABLE])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import traceback
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +11,7 @@ from cdtool.detectors.base import Detector
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import Recording
+from cdtool.value_words import fault_and_place
 
 
 def checked_signal(detector: Detector, recording: Recording, machine: Machine) -> Signal:
@@ -35,8 +34,8 @@ def checked_signal(detector: Detector, recording: Recording, machine: Machine) -
     Raises
     ------
     RecordingError
-        The detector fails, or its signal has wrong shapes, types, times, joints or status codes, or values that are not
-        finite and yet valid.
+        The detector fails, or its signal has wrong shapes, types, times, joints, status codes or marks of lost samples,
+        or values that are not finite and yet valid.
 
     Examples
     --------
@@ -54,9 +53,7 @@ def checked_signal(detector: Detector, recording: Recording, machine: Machine) -
     except CdtoolError:
         raise
     except Exception as fault:
-        place = traceback.extract_tb(fault.__traceback__)[-1]
-        words = f"fails: {fault!r} in {Path(place.filename).name}, line {place.lineno}"
-        raise _fault(detector, recording, words) from fault
+        raise _fault(detector, recording, f"fails: {fault_and_place(fault)}") from fault
     if problem := _breach(signal, recording):
         raise _fault(detector, recording, problem)
     return signal
@@ -76,6 +73,9 @@ def _breach(signal: Any, recording: Recording) -> str:
     if not wanted or time.ndim != 1:
         kinds = f"times as {time.ndim}-dimensional {time.dtype}, values as {values.dtype}, status as {status.dtype}"
         return f"returns {kinds}: a row of float64, float64 and uint8 are needed"
+    lost = signal.lost
+    if lost is not None and (np.shape(lost) != shape or np.asarray(lost).dtype != np.bool_):
+        return f"returns marks of lost samples that are not {shape} of bool, samples by joints"
     if np.any(status > max(Status)):
         return f"returns a status of {int(status.max())}: 0 to {max(Status):d} are known"
     if len(set(signal.joints)) < len(signal.joints):

@@ -163,8 +163,8 @@ class StuckChannel(Fact):
 class UnitContradicted(Fact):
     """The header of a column, and of `more` others, states another unit than the machine file.
 
-    `stated` is what the machine file says, `ratio` the factor between both units (0: they measure different things),
-    `scale_needed` the unit of a scale that the header's unit needs, `scale_unneeded`: the stated scale then goes.
+    `stated` is what the machine file says, `ratio` the factor between both units (0: they measure different things).
+    `advice`: what to write if the header is right, with "unit and scale" a scale in the unit `scale`.
     """
 
     header: str

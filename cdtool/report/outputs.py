@@ -9,14 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import UsageError
+from cdtool.errors import CdtoolError, OutputError, UsageError
 from cdtool.evaluation.traces.file import as_read
 from cdtool.file_locks import is_temporary
 from cdtool.files import replaced_folder, resolved
 from cdtool.foreign_files import FIGURES, Kind, refuse_inputs, refuse_other_kind
 from cdtool.plain_text import plain
-from cdtool.report.writers import known_suffixes, own_writers, writer_of
+from cdtool.report.writers import WRITERS, known_suffixes, own_writers, writer_of
 from cdtool.report.writers.base import Report, Subject, Writer
+from cdtool.value_words import fault_and_place
 
 _FIGURES_IN_FOLDER = re.compile(r"(latency|survival|amoc|forces|(forces|triggers)_[a-z0-9-]+)\.png")
 
@@ -63,9 +64,24 @@ def write_outputs(
         if _is_folder(target):
             written.append(_write_folder(report, target, force=force))
         else:
-            _writer_of(target, subject).write(report, target)
+            _write_file(_writer_of(target, subject), report, target)
             written.append(target)
     return written
+
+
+def _write_file(writer: Writer[Any], report: Any, target: Path) -> None:
+    """Write one file; an error in a plug-in becomes one line."""
+    try:
+        writer.write(report, target)
+    except (CdtoolError, OSError, MemoryError):
+        raise
+    except Exception as fault:
+        if writer.name in WRITERS.table:  # an error in cdtool itself
+            raise
+        raise OutputError(
+            f"{plain(target)}: writer {writer.name} fails: {fault_and_place(fault)}",
+            "an error in the writer: see docs/own-detector.md",
+        ) from fault
 
 
 def _writer_of(target: Path, subject: Subject) -> Writer[Any]:

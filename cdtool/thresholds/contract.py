@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from cdtool.detection import Band, Signal
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance
+from cdtool.value_words import fault_and_place
 
 _HINT = "an error in the threshold: see docs/own-detector.md"
 
@@ -47,7 +46,7 @@ def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> F
     except CdtoolError:
         raise
     except Exception as fault:
-        raise SignatureError(f"threshold {rule.name} fails: {_place(fault)}", _HINT) from fault
+        raise SignatureError(f"threshold {rule.name} fails: {fault_and_place(fault)}", _HINT) from fault
     if type(fitted) not in rule.fitted:
         names = ", ".join(item.__name__ for item in rule.fitted) or "none"
         raise SignatureError(
@@ -95,7 +94,7 @@ def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal:
     except CdtoolError:
         raise
     except Exception as fault:
-        raise RecordingError(f"{recording.name}: threshold {name} fails: {_place(fault)}", _HINT) from fault
+        raise RecordingError(f"{recording.name}: threshold {name} fails: {fault_and_place(fault)}", _HINT) from fault
     shape = signal.values.shape
     if any(np.shape(item) != shape for item in (statistic.values, statistic.status, band.lower, band.upper)):
         raise RecordingError(
@@ -139,7 +138,7 @@ def checked_factor(threshold: FittedThreshold, factor: float) -> FittedThreshold
     except CdtoolError:
         raise
     except Exception as fault:
-        raise SignatureError(f"threshold {type(threshold).__name__} fails: {_place(fault)}", _HINT) from fault
+        raise SignatureError(f"threshold {type(threshold).__name__} fails: {fault_and_place(fault)}", _HINT) from fault
 
 
 def checked_exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, FloatArray]:
@@ -175,9 +174,4 @@ def checked_exceedance(threshold: FittedThreshold, recording: Recording, signal:
     except CdtoolError:
         raise
     except Exception as fault:
-        raise SignatureError(f"threshold {type(threshold).__name__} fails: {_place(fault)}", _HINT) from fault
-
-
-def _place(fault: Exception) -> str:
-    frame = traceback.extract_tb(fault.__traceback__)[-1]
-    return f"{fault!r} in {Path(frame.filename).name}, line {frame.lineno}"
+        raise SignatureError(f"threshold {type(threshold).__name__} fails: {fault_and_place(fault)}", _HINT) from fault

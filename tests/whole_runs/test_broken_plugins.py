@@ -177,6 +177,8 @@ def test_a_threshold_without_a_safety_factor_is_refused(install):
         ("dtype=np.uint8", "dtype=int", "float64 and uint8 are needed"),
         ("torque.time, values", "torque.time[::-1], values", "times that do not strictly increase"),
         ("torque.values.copy()", "np.where(torque.values > 0, np.nan, 0.0)", "valid but not finite"),
+        ('status, "N")', 'status, "N", lost=np.zeros(3, dtype=bool))', "marks of lost samples"),
+        ('status, "N")', 'status, "N", lost=values)', "marks of lost samples"),
     ],
 )
 def test_a_signal_that_breaks_the_contract_is_one_line(install, old, new, words):
@@ -335,6 +337,7 @@ def test_a_report_is_written_by_the_writer_of_another_package(install, tmp_path)
         ('(".txt",)', '("txt",)', "cannot be loaded: ConfigurationError"),
         ('{".txt"', '{".text"', "cannot be loaded: ConfigurationError"),
         ("(Writer)", "", "has no attribute 'in_folder'"),
+        ('name = "odd"', 'name = "odd"; subject = "comparisons"', "cannot be loaded: ConfigurationError"),
     ],
 )
 def test_a_writer_that_cannot_be_used_is_listed_as_left_out(install, old, new, words):
@@ -342,3 +345,13 @@ def test_a_writer_that_cannot_be_used_is_listed_as_left_out(install, old, new, w
     install(WRITER.replace(old, new), group="writers")
     listed = cdtool("list", "writers")
     assert listed.status == 3 and f"writer plug-in 'odd' of package 'odd-things' {words}" in listed.err
+
+
+def test_a_writer_that_fails_is_one_line_and_leaves_the_file(install, tmp_path):
+    assert WRITER.count('"cdtool: " + ') == 1
+    install(WRITER.replace('"cdtool: " + ', '"cdtool: " + 1 / 0 + '), group="writers")
+    (tmp_path / "list.txt").write_text("cdtool: earlier\n", encoding="utf-8")
+    done = cdtool("benchmark", benchmark_file(tmp_path), "-o", tmp_path / "list.txt")
+    assert done.status == 2 and "list.txt: writer odd fails: ZeroDivisionError" in done.err, done.err
+    assert "Traceback" not in done.err and "odd_things_module.py, line " in done.err
+    assert (tmp_path / "list.txt").read_text(encoding="utf-8") == "cdtool: earlier\n"

@@ -236,7 +236,7 @@ def _check_power(power: float, level: float) -> None:
 
 def _check_above_zero(name: str, value: float) -> None:
     if not (value > 0.0 and math.isfinite(value)):
-        raise UsageError(f"{name} is {value:g}", "a number above 0")
+        raise UsageError(f"{name} is {value:g}", "give a number above 0")
 
 
 def _power(noncentrality: float, freedom: int, level: float) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Generic, Literal, TypeVar
+from typing import ClassVar, Generic, Literal, TypeVar, get_args
 
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.evaluated import Evaluated
@@ -57,7 +57,11 @@ class Writer(Generic[Content]):
     kinds: ClassVar[Mapping[str, Kind]] = {}
 
     def __init_subclass__(cls) -> None:
-        """Raise ConfigurationError for a suffix that a name cannot have, or without a kind."""
+        """Raise ConfigurationError for an unknown subject, or a suffix that a name cannot have or without a kind."""
+        if cls.subject not in get_args(Subject):
+            raise ConfigurationError(
+                f"the writer {cls.__name__} has the subject '{cls.subject}'", f"use {' or '.join(get_args(Subject))}"
+            )
         for suffix in (*cls.suffixes, *([Path(cls.in_folder).suffix] if cls.in_folder else [])):
             if not suffix.startswith(".") or suffix != suffix.lower() or suffix not in cls.kinds:
                 raise ConfigurationError(
