@@ -7,7 +7,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.plain_text import counted
 
 
@@ -137,15 +137,13 @@ class LeapingValues(Fact):
 
 
 @dataclass(frozen=True)
-class LearnedInOtherUnit(Fact):
+class LearnedInOtherUnit(TemplateFact):
     """A channel whose plausible range was learned in another unit."""
 
     logged: str
     learned: str
 
-    def sentence(self) -> str:
-        """Return both units."""
-        return f"logged in {self.logged}, learned in {self.learned}: not checked for implausible values"
+    words = "logged in {logged}, learned in {learned}: not checked for implausible values"
 
 
 @dataclass(frozen=True)
@@ -187,38 +185,30 @@ class UnitContradicted(Fact):
 
 
 @dataclass(frozen=True)
-class DerivedSpeed(Fact):
+class DerivedSpeed(TemplateFact):
     """The speed is the derivative of the position, through two low-passes at `low_pass` [Hz]."""
 
     low_pass: float
 
-    def sentence(self) -> str:
-        """Return how it was derived."""
-        return f"not in the log: derived causally from position (two first-order low-passes at {self.low_pass:g} Hz)"
+    words = "not in the log: derived causally from position (two first-order low-passes at {low_pass:g} Hz)"
 
 
 @dataclass(frozen=True)
-class IntegratedPosition(Fact):
+class IntegratedPosition(TemplateFact):
     """The position is the integral of the speed."""
 
-    def sentence(self) -> str:
-        """Return how it was derived."""
-        return "not in the log: the speed, integrated from 0"
+    words = "not in the log: the speed, integrated from 0"
 
 
 @dataclass(frozen=True)
-class IntegratedReference(Fact):
+class IntegratedReference(TemplateFact):
     """The reference position is the integral of the reference speed."""
 
-    def sentence(self) -> str:
-        """Return how it was derived."""
-        return "not in the log: the reference speed, integrated from the first position"
+    words = "not in the log: the reference speed, integrated from the first position"
 
 
 @dataclass(frozen=True)
-class LinkAccelerations(Fact):
+class LinkAccelerations(TemplateFact):
     """Specific forces on the links became their angular accelerations."""
 
-    def sentence(self) -> str:
-        """Return what they are now."""
-        return "specific forces [m/s2] became link accelerations [rad/s2], gravity taken off"
+    words = "specific forces [m/s2] became link accelerations [rad/s2], gravity taken off"

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.plain_text import counted, first_of
 
 _OWN_CLOCKS = 'time = { column = "time", unit = "s" }'
@@ -295,15 +295,13 @@ class ClockUnitContradicted(Fact):
 
 
 @dataclass(frozen=True)
-class NoClock(Fact):
+class NoClock(TemplateFact):
     """No column of a table looks like its clock."""
 
-    def sentence(self) -> str:
-        """Return what is unknown, and the next step."""
-        return (
-            "no column looks like a clock: rates, gaps and times are unknown; "
-            "name it, or the sample rate, in [channels] time of a machine file"
-        )
+    words = (
+        "no column looks like a clock: rates, gaps and times are unknown; name it, or the sample rate, in [channels] "
+        "time of a machine file"
+    )
 
 
 def _named(doubt: str, is_named: bool) -> str:
@@ -417,25 +415,21 @@ class WrittenTimes(Fact):
 
 
 @dataclass(frozen=True)
-class StampsAsSeconds(Fact):
+class StampsAsSeconds(TemplateFact):
     """Time stamps are taken as seconds from the first one, an ISO date."""
 
     start: str
 
-    def sentence(self) -> str:
-        """Return the start."""
-        return f"time stamps: taken as seconds from {self.start}"
+    words = "time stamps: taken as seconds from {start}"
 
 
 @dataclass(frozen=True)
-class UnusableClock(Fact):
+class UnusableClock(TemplateFact):
     """A dataset with a unit of time cannot be a clock."""
 
     reason: str
 
-    def sentence(self) -> str:
-        """Return the reason."""
-        return f"{self.reason}: it is not a clock"
+    words = "{reason}: it is not a clock"
 
 
 @dataclass(frozen=True)
@@ -464,40 +458,31 @@ class NoStartTime(Fact):
 
 
 @dataclass(frozen=True)
-class HeaderDelay(Fact):
+class HeaderDelay(TemplateFact):
     """How much later messages were logged than stamped [ms]: the median, and 5 and 95 %."""
 
     median: float
     low: float
     high: float
 
-    def sentence(self) -> str:
-        """Return the delay."""
-        return (
-            f"logged {self.median:.3f} ms (median; 5 to 95 %: {self.low:.3f} to {self.high:.3f} ms) "
-            "after the header's stamp"
-        )
+    words = "logged {median:.3f} ms (median; 5 to 95 %: {low:.3f} to {high:.3f} ms) after the header's stamp"
 
 
 @dataclass(frozen=True)
-class HeaderUnset(Fact):
+class HeaderUnset(TemplateFact):
     """The stamps in the messages' headers are all 0."""
 
-    def sentence(self) -> str:
-        """Return the next step."""
-        return "the header's stamps are never set: use the log clock"
+    words = "the header's stamps are never set: use the log clock"
 
 
 @dataclass(frozen=True)
-class ClocksApart(Fact):
+class ClocksApart(TemplateFact):
     """The channel begins `distance` [s] after the channel `before` ends."""
 
     distance: float
     before: str
 
-    def sentence(self) -> str:
-        """Return the distance, and the next step."""
-        return (
-            f"begins {self.distance:.6g} s after {self.before} ends: their clocks have no time in common; "
-            "choose another clock in the machine file, or a time_offset"
-        )
+    words = (
+        "begins {distance:.6g} s after {before} ends: their clocks have no time in common; choose another clock in "
+        "the machine file, or a time_offset"
+    )

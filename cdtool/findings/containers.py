@@ -5,56 +5,36 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.plain_text import counted
 
 
 @dataclass(frozen=True)
-class ColumnLeftOut(Fact):
+class ColumnLeftOut(TemplateFact):
     """A column without numbers; `what` it is instead."""
 
     column: str
     what: str
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.what
-
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.column
-
-    def sentence(self) -> str:
-        """Return the column and what it is."""
-        return f"column '{self.column}' is {self.what}: left out"
+    subject_field = "column"
+    variant_field = "what"
+    words = "column '{column}' is {what}: left out"
 
 
 @dataclass(frozen=True)
-class VariableLeftOut(Fact):
+class VariableLeftOut(TemplateFact):
     """A MATLAB variable without real numbers; `what` it is instead."""
 
     variable: str
     what: str
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.what
-
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.variable
-
-    def sentence(self) -> str:
-        """Return the variable and what it is."""
-        return f"variable '{self.variable}' is {self.what}: left out"
+    subject_field = "variable"
+    variant_field = "what"
+    words = "variable '{variable}' is {what}: left out"
 
 
 @dataclass(frozen=True)
-class RowsAsColumns(Fact):
+class RowsAsColumns(TemplateFact):
     """A matrix with more columns than rows is read across."""
 
     thing: Literal["dataset", "variable"]
@@ -62,26 +42,18 @@ class RowsAsColumns(Fact):
     rows: int
     columns: int
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.name
-
-    def sentence(self) -> str:
-        """Return name and shape."""
-        return f"{self.thing} '{self.name}' is {self.rows} x {self.columns}: its rows are taken as columns"
+    subject_field = "name"
+    words = "{thing} '{name}' is {rows} x {columns}: its rows are taken as columns"
 
 
 @dataclass(frozen=True)
-class PackedValues(Fact):
+class PackedValues(TemplateFact):
     """Values are packed by the CF conventions."""
 
     scale: float
     offset: float
 
-    def sentence(self) -> str:
-        """Return scale and offset."""
-        return f"packed (CF): times {self.scale:g}, plus {self.offset:g}"
+    words = "packed (CF): times {scale:g}, plus {offset:g}"
 
 
 @dataclass(frozen=True)
@@ -98,81 +70,63 @@ class RoundedIntegers(Fact):
 
 
 @dataclass(frozen=True)
-class RoundedColumn(Fact):
+class RoundedColumn(TemplateFact):
     """A column of integers of which some have more digits than float64."""
 
-    def sentence(self) -> str:
-        """Return what is done with them."""
-        return "integers beyond 2^53 are rounded to float64"
+    words = "integers beyond 2^53 are rounded to float64"
 
 
 @dataclass(frozen=True)
-class ValuesCutOff(Fact):
+class ValuesCutOff(TemplateFact):
     """A column ends before its declared length: `count` values are missing from number `first` on."""
 
     count: int
     first: int
 
-    def sentence(self) -> str:
-        """Return how many and from where."""
-        return f"{self.count} values from number {self.first} on are missing"
+    words = "{count} values from number {first} on are missing"
 
 
 @dataclass(frozen=True)
-class NeverFinalised(Fact):
+class NeverFinalised(TemplateFact):
     """The recorder did not close the file."""
 
-    def sentence(self) -> str:
-        """Return what may be missing."""
-        return "the recording was never finalised: its end may be missing"
+    words = "the recording was never finalised: its end may be missing"
 
 
 @dataclass(frozen=True)
-class LastSegmentIncomplete(Fact):
+class LastSegmentIncomplete(TemplateFact):
     """The file ends within a segment."""
 
-    def sentence(self) -> str:
-        """Return what is lost."""
-        return "the last segment is not complete: the rest of it is lost"
+    words = "the last segment is not complete: the rest of it is lost"
 
 
 @dataclass(frozen=True)
-class CutBehindRow(Fact):
+class CutBehindRow(TemplateFact):
     """The file is cut off or damaged behind a row."""
 
     row: int
 
-    def sentence(self) -> str:
-        """Return the row."""
-        return f"the file is cut off or damaged behind row {self.row}: what came after is lost"
+    words = "the file is cut off or damaged behind row {row}: what came after is lost"
 
 
 @dataclass(frozen=True)
-class LibraryMessage(Fact):
+class LibraryMessage(TemplateFact):
     """A line that a library wrote about the file."""
 
     library: str
     text: str
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.text
-
-    def sentence(self) -> str:
-        """Return the line."""
-        return f"{self.library} says: {self.text}"
+    variant_field = "text"
+    words = "{library} says: {text}"
 
 
 @dataclass(frozen=True)
-class BagDamaged(Fact):
+class BagDamaged(TemplateFact):
     """A ROS bag is damaged where the count of its messages does not show it; `reason` is its library's."""
 
     reason: str
 
-    def sentence(self) -> str:
-        """Return the reason."""
-        return f"the bag is damaged: {self.reason}"
+    words = "the bag is damaged: {reason}"
 
 
 @dataclass(frozen=True)
@@ -217,10 +171,7 @@ class DamagedAt(Fact):
     lost: LostBytes
     read_before: int | None = None
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.reason
+    variant_field = "reason"
 
     def sentence(self) -> str:
         """Return place, reason and loss."""
@@ -255,10 +206,7 @@ class MessagesLost(Fact):
     reason: str
     count: int
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.reason
+    variant_field = "reason"
 
     def sentence(self) -> str:
         """Return reason and count."""
@@ -292,15 +240,13 @@ class SummaryDamaged(Fact):
 
 
 @dataclass(frozen=True)
-class MessageCountDiffers(Fact):
+class MessageCountDiffers(TemplateFact):
     """The file's summary states another number of messages than were read."""
 
     stated: int
     read: int
 
-    def sentence(self) -> str:
-        """Return both numbers."""
-        return f"the file's summary says {self.stated} messages, {self.read} were read"
+    words = "the file's summary says {stated} messages, {read} were read"
 
 
 @dataclass(frozen=True)
@@ -316,23 +262,19 @@ class Unverified(Fact):
 
 
 @dataclass(frozen=True)
-class SeveralWriters(Fact):
+class SeveralWriters(TemplateFact):
     """Several channels write to one topic."""
 
     channels: int
 
-    def sentence(self) -> str:
-        """Return how many."""
-        return f"{self.channels} channels write to it: their messages are one column, sorted by time"
+    words = "{channels} channels write to it: their messages are one column, sorted by time"
 
 
 @dataclass(frozen=True)
-class NoMessage(Fact):
+class NoMessage(TemplateFact):
     """A log without a message."""
 
-    def sentence(self) -> str:
-        """Return that it is empty."""
-        return "holds no message"
+    words = "holds no message"
 
 
 @dataclass(frozen=True)
@@ -342,10 +284,7 @@ class IndexDisagrees(Fact):
     count: int
     how: Literal["not indexed", "only indexed", "other values"]
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.how
+    variant_field = "how"
 
     def sentence(self) -> str:
         """Return how many."""
@@ -369,18 +308,14 @@ class ChunkTimesDiffer(Fact):
 
 
 @dataclass(frozen=True)
-class ChannelCountsDiffer(Fact):
+class ChannelCountsDiffer(TemplateFact):
     """The summary states other message counts by channel."""
 
-    def sentence(self) -> str:
-        """Return what disagrees."""
-        return "the summary disagrees with the data: other message counts by channel"
+    words = "the summary disagrees with the data: other message counts by channel"
 
 
 @dataclass(frozen=True)
-class DefinedOtherwise(Fact):
+class DefinedOtherwise(TemplateFact):
     """The summary defines a topic's channel or schema otherwise than the data."""
 
-    def sentence(self) -> str:
-        """Return what disagrees."""
-        return "the summary defines it otherwise than the data"
+    words = "the summary defines it otherwise than the data"

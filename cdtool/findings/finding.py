@@ -6,7 +6,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 Severity = Literal["note", "warning", "loss"]
 
@@ -16,7 +16,13 @@ _WORD = re.compile(r"(?<!^)(?=[A-Z])")
 
 @dataclass(frozen=True)
 class Fact(ABC):
-    """One kind of fact: a frozen dataclass whose fields are the numbers and names in its sentence."""
+    """One kind of fact: a frozen dataclass whose fields are the numbers and names in its sentence.
+
+    `subject_field` and `variant_field` name the fields that are its `subject` and `variant`.
+    """
+
+    subject_field: ClassVar[str] = ""
+    variant_field: ClassVar[str] = ""
 
     @property
     def kind(self) -> str:
@@ -26,16 +32,30 @@ class Fact(ABC):
     @property
     def variant(self) -> str:
         """What tells facts of one kind apart that are not to be merged; empty for most kinds."""
-        return ""
+        return str(getattr(self, self.variant_field)) if self.variant_field else ""
 
     @property
     def subject(self) -> str:
         """What the fact is about where that is not a channel: a column that is left out, a part of a log."""
-        return ""
+        return str(getattr(self, self.subject_field)) if self.subject_field else ""
 
     @abstractmethod
     def sentence(self) -> str:
         """Return the fact in words, without the channel and the file that it is about."""
+
+
+@dataclass(frozen=True)
+class TemplateFact(Fact):
+    """A fact whose sentence is `words`, with its fields in the places of their names in braces."""
+
+    @property
+    @abstractmethod
+    def words(self) -> str:
+        """The sentence as a template: `the values reach {largest:.3g}`."""
+
+    def sentence(self) -> str:
+        """Return the sentence with its numbers."""
+        return self.words.format(**vars(self))
 
 
 @dataclass(frozen=True)
@@ -48,10 +68,7 @@ class Remark(Fact):
 
     text: str
 
-    @property
-    def variant(self) -> str:
-        """The text."""
-        return self.text
+    variant_field = "text"
 
     def sentence(self) -> str:
         """Return the text."""

@@ -67,10 +67,7 @@ class UndecodableMessages(Fact):
     messages: int
     reason: str
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.reason
+    variant_field = "reason"
 
     def sentence(self) -> str:
         """Return how many and why."""

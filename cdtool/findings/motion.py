@@ -5,26 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.plain_text import counted
 
 
 @dataclass(frozen=True)
-class NoMotionMapped(Fact):
+class NoMotionMapped(TemplateFact):
     """Neither speed nor position is mapped."""
 
-    def sentence(self) -> str:
-        """Return what cannot be done."""
-        return "neither speed nor position is mapped: no operation can be cut or classed"
+    words = "neither speed nor position is mapped: no operation can be cut or classed"
 
 
 @dataclass(frozen=True)
-class NoMotion(Fact):
+class NoMotion(TemplateFact):
     """The axis stands still."""
 
-    def sentence(self) -> str:
-        """Return that it does not move."""
-        return "the axis does not move"
+    words = "the axis does not move"
 
 
 @dataclass(frozen=True)
@@ -82,30 +78,26 @@ class SpeedSignOpposite(Fact):
 
 
 @dataclass(frozen=True)
-class JointsSwapped(Fact):
+class JointsSwapped(TemplateFact):
     """The position of one joint follows the speed of another one."""
 
     joint: str
     follows: str
 
-    def sentence(self) -> str:
-        """Return both joints."""
-        return f"that of {self.joint} follows the speed of {self.follows}: columns in another order?"
+    words = "that of {joint} follows the speed of {follows}: columns in another order?"
 
 
 @dataclass(frozen=True)
-class BelowMinimumSpeed(Fact):
+class BelowMinimumSpeed(TemplateFact):
     """The nominal speed is below the detector's `minimum` one."""
 
     minimum: float
 
-    def sentence(self) -> str:
-        """Return the minimum."""
-        return f"nominal speed below minimum_speed ({self.minimum:g}): not applicable"
+    words = "nominal speed below minimum_speed ({minimum:g}): not applicable"
 
 
 @dataclass(frozen=True)
-class Poles(Fact):
+class Poles(TemplateFact):
     """The friction EKF's poles [rad/s] at the nominal speed."""
 
     speed: float
@@ -113,9 +105,7 @@ class Poles(Fact):
     slow: float
     fast: float
 
-    def sentence(self) -> str:
-        """Return speed and poles."""
-        return f"poles at {self.speed:.3g} {self.unit}: {self.slow:.3g} and {self.fast:.3g} rad/s"
+    words = "poles at {speed:.3g} {unit}: {slow:.3g} and {fast:.3g} rad/s"
 
 
 def _of(joint: str) -> str:
@@ -133,10 +123,7 @@ class AccelerometerUncheckable(Fact):
     reason: Literal["joint hardly moves", "speed hardly changes", "correlation"]
     correlation: float = 0.0
 
-    @property
-    def variant(self) -> str:
-        """What tells apart those that are not merged."""
-        return self.reason
+    variant_field = "reason"
 
     def sentence(self) -> str:
         """Return the reason."""

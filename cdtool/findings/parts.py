@@ -4,92 +4,62 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 
 
 @dataclass(frozen=True)
-class PartMissing(Fact):
+class PartMissing(TemplateFact):
     """A part that the metadata file names is not there."""
 
     part: str
     metadata: str
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.part
-
-    def sentence(self) -> str:
-        """Return the part."""
-        return f"part {self.part} of {self.metadata} is not in the folder"
+    subject_field = "part"
+    words = "part {part} of {metadata} is not in the folder"
 
 
 @dataclass(frozen=True)
-class PartCompressed(Fact):
+class PartCompressed(TemplateFact):
     """A part is compressed as a whole."""
 
     part: str
     metadata: str
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.part
-
-    def sentence(self) -> str:
-        """Return the part, and how to decompress it."""
-        return f"part {self.part} of {self.metadata} is compressed as a whole: decompress it, e.g. with zstd -d"
+    subject_field = "part"
+    words = "part {part} of {metadata} is compressed as a whole: decompress it, e.g. with zstd -d"
 
 
 @dataclass(frozen=True)
-class PartOfOtherKind(Fact):
+class PartOfOtherKind(TemplateFact):
     """A part is of another format than the others."""
 
     part: str
     metadata: str
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.part
-
-    def sentence(self) -> str:
-        """Return the part."""
-        return f"part {self.part} of {self.metadata} is left out: the folder holds parts of another kind too"
+    subject_field = "part"
+    words = "part {part} of {metadata} is left out: the folder holds parts of another kind too"
 
 
 @dataclass(frozen=True)
-class PartUnreadable(Fact):
+class PartUnreadable(TemplateFact):
     """A part cannot be read."""
 
     part: str
     reason: str
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.part
-
-    def sentence(self) -> str:
-        """Return part and reason."""
-        return f"part {self.part} is left out, it cannot be read: {self.reason}"
+    subject_field = "part"
+    words = "part {part} is left out, it cannot be read: {reason}"
 
 
 @dataclass(frozen=True)
-class PartsOverlap(Fact):
+class PartsOverlap(TemplateFact):
     """A part begins before the one before it ends; `column` shows it."""
 
     part: str
     column: str
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.part
-
-    def sentence(self) -> str:
-        """Return part and column."""
-        return f"{self.part} begins before the part before it ends ({self.column}): put in the order of the times"
+    subject_field = "part"
+    words = "{part} begins before the part before it ends ({column}): put in the order of the times"
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.plain_text import counted
 
 
@@ -45,28 +45,24 @@ class PeakUnseen(Fact):
 
 
 @dataclass(frozen=True)
-class NoForce(Fact):
+class NoForce(TemplateFact):
     """A contact's force cannot be computed."""
 
     contact: int
     reason: str
 
-    def sentence(self) -> str:
-        """Return contact and reason."""
-        return f"contact {self.contact}: no force: {self.reason}"
+    words = "contact {contact}: no force: {reason}"
 
 
 @dataclass(frozen=True)
-class ForceUnassessable(Fact):
+class ForceUnassessable(TemplateFact):
     """A force profile cannot assess a contact, since load-cell samples are missing."""
 
     contact: int
     profile: str
     reason: str
 
-    def sentence(self) -> str:
-        """Return contact, profile and reason."""
-        return f"contact {self.contact} is not assessable by {self.profile}: {self.reason}"
+    words = "contact {contact} is not assessable by {profile}: {reason}"
 
 
 @dataclass(frozen=True)
@@ -87,68 +83,56 @@ class LogNotCut(Fact):
 
 
 @dataclass(frozen=True)
-class AssumedImpactFree(Fact):
+class AssumedImpactFree(TemplateFact):
     """Whether a log is free of impacts cannot be checked; `absent` is the ground truth that is missing from it."""
 
     absent: str
 
-    def sentence(self) -> str:
-        """Return what is absent."""
-        return f"{self.absent}: assumed to be free of impacts"
+    words = "{absent}: assumed to be free of impacts"
 
 
 @dataclass(frozen=True)
-class LearnedFromIt(Fact):
+class LearnedFromIt(TemplateFact):
     """The signature was learned from the log."""
 
-    def sentence(self) -> str:
-        """Return what follows."""
-        return "the signature was learned from this log: the absence of alarms is no evidence"
+    words = "the signature was learned from this log: the absence of alarms is no evidence"
 
 
 @dataclass(frozen=True)
-class PlotsLeftOut(Fact):
+class PlotsLeftOut(TemplateFact):
     """Operations with a miss or a false alarm for which no trigger plot is kept."""
 
     count: int
 
-    def sentence(self) -> str:
-        """Return how many."""
-        return f"{self.count} more operations with a miss or a false alarm have no trigger plot"
+    words = "{count} more operations with a miss or a false alarm have no trigger plot"
 
 
 @dataclass(frozen=True)
-class LimitsUnchecked(Fact):
+class LimitsUnchecked(TemplateFact):
     """Limits that are set for detectors that were not run."""
 
     count: int
     limits: int
 
-    def sentence(self) -> str:
-        """Return how many of how many."""
-        return f"{self.count} of {self.limits} limits are set for detectors that were not run: not checked"
+    words = "{count} of {limits} limits are set for detectors that were not run: not checked"
 
 
 @dataclass(frozen=True)
-class DetectorLeftOut(Fact):
+class DetectorLeftOut(TemplateFact):
     """A detector could not be run."""
 
     reason: str
 
-    def sentence(self) -> str:
-        """Return the reason."""
-        return f"left out: {self.reason}"
+    words = "left out: {reason}"
 
 
 @dataclass(frozen=True)
-class DetectorUnassessable(Fact):
+class DetectorUnassessable(TemplateFact):
     """A detector can assess none of the runs to learn from."""
 
     reason: str
 
-    def sentence(self) -> str:
-        """Return the reason."""
-        return f"not assessable: {self.reason}"
+    words = "not assessable: {reason}"
 
 
 @dataclass(frozen=True)

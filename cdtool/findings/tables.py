@@ -6,7 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.plain_text import shown_lines
 
 # Of a cell so many characters are shown.
@@ -43,26 +43,22 @@ class PinnedLinesSkipped(Fact):
 
 
 @dataclass(frozen=True)
-class OtherEncoding(Fact):
+class OtherEncoding(TemplateFact):
     """The text is not UTF-8."""
 
     encoding: str
 
-    def sentence(self) -> str:
-        """Return the encoding."""
-        return f"not valid UTF-8, read as {self.encoding}"
+    words = "not valid UTF-8, read as {encoding}"
 
 
 @dataclass(frozen=True)
-class NamedSeparator(Fact):
+class NamedSeparator(TemplateFact):
     """A line names the separator, as Excel writes it."""
 
     line: int
     text: str
 
-    def sentence(self) -> str:
-        """Return the line."""
-        return f"line {self.line} ({self.text}) names the separator"
+    words = "line {line} ({text}) names the separator"
 
 
 @dataclass(frozen=True)
@@ -92,14 +88,12 @@ class WordsAboveRows(Fact):
 
 
 @dataclass(frozen=True)
-class NamesFromComment(Fact):
+class NamesFromComment(TemplateFact):
     """The columns' names are given in a comment."""
 
     line: int
 
-    def sentence(self) -> str:
-        """Return the line."""
-        return f"the names are those of the comment in line {self.line}"
+    words = "the names are those of the comment in line {line}"
 
 
 @dataclass(frozen=True)
@@ -138,10 +132,7 @@ class NotNumeric(Fact):
     cell: str
     advice: CellAdvice | None = None
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.column
+    subject_field = "column"
 
     def sentence(self) -> str:
         """Return column and cell."""
@@ -152,20 +143,14 @@ class NotNumeric(Fact):
 
 
 @dataclass(frozen=True)
-class AmbiguousTimes(Fact):
+class AmbiguousTimes(TemplateFact):
     """A column of dates that can be read in two ways."""
 
     column: str
     readings: str
 
-    @property
-    def subject(self) -> str:
-        """What it is about."""
-        return self.column
-
-    def sentence(self) -> str:
-        """Return both readings, and how to pin one."""
-        return f"column '{self.column}': {self.readings}: left out; pin time_format in [csv]"
+    subject_field = "column"
+    words = "column '{column}': {readings}: left out; pin time_format in [csv]"
 
 
 @dataclass(frozen=True)
@@ -258,46 +243,38 @@ class NulLines(SkippedLines):
 
 
 @dataclass(frozen=True)
-class LastLineCut(Fact):
+class LastLineCut(TemplateFact):
     """The last line is cut off."""
 
     line: int
 
-    def sentence(self) -> str:
-        """Return the line."""
-        return f"the last line ({self.line}) is cut off, dropped"
+    words = "the last line ({line}) is cut off, dropped"
 
 
 @dataclass(frozen=True)
-class NulBytesAtEnd(Fact):
+class NulBytesAtEnd(TemplateFact):
     """The file ends in NUL bytes."""
 
     count: int
 
-    def sentence(self) -> str:
-        """Return how many."""
-        return f"the file ends in {self.count} NUL bytes: was the power lost?"
+    words = "the file ends in {count} NUL bytes: was the power lost?"
 
 
 @dataclass(frozen=True)
-class LastLineKept(Fact):
+class LastLineKept(TemplateFact):
     """The last line has no line end, and its last cell looks whole."""
 
     line: int
     cell: str
 
-    def sentence(self) -> str:
-        """Return line and cell."""
-        return f"the last line ({self.line}) has no line end: its last cell '{self.cell}' is taken to be whole"
+    words = "the last line ({line}) has no line end: its last cell '{cell}' is taken to be whole"
 
 
 @dataclass(frozen=True)
-class LastLineDropped(Fact):
+class LastLineDropped(TemplateFact):
     """The last line has no line end, and its last cell may be cut off."""
 
     line: int
     cell: str
 
-    def sentence(self) -> str:
-        """Return line and cell."""
-        return f"the last line ({self.line}) has no line end, and '{self.cell}' may be cut off, dropped"
+    words = "the last line ({line}) has no line end, and '{cell}' may be cut off, dropped"

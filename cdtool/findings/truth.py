@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.plain_text import digits
 
 
@@ -88,11 +88,9 @@ class RestLevelShifted(Fact):
 
 
 @dataclass(frozen=True)
-class InProgress(Fact):
+class InProgress(TemplateFact):
     """A contact is in progress when the log begins, until `end` [s]."""
 
     end: float
 
-    def sentence(self) -> str:
-        """Return until when."""
-        return f"a contact is in progress when it begins, until {self.end:.3f} s: its onset is not recorded"
+    words = "a contact is in progress when it begins, until {end:.3f} s: its onset is not recorded"

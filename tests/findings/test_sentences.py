@@ -8,6 +8,7 @@ import json
 import math
 import pkgutil
 from collections.abc import Iterator
+from dataclasses import fields
 
 import pytest
 
@@ -630,6 +631,15 @@ def test_every_kind_has_a_name_of_its_own():
     names = [fact.kind for fact in {type(fact): fact for fact, _ in SENTENCES}.values()]
     assert len(set(names)) == len(names) == len(set(kinds())) and all(name == name.lower() for name in names)
     assert clocks.RepeatedStamps(1, 2, (0,), "line").kind == "repeated_stamps"
+
+
+def test_subject_and_variant_are_fields_of_the_kind():
+    named = {kind: {kind.subject_field, kind.variant_field} - {""} for kind in kinds()}
+    assert all(names <= {field.name for field in fields(kind)} for kind, names in named.items())
+    assert sum(map(len, named.values())) > 15
+    left_out = containers.ColumnLeftOut("mode", "text")
+    assert (left_out.subject, left_out.variant) == ("mode", "text")
+    assert (clocks.NoClock().subject, clocks.NoClock().variant) == ("", "")
 
 
 @pytest.mark.parametrize("fact", [fact for fact, _ in SENTENCES], ids=lambda fact: fact.kind)
