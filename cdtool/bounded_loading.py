@@ -100,10 +100,9 @@ def read_bytes(
     return content
 
 
-def read_text(
-    path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT, hint: str = "give a UTF-8 text file"
-) -> str:
+def read_text(path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT) -> str:
     """Return the UTF-8 text of a regular file; raises `error` with the path."""
+    hint = "give a UTF-8 text file"
     try:
         text = read_bytes(path, error, most=most, hint=hint, missing="check the path").decode("utf-8")
     except UnicodeDecodeError as fault:

@@ -230,6 +230,33 @@ def _put_whole(part: Path, target: Path) -> bool:
     return _exchange(part, target)
 
 
+def _exchange(first: Path, second: Path) -> bool:
+    """Exchange two folders in one call (Linux: renameat2); return False if not supported; raises OSError."""
+    import ctypes
+
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError, TypeError):
+        return False
+    if call(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _EXCHANGE) == 0:
+        return True
+    fault = ctypes.get_errno()
+    if fault in _UNABLE:
+        return False
+    raise OSError(fault, os.strerror(fault), str(second))
+
+
+def _has_to_stay(folder: Path) -> bool:
+    """Whether an existing folder must not be renamed: a mount point, the current folder, or in a read-only folder."""
+    if not folder.is_dir():
+        return False
+    try:
+        inside = Path(os.path.realpath(Path.cwd())).is_relative_to(folder)
+    except FileNotFoundError:  # the current folder is gone
+        inside = False
+    return inside or folder.is_mount() or not os.access(folder.parent, os.W_OK | os.X_OK)
+
+
 def _flush(path: Path) -> None:
     """Flush a file's content, or a folder's names, to disk."""
     if path.is_dir() and not hasattr(os, "O_DIRECTORY"):
@@ -264,30 +291,3 @@ def _remove(path: Path) -> None:
 atexit.register(clean_up)
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_temporaries.clear)  # these belong to the parent
-
-
-def _exchange(first: Path, second: Path) -> bool:
-    """Exchange two folders in one call (Linux: renameat2); return False if not supported; raises OSError."""
-    import ctypes
-
-    try:
-        call = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError, TypeError):
-        return False
-    if call(_HERE, os.fsencode(first), _HERE, os.fsencode(second), _EXCHANGE) == 0:
-        return True
-    fault = ctypes.get_errno()
-    if fault in _UNABLE:
-        return False
-    raise OSError(fault, os.strerror(fault), str(second))
-
-
-def _has_to_stay(folder: Path) -> bool:
-    """Whether an existing folder must not be renamed: a mount point, the current folder, or in a read-only folder."""
-    if not folder.is_dir():
-        return False
-    try:
-        inside = Path(os.path.realpath(Path.cwd())).is_relative_to(folder)
-    except FileNotFoundError:  # the current folder is gone
-        inside = False
-    return inside or folder.is_mount() or not os.access(folder.parent, os.W_OK | os.X_OK)

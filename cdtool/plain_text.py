@@ -11,6 +11,8 @@ from decimal import Decimal
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
 # Length of one printed error, warning or note, including text from files [characters].
 LINE_LENGTH = 300
+# So many names of a list are shown.
+_NAMED = 3
 _SINGULAR = {"are": "is", "were": "was", "have": "has"}
 _NONCHARACTERS = frozenset("\ufffe\uffff")
 
@@ -23,9 +25,9 @@ def plain(text: object) -> str:
     return "".join("?" if _is_active(character) else character for character in given)
 
 
-def one_line(text: object, length: int = LINE_LENGTH) -> str:
-    """Return plain text on one line of at most `length` characters; an ellipsis marks omitted text."""
-    return shorten(plain(text), length)
+def one_line(text: object) -> str:
+    """Return plain text on one line of at most 300 characters; an ellipsis marks omitted text."""
+    return shorten(plain(text), LINE_LENGTH)
 
 
 def shorten(text: str, length: int) -> str:
@@ -83,14 +85,14 @@ def ordinal(number: int) -> str:
     return f"{number}{ending}"
 
 
-def first_of(names: Sequence[str], most: int = 3) -> str:
-    """Return the first names of a list, and how many more there are.
+def first_of(names: Sequence[str]) -> str:
+    """Return the first three names of a list, and how many more there are.
 
     >>> first_of(["a", "b"]), first_of(["a", "b", "c", "d", "e"])
     ('a, b', 'a, b, c and 2 more')
     """
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return f"{', '.join(names[:most])}{more}"
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"{', '.join(names[:_NAMED])}{more}"
 
 
 def shown_lines(numbers: Sequence[int]) -> str:

@@ -60,7 +60,7 @@ def print_json(value: Any) -> None:
 
 def with_findings(result: Any) -> dict[str, Any]:
     """Return a command's result as JSON values; its findings with their kinds, numbers and sentences."""
-    return {**asdict(result), "findings": [finding.to_dict() for finding in result.findings]}
+    return {**asdict(replace(result, findings=())), "findings": [finding.to_dict() for finding in result.findings]}
 
 
 def print_skipped(skipped: Sequence[Skipped], findings: Sequence[RecordingFinding] = ()) -> None:

@@ -60,11 +60,7 @@ class PreparedBenchmark:
 
 
 def prepare_benchmark(
-    file: str | Path,
-    *,
-    detector: str | None = None,
-    signature: str | Path | None = None,
-    jobs: int = 1,
+    file: str | Path, *, detector: str | None = None, signature: str | Path | None = None
 ) -> PreparedBenchmark:
     """Read a benchmark file and learn the threshold of one of its detectors, or use that of a signature file.
 
@@ -98,7 +94,7 @@ def prepare_benchmark(
         )
     setup = with_detectors(setup, [_chosen(setup, detector)])
     instance = machine_file.detector(setup.detectors[0])
-    reading = RunReading(setup.operations, onset=setup.onset, base=setup.path.parent, jobs=jobs)
+    reading = RunReading(setup.operations, onset=setup.onset, base=setup.path.parent)
     runs = load_runs(setup.learn, machine_file, reading)
     fitted = learn_thresholds(setup, runs.operations, [instance], runs.skipped)
     used = fitted.learned_from(runs.operations)
