@@ -11,7 +11,7 @@ from decimal import Decimal
 _ACTIVE = frozenset(("Cc", "Cf", "Cs", "Co", "Zl", "Zp"))
 # Length of one printed error, warning or note, including text from files [characters].
 LINE_LENGTH = 300
-# So many names of a list are shown.
+# So many names or lines of a list are shown.
 _NAMED = 3
 _SINGULAR = {"are": "is", "were": "was", "have": "has"}
 _NONCHARACTERS = frozenset("\ufffe\uffff")
@@ -101,12 +101,17 @@ def shown_lines(numbers: Sequence[int]) -> str:
     >>> shown_lines([3]), shown_lines([1, 2, 3]), shown_lines([3, 9, 12, 20])
     ('line 3', 'lines 1 to 3', '4 lines (3, 9, 12, ...)')
     """
-    if len(numbers) == 1:
-        return f"line {numbers[0]}"
-    if numbers[-1] - numbers[0] == len(numbers) - 1:
-        return f"lines {numbers[0]} to {numbers[-1]}"
-    listed = ", ".join(str(number) for number in numbers[:3])
-    return f"{counted(len(numbers), 'line')} ({listed}{', ...' if len(numbers) > 3 else ''})"
+    return counted_lines(len(numbers), numbers[:_NAMED], numbers[-1])
+
+
+def counted_lines(count: int, first: Sequence[int], last: int) -> str:
+    """Return the same of so many lines, of which the `first` three and the `last` one are known."""
+    if count == 1:
+        return f"line {last}"
+    if last - first[0] == count - 1:
+        return f"lines {first[0]} to {last}"
+    listed = ", ".join(map(str, first))
+    return f"{counted(count, 'line')} ({listed}{', ...' if count > len(first) else ''})"
 
 
 def plural(thing: str) -> str:

@@ -96,6 +96,11 @@ class Finding:
     severity: Severity = "warning"
     file: str = ""
 
+    def __post_init__(self) -> None:
+        """Raise TypeError for anything but a fact, where a plug-in makes it and not where it is shown."""
+        if not isinstance(self.fact, Fact):
+            raise TypeError(f"a Finding needs a Fact, not {type(self.fact).__name__}: write Finding(Remark('...'))")
+
     @property
     def kind(self) -> str:
         """The kind of the fact."""

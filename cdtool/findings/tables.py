@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import InitVar, dataclass, field
 from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
-from cdtool.plain_text import shown_lines
+from cdtool.plain_text import counted_lines
 
-# Of a cell so many characters are shown.
-_SHOWN = 40
+# Of a cell so many characters are shown, of lines so many numbers.
+_SHOWN, _FIRST = 40, 3
 
 
 @dataclass(frozen=True)
@@ -32,14 +33,33 @@ class CellAdvice:
 
 
 @dataclass(frozen=True)
-class PinnedLinesSkipped(Fact):
-    """Lines that [csv] says to skip."""
+class LinesFact(Fact):
+    """A fact about lines of the file: how many they are, the first three and the last; a long log may have millions."""
 
-    lines: tuple[int, ...]
+    lines: InitVar[Sequence[int]]
+    count: int = field(init=False)
+    first: tuple[int, ...] = field(init=False)
+    last: int = field(init=False)
+
+    def __post_init__(self, lines: Sequence[int]) -> None:
+        """Keep of the lines' numbers what a sentence shows."""
+        object.__setattr__(self, "count", len(lines))
+        object.__setattr__(self, "first", tuple(lines[:_FIRST]))
+        object.__setattr__(self, "last", lines[-1])
+
+    @property
+    def shown_lines(self) -> str:
+        """The lines in words."""
+        return counted_lines(self.count, self.first, self.last)
+
+
+@dataclass(frozen=True)
+class PinnedLinesSkipped(LinesFact):
+    """Lines that [csv] says to skip."""
 
     def sentence(self) -> str:
         """Return the lines."""
-        return f"{shown_lines(self.lines)} skipped, as [csv] says"
+        return f"{self.shown_lines} skipped, as [csv] says"
 
 
 @dataclass(frozen=True)
@@ -62,29 +82,25 @@ class NamedSeparator(TemplateFact):
 
 
 @dataclass(frozen=True)
-class NumbersAboveRows(Fact):
+class NumbersAboveRows(LinesFact):
     """Lines with numbers above the rows were skipped."""
-
-    lines: tuple[int, ...]
 
     def sentence(self) -> str:
         """Return the lines, and the next step."""
-        holds = "it holds" if len(self.lines) == 1 else "they hold"
+        holds = "it holds" if self.count == 1 else "they hold"
         return (
-            f"{shown_lines(self.lines)} above the rows skipped though {holds} numbers; "
+            f"{self.shown_lines} above the rows skipped though {holds} numbers; "
             "skip_lines in [csv] says that they are no rows"
         )
 
 
 @dataclass(frozen=True)
-class WordsAboveRows(Fact):
+class WordsAboveRows(LinesFact):
     """Lines of words above the rows were skipped."""
-
-    lines: tuple[int, ...]
 
     def sentence(self) -> str:
         """Return the lines."""
-        return f"{shown_lines(self.lines)} above the rows skipped: no names, no numbers"
+        return f"{self.shown_lines} above the rows skipped: no names, no numbers"
 
 
 @dataclass(frozen=True)
@@ -97,15 +113,14 @@ class NamesFromComment(TemplateFact):
 
 
 @dataclass(frozen=True)
-class FooterSkipped(Fact):
+class FooterSkipped(LinesFact):
     """Lines below the rows that are no samples; `text` is the first of them."""
 
-    lines: tuple[int, ...]
     text: str
 
     def sentence(self) -> str:
         """Return the lines and how they begin."""
-        return f"{shown_lines(self.lines)} skipped: a footer ({self.text[:_SHOWN]!r}), no sample"
+        return f"{self.shown_lines} skipped: a footer ({self.text[:_SHOWN]!r}), no sample"
 
 
 @dataclass(frozen=True)
@@ -154,34 +169,29 @@ class AmbiguousTimes(TemplateFact):
 
 
 @dataclass(frozen=True)
-class UnreadCells(Fact):
+class UnreadCells(LinesFact):
     """Cells of a column that cannot be read; `cell` is the first of them."""
 
-    lines: tuple[int, ...]
     cell: str
     advice: CellAdvice
 
     def sentence(self) -> str:
         """Return lines, first cell and advice."""
-        return f"{shown_lines(self.lines)}: {self.cell[:_SHOWN]!r} cannot be read, taken as missing; {self.advice}"
+        return f"{self.shown_lines}: {self.cell[:_SHOWN]!r} cannot be read, taken as missing; {self.advice}"
 
 
 @dataclass(frozen=True)
-class BlankRows(Fact):
+class BlankRows(LinesFact):
     """Blank lines that are rows without values."""
-
-    lines: tuple[int, ...]
 
     def sentence(self) -> str:
         """Return the lines."""
-        return f"{shown_lines(self.lines)} blank: taken as missing samples"
+        return f"{self.shown_lines} blank: taken as missing samples"
 
 
 @dataclass(frozen=True)
-class SkippedLines(Fact):
+class SkippedLines(LinesFact):
     """Lines between the rows that are no rows."""
-
-    lines: tuple[int, ...]
 
     @property
     @abstractmethod
@@ -190,7 +200,7 @@ class SkippedLines(Fact):
 
     def sentence(self) -> str:
         """Return the lines and what they hold."""
-        return f"{shown_lines(self.lines)} skipped: {self.what}"
+        return f"{self.shown_lines} skipped: {self.what}"
 
 
 @dataclass(frozen=True)

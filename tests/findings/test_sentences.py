@@ -656,6 +656,18 @@ def test_numbers_stand_apart_from_the_sentence():
     assert numbers == {"count": 2, "values": 100}
 
 
+def test_a_fact_about_a_million_lines_holds_few_numbers():
+    finding = Finding(tables.BlankLines(range(2, 2_000_002, 2)))
+    assert finding.to_dict()["numbers"] == {"count": 1_000_000, "first": (2, 4, 6), "last": 2_000_000}
+    assert finding.message == "1000000 lines (2, 4, 6, ...) skipped: blank"
+    assert tables.BlankLines((3, 5, 7, 9)) == tables.BlankLines([3, 5, 7, 9]) != tables.BlankRows((3, 5, 7, 9))
+
+
+def test_a_finding_of_words_alone_says_what_to_write():
+    with pytest.raises(TypeError, match=r"Finding\(Remark\("):
+        Finding("the recorder lost its clock", "torque")  # type: ignore[arg-type]
+
+
 def test_a_finding_names_its_channel_and_the_part_of_its_log():
     assert str(Finding(Remark("late"))) == "late"
     assert str(Finding(Remark("late"), "speed")) == "speed: late"
