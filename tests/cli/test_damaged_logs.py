@@ -75,6 +75,20 @@ def test_a_benchmark_does_not_advise_to_move_a_cut_impact_log_to_the_hold_out(cu
     assert "copy the log again" in line and "holdout" not in line
 
 
+def test_a_loss_in_the_runs_learned_from_is_reported_even_if_no_log_can_be_used(gate_folder, tmp_path):
+    (tmp_path / "empty.csv").touch()
+    (tmp_path / "too.csv").touch()
+    setup = benchmark_of(tmp_path, gate_folder, "empty.csv")
+    run = tmp_path / "free" / "02.csv"
+    text = run.read_text(encoding="utf-8")
+    run.write_text(text[: text.rindex(",")], encoding="utf-8")
+    done = cdtool("detect", tmp_path / "empty.csv", tmp_path / "too.csv", "--benchmark", setup)
+    assert done.status == 4 and not done.out, done.err
+    (line,) = [line for line in done.err.splitlines() if line.startswith("loss: ")]
+    assert line.startswith("loss: free/02.csv: the last line")
+    assert sum(line.startswith("error: ") and "is empty" in line for line in done.err.splitlines()) == 2
+
+
 def benchmark_of(tmp_path: Path, gate_folder: Path, log: str) -> Path:
     """A benchmark of that log and an intact one, learned from 3 impact-free logs."""
     for name in ("free/01.csv", "free/02.csv", "free/03.csv", "stiff/02.csv", "machine.toml"):
