@@ -330,7 +330,9 @@ def calls_of(run: Callable[[], object], package: Path, utilities: Iterable[str] 
 
 
 def _is_public(qualname: str) -> bool:
-    """No part of the name is private or local; `__init__` and its kin are public."""
+    """No part of the name is private or local, nor the check of a new value; `__init__` and its kin are public."""
+    if qualname.endswith(".__post_init__"):
+        return False
     return all(
         part.isidentifier() and (not part.startswith("_") or (part.startswith("__") and part.endswith("__")))
         for part in qualname.split(".")

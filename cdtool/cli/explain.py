@@ -1,20 +1,30 @@
-"""`cdtool explain`."""
+"""`cdtool explain`: the command, and its output on screen and as JSON."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cdtool.cli.console import leave, plain, print_json, print_not_assessable, print_skipped
-from cdtool.cli.explain_shown import SHOWN, explained_as_json, show_explained
+from cdtool.cli.console import leave, number, plain, print_json, print_not_assessable, print_skipped, say, table
 from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
+from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
+    from cdtool.evaluation.explanation.cause import Cause
+    from cdtool.evaluation.explanation.explanation import AlarmExplanation, Explanation, MissExplanation
+    from cdtool.evaluation.explanation.margin import Moment
     from cdtool.workflows.explaining import Explained
+
+# Events that are printed and drawn; --json has all.
+_SHOWN = 20
+# Its reason already names the speeds.
+_BLIND = "not_assessable"
 
 
 @with_options
@@ -46,9 +56,9 @@ def explain(
     findings = [*(prepared.losses if prepared else ()), *lost(found.recording), *found.findings]
     print_skipped(skipped, findings)
     if as_json:
-        print_json(explained_as_json(log, explained))
+        print_json(_as_json_value(log, explained))
     else:
-        show_explained(explained)
+        _show_explained(explained)
     for path in _draw(explained, drawn, log.stem, force=force):
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
@@ -61,9 +71,168 @@ def _draw(explained: Explained, plot: Path | None, stem: str, *, force: bool) ->
         return []
     from cdtool.report.plots.margin_plot import plot_explanation
 
-    events = explained.events[: SHOWN if plot.is_dir() else 1]
+    events = explained.events[: _SHOWN if plot.is_dir() else 1]
     paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
     paths = [figure_name(path, force=force) for path in paths]
     for (detection, item), path in zip(events, paths, strict=True):
         plot_explanation(detection, item, path)
     return paths
+
+
+def _show_explained(explained: Explained) -> None:
+    """Print every event of a log, and the operations without one."""
+    shown = explained.events[:_SHOWN]
+    for _, item in shown:
+        _show_event(item)
+    if len(explained.events) > len(shown):
+        typer.echo(f"and {counted(len(explained.events) - len(shown), 'more event')} (--json has all)")
+    elsewhere = [item for item in explained.found.detections if item.other_speed and item.verdict.outcome != _BLIND]
+    for detection in elsewhere[:_SHOWN]:
+        say(f"{detection.operation.name}, not assessable at another speed: {detection.other_speed}")
+    pairs = zip(explained.found.detections, explained.explanations, strict=True)
+    quiet = [detection for detection, events in pairs if not events]
+    for detection in quiet[:_SHOWN]:
+        why = detection.verdict.reason or "no alarm and no missed contact"
+        say(f"{detection.operation.name}, {detection.detector}: {why}")
+    if len(quiet) > _SHOWN:
+        typer.echo(f"and {counted(len(quiet) - _SHOWN, 'more operation')} without an event")
+
+
+def _show_event(item: Explanation) -> None:
+    """Print the headline, the sentences, and the margin over time."""
+    from cdtool.evaluation.explanation.explanation import AlarmExplanation
+    from cdtool.evaluation.explanation.words import words
+
+    headline, *sentences = words(item)
+    say(f"{item.operation}, {item.detector}: {headline}")
+    for sentence in sentences:
+        say(sentence, indent="  ")
+    # Without an onset or an alarm to count from, one column stays empty and is dropped.
+    alarm = item.alarm.time if isinstance(item, AlarmExplanation) else None
+    rows = [
+        (
+            f"{1e3 * (moment.time - item.contact.start):.0f}" if item.contact else "",
+            f"{1e3 * (moment.time - alarm):.0f}" if alarm is not None else "",
+            number(moment.statistic, 4),
+            number(moment.limit, 4),
+            number(moment.margin, 4),
+            f"{100.0 * moment.share:.0f}" if math.isfinite(moment.share) else "-",
+            moment.reason,
+        )
+        for moment in item.moments
+    ]
+    if rows:
+        heads = ("from onset\nms", "to alarm\nms", f"signal\n{item.unit}", "limit\n", "margin\n", "of limit\n%")
+        table([*((head, "right") for head in heads), ("", "left")], rows)
+    typer.echo()
+
+
+def _as_json_value(log: Path, explained: Explained) -> dict[str, Any]:
+    """Return the same as JSON values."""
+    from cdtool.cli.contact_rows import contact_as_json
+    from cdtool.evaluation.explanation.explanation import AlarmExplanation
+
+    items = [item for _, item in explained.events]
+    return {
+        "log": str(log),
+        "verdicts": [
+            {"operation": item.operation.name, "verdict": item.verdict.outcome, "reason": item.verdict.reason or None}
+            for item in explained.found.detections
+        ],
+        "contacts": [
+            contact_as_json(detection, row)
+            for detection, rows in zip(explained.found.detections, explained.found.contact_rows, strict=True)
+            for row in rows
+        ],
+        "alarms": [_alarm_as_json(item) for item in items if isinstance(item, AlarmExplanation)],
+        "missed": [_miss_as_json(item) for item in items if not isinstance(item, AlarmExplanation)],
+    }
+
+
+def _alarm_as_json(item: AlarmExplanation) -> dict[str, Any]:
+    return {
+        **_common(item),
+        "role": item.role,
+        "time_s": item.alarm.time,
+        "side": item.alarm.side,
+        "statistic": item.alarm.statistic,
+        "limit": item.alarm.limit,
+        "onset_s": item.contact.start if item.contact else None,
+        "left_band_s": item.left,
+        "missing_samples_skipped": item.skipped,
+        "likely_cause": _cause_as_json(item.cause),
+    }
+
+
+def _cause_as_json(cause: Cause) -> dict[str, Any]:
+    return {
+        "kind": str(cause.kind),
+        "shifts": [asdict(shift) for shift in cause.shifts],
+        "transient": asdict(cause.transient) if cause.transient else None,
+        "lost": asdict(cause.loss) if cause.loss else None,
+    }
+
+
+def _miss_as_json(item: MissExplanation) -> dict[str, Any]:
+    return {
+        **_common(item),
+        "outcome": item.outcome,
+        "reason": item.reason or None,
+        "onset_s": item.contact.start,
+        "watched_ms": 1e3 * item.watched,
+        "not_judged": dict(item.not_judged),
+        "joints": [
+            {
+                "joint": found.joint,
+                "nearest": _moment_as_json(found.nearest),
+                "longest_outside_samples": found.longest,
+                "longest_outside_from_s": found.outside_from,
+                "held_share_of_limit": found.held,
+                "outside_before_contact_from_s": found.latched_from,
+            }
+            for found in item.approaches
+        ],
+    }
+
+
+def _common(item: Explanation) -> dict[str, Any]:
+    from cdtool.evaluation.explanation.words import words
+
+    return {
+        "operation": item.operation,
+        "detector": item.detector,
+        "joint": item.joint,
+        "unit": item.unit,
+        "debounce_samples": item.debounce,
+        "words": words(item),
+        "detector_reads": list(item.inputs),
+        "compared_with_runs": item.runs,
+        "not_compared_because": str(item.absent) if item.absent else None,
+        "moved": [
+            {
+                "channel": found.channel,
+                "joint": found.joint,
+                "time_s": found.time,
+                "direction": found.direction or None,
+                "reason": found.reason or None,
+                "unit": found.unit or None,
+                "value": found.value,
+                "normal_mean": found.mean,
+                "normal_spread": found.spread,
+                "brief": found.brief,
+            }
+            for found in item.moved
+        ],
+        "margins": [_moment_as_json(moment) for moment in item.moments],
+    }
+
+
+def _moment_as_json(moment: Moment) -> dict[str, Any]:
+    return {
+        "time_s": moment.time,
+        "statistic": moment.statistic,
+        "limit": moment.limit,
+        "margin": moment.margin,
+        "share_of_limit": moment.share,
+        "reason": moment.reason or None,
+    }
