@@ -159,6 +159,8 @@ class TopicColumns(Topic):
         """Add messages that the fast path wrote into rows, using the result of `binding`."""
         for part in _joined(parts):
             self.decoders.decoded += part.count
+            if self.first_stamp is None:
+                self.first_stamp = int(part.destination.stamps[part.rows.start])
             self._stamps.confirm(part.destination.stamps, part.rows)
             self.orders.add(stream.id, part.destination.stamps[part.rows], part.ascending)
             for (text, rows), table in zip(self._rows.items(), part.destination.tables, strict=True):

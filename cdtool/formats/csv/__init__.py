@@ -6,8 +6,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -17,6 +19,7 @@ from cdtool.channels import ChannelMap, TablePins, TimeSource
 from cdtool.columns import Column
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
+from cdtool.formats.groups import PREFIX
 from cdtool.formats.pieces import Pieces
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
@@ -24,10 +27,6 @@ from cdtool.recording import FloatArray
 if TYPE_CHECKING:
     from cdtool.formats.csv.dialect import Dialect
     from cdtool.formats.csv.table import TextTable
-import math
-from itertools import takewhile
-
-from cdtool.formats.groups import PREFIX
 
 _MARK = b"# " + PREFIX.encode()
 _KEY = _MARK + b"origin_s: "

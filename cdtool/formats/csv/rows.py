@@ -34,7 +34,7 @@ _THREADS = 4
 class _Block:
     """The result of one block: `rows` rows of `arrays` from row `first`, the number of lines, and irregular lines.
 
-    `blank` are the blank lines; `empty` are blank lines that are rows.
+    `blank` are the blank lines; `empty` are blank lines that are rows; `unfinished`: the last line has no end.
     """
 
     arrays: Rows
@@ -44,6 +44,7 @@ class _Block:
     blank: Integers
     empty: Integers
     irregular: list[IrregularLine]
+    unfinished: bool
 
 
 class RowReader:
@@ -78,6 +79,7 @@ class RowReader:
         """
         line, end = self.dialect.first_line, 0
         for block in self._read_ahead(whole):
+            self.ended = not block.unfinished
             for each in block.irregular:
                 irregular.read(each, line, block.arrays)
             irregular.blank += (block.blank + line).tolist()
@@ -127,7 +129,6 @@ class RowReader:
     def _block(self, block: bytearray, size: int, first: int, count: int, arrays: Rows) -> _Block:
         end = self.dialect.text.line_end
         unfinished = block[size - 1] not in b"\r\n"
-        self.ended = self.ended and not unfinished
         if block[size - 1 : size] != end:  # the line ends after the block replace the missing one
             size += 1
         if self.dialect.marks.thousands in NARROW_BLANKS:
@@ -160,7 +161,9 @@ class RowReader:
             IrregularLine(line, row, bytes(block[begin:stop]), line == final)
             for line, row, begin, stop in irregular[: counts[3]].tolist()
         ]
-        return _Block(arrays, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed)
+        return _Block(
+            arrays, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed, unfinished
+        )
 
     def _marks(self) -> Integers:
         dialect = self.dialect

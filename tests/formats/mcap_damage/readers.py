@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.findings import Fact, Finding
 from cdtool.formats.mcap import Mcap
 from cdtool.formats.mcap.container.log import Log
 from cdtool.formats.source import Source
@@ -33,9 +33,9 @@ class Reading:
     topics: tuple[str, ...] | None = None
     origin: float = 0.0
 
-    def mentions(self, *words: str) -> bool:
-        """Return whether a finding contains one of the words."""
-        return any(word in finding.message for finding in self.findings for word in words)
+    def has(self, *kinds: type[Fact]) -> bool:
+        """Return whether a finding is of one of the kinds."""
+        return any(isinstance(finding.fact, kinds) for finding in self.findings)
 
     @property
     def lossy(self) -> bool:
