@@ -334,11 +334,11 @@ class CoarseStamps(Fact):
 
 @dataclass(frozen=True)
 class EmptyClock(Fact):
-    """A column that is named as a clock holds no stamp."""
+    """A column that is named as a clock contains no time stamp."""
 
     def sentence(self) -> str:
         """Return that it is empty."""
-        return _named("it holds no stamp", True)
+        return _named("it contains no time stamp", True)
 
 
 @dataclass(frozen=True)
@@ -395,7 +395,7 @@ class ValuesWithoutTime(Fact):
 class WrittenTimes(Fact):
     """How dates and times are written, what their seconds count from, and how often the clock wrapped.
 
-    `days_column` holds the days of times without a date.
+    `days_column` contains the days of times without a date.
     """
 
     pattern: str

@@ -179,7 +179,7 @@ class DamagedAt(Fact):
         if self.read_before is None:
             return f"{where}: {self.lost}"
         behind = f"; {self.lost}" if self.lost.size else ""
-        return f"{where}: only what lies before it was read ({counted(self.read_before, 'message')}){behind}"
+        return f"{where}: only the part before it was read ({counted(self.read_before, 'message')}){behind}"
 
 
 @dataclass(frozen=True)
@@ -274,7 +274,7 @@ class SeveralWriters(TemplateFact):
 class NoMessage(TemplateFact):
     """A log without a message."""
 
-    words = "holds no message"
+    words = "contains no message"
 
 
 @dataclass(frozen=True)
@@ -298,13 +298,13 @@ class IndexDisagrees(Fact):
 
 @dataclass(frozen=True)
 class ChunkTimesDiffer(Fact):
-    """Chunks whose headers claim other times than their messages have."""
+    """Chunks whose headers state other times than those of their messages."""
 
     chunks: int
 
     def sentence(self) -> str:
         """Return how many."""
-        return f"{counted(self.chunks, 'chunk', 'claim')} other times than the messages have"
+        return f"{counted(self.chunks, 'chunk', 'state')} other times than those of the messages"
 
 
 @dataclass(frozen=True)

@@ -173,11 +173,11 @@ class AccelerometerScaleUncheckable(AccelerometerFit):
 
 @dataclass(frozen=True)
 class AccelerometerScaleWrong(AccelerometerFit):
-    """The scale is wrong; the log may hold another unit: m/s2 where g is stated, or g."""
+    """The scale is wrong; the log may contain another unit: m/s2 where g is stated, or g."""
 
     may_hold: Literal["m/s2", "g", ""] = ""
 
     def sentence(self) -> str:
         """Return the fit, and the next step."""
-        advice = {"m/s2": "the log may hold m/s2, not g", "g": "the log may hold g", "": "check unit and ratio"}
+        advice = {"m/s2": "the log may contain m/s2, not g", "g": "the log may contain g", "": "check unit and ratio"}
         return f"accelerometer{_of(self.joint)} has the wrong scale ({self.figures}): {advice[self.may_hold]}"

@@ -37,7 +37,7 @@ class PartOfOtherKind(TemplateFact):
     metadata: str
 
     subject_field = "part"
-    words = "part {part} of {metadata} is left out: the folder holds parts of another kind too"
+    words = "part {part} of {metadata} is left out: the folder also contains parts of another kind"
 
 
 @dataclass(frozen=True)

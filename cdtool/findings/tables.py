@@ -87,9 +87,9 @@ class NumbersAboveRows(LinesFact):
 
     def sentence(self) -> str:
         """Return the lines, and the next step."""
-        holds = "it holds" if self.count == 1 else "they hold"
+        contains = "it contains" if self.count == 1 else "they contain"
         return (
-            f"{self.shown_lines} above the rows skipped though {holds} numbers; "
+            f"{self.shown_lines} above the rows skipped although {contains} numbers; "
             "skip_lines in [csv] says that they are no rows"
         )
 
@@ -152,9 +152,7 @@ class NotNumeric(Fact):
     def sentence(self) -> str:
         """Return column and cell."""
         advice = f"; {self.advice}" if self.advice else ""
-        return (
-            f"column '{self.column}' is not numeric (line {self.line} holds {self.cell[:_SHOWN]!r}): left out{advice}"
-        )
+        return f"column '{self.column}' is not numeric (line {self.line} is {self.cell[:_SHOWN]!r}): left out{advice}"
 
 
 @dataclass(frozen=True)
@@ -247,9 +245,9 @@ class WordsBelowRows(SkippedLines):
 
 @dataclass(frozen=True)
 class NulLines(SkippedLines):
-    """Lines that hold NUL bytes."""
+    """Lines that contain NUL bytes."""
 
-    what = "damaged, they hold NUL bytes"
+    what = "damaged, they contain NUL bytes"
 
 
 @dataclass(frozen=True)

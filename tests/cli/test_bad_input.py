@@ -118,7 +118,7 @@ def test_a_truncated_mcap_file_is_read_up_to_the_cut_with_status_3(detect, tmp_p
     path = written(tmp_path / "cut.mcap", whole[: int(0.95 * len(whole))])
     done = detect(path)
     assert done.status == 3
-    assert "alarm" in done.out and "damaged at byte" in done.err and "only what lies before it was read" in done.err
+    assert "alarm" in done.out and "damaged at byte" in done.err and "only the part before it was read" in done.err
 
 
 def test_an_unknown_unit_in_the_machine_file_lists_the_known_ones(gate_folder, tmp_path):

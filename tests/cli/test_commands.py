@@ -57,7 +57,7 @@ def test_info_finds_an_accelerometer_that_is_mounted_the_other_way_round(gate_fo
     text = text.replace('unit = "g", scale = 1', 'unit = "m/s2", scale = -1')
     (tmp_path / "m.toml").write_text(text)
     done = cdtool("info", gate_folder / "free" / "01.csv", "--machine", tmp_path / "m.toml")
-    assert "wrong scale" in done.out and "may hold g" in done.out
+    assert "wrong scale" in done.out and "may contain g" in done.out
 
 
 def test_info_continues_after_a_bad_log(gate_folder, tmp_path):

@@ -146,7 +146,7 @@ SENTENCES: list[tuple[Fact, str]] = [
         "named as a clock, but all of its 400 stamps are the same: the clock stands still",
     ),
     (clocks.CoarseStamps(0.501, named=False), "50.1 % of its stamps repeat: a coarse clock"),
-    (clocks.EmptyClock(), "named as a clock, but it holds no stamp"),
+    (clocks.EmptyClock(), "named as a clock, but it contains no time stamp"),
     (clocks.BackwardClock(12), "named as a clock, but it runs backward at 12 of its steps"),
     (
         clocks.OtherClock("time1", clocks.ClockDifference("steps", 0.01, 0.02), ("a", "b", "c", "d")),
@@ -210,12 +210,12 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.NamedSeparator(1, "sep=;"), "line 1 (sep=;) names the separator"),
     (
         tables.NumbersAboveRows((3,)),
-        ("line 3 above the rows skipped though it holds numbers; skip_lines in [csv] says that they are no rows"),
+        ("line 3 above the rows skipped although it contains numbers; skip_lines in [csv] says that they are no rows"),
     ),
     (
         tables.NumbersAboveRows((3, 4)),
         (
-            "lines 3 to 4 above the rows skipped though they hold numbers; skip_lines in [csv] says that "
+            "lines 3 to 4 above the rows skipped although they contain numbers; skip_lines in [csv] says that "
             "they are no rows"
         ),
     ),
@@ -226,11 +226,11 @@ SENTENCES: list[tuple[Fact, str]] = [
         tables.DoubtfulPoint("1.234", 7),
         ("'1.234' (line 7) is read as 1.234, not as 1234: pin decimal and thousands in [csv] if that is wrong"),
     ),
-    (tables.NotNumeric("note", 2, "up"), "column 'note' is not numeric (line 2 holds 'up'): left out"),
+    (tables.NotNumeric("note", 2, "up"), "column 'note' is not numeric (line 2 is 'up'): left out"),
     (
         tables.NotNumeric("note", 2, "1-2-2025", tables.CellAdvice("time")),
         (
-            "column 'note' is not numeric (line 2 holds '1-2-2025'): left out; repair it, or pin "
+            "column 'note' is not numeric (line 2 is '1-2-2025'): left out; repair it, or pin "
             'time_format in [csv], e.g. "%d.%m.%Y %H:%M:%S.%f"'
         ),
     ),
@@ -259,7 +259,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.HeaderLines((11,)), "line 11 skipped: the header again"),
     (tables.DrawnLines((2,)), "line 2 skipped: drawn lines"),
     (tables.WordsBelowRows((30,)), "line 30 skipped: words below the rows"),
-    (tables.NulLines((31,)), "line 31 skipped: damaged, they hold NUL bytes"),
+    (tables.NulLines((31,)), "line 31 skipped: damaged, they contain NUL bytes"),
     (tables.LastLineCut(99), "the last line (99) is cut off, dropped"),
     (tables.NulBytesAtEnd(512), "the file ends in 512 NUL bytes: was the power lost?"),
     (tables.LastLineKept(99, "0.5"), "the last line (99) has no line end: its last cell '0.5' is taken to be whole"),
@@ -295,12 +295,12 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (
         containers.DamagedAt(345, "the file ends within a record", containers.LostBytes(0), read_before=30),
-        ("damaged at byte 345 (the file ends within a record): only what lies before it was read (30 messages)"),
+        ("damaged at byte 345 (the file ends within a record): only the part before it was read (30 messages)"),
     ),
     (
         containers.DamagedAt(345, "the file ends within a record", containers.LostBytes(24), read_before=1),
         (
-            "damaged at byte 345 (the file ends within a record): only what lies before it was read (1 "
+            "damaged at byte 345 (the file ends within a record): only the part before it was read (1 "
             "message); 24 bytes lost"
         ),
     ),
@@ -326,7 +326,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     (containers.MessageCountDiffers(20, 18), "the file's summary says 20 messages, 18 were read"),
     (containers.Unverified(24, 24), "24 of 24 messages without a checksum: unverified"),
     (containers.SeveralWriters(2), "2 channels write to it: their messages are one column, sorted by time"),
-    (containers.NoMessage(), "holds no message"),
+    (containers.NoMessage(), "contains no message"),
     (containers.IndexDisagrees(1, "not indexed"), "the summary disagrees with the data: 1 chunk is not in its index"),
     (
         containers.IndexDisagrees(2, "only indexed"),
@@ -336,7 +336,7 @@ SENTENCES: list[tuple[Fact, str]] = [
         containers.IndexDisagrees(2, "other values"),
         "the summary disagrees with the data: 2 chunks have other sizes or times than its index says",
     ),
-    (containers.ChunkTimesDiffer(1), "1 chunk claims other times than the messages have"),
+    (containers.ChunkTimesDiffer(1), "1 chunk states other times than those of the messages"),
     (containers.ChannelCountsDiffer(), "the summary disagrees with the data: other message counts by channel"),
     (containers.DefinedOtherwise(), "the summary defines it otherwise than the data"),
     # messages
@@ -360,7 +360,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (
         parts.PartOfOtherKind("bag_2.db3", "metadata.yaml"),
-        "part bag_2.db3 of metadata.yaml is left out: the folder holds parts of another kind too",
+        "part bag_2.db3 of metadata.yaml is left out: the folder also contains parts of another kind",
     ),
     (
         parts.PartUnreadable("bag_2.mcap", "damaged at byte 8"),
@@ -494,14 +494,14 @@ SENTENCES: list[tuple[Fact, str]] = [
         motion.AccelerometerScaleWrong("", 9.8, 0.98, "m/s2"),
         (
             "accelerometer has the wrong scale (slope 9.8, correlation 0.98 over the speed's derivative): "
-            "the log may hold m/s2, not g"
+            "the log may contain m/s2, not g"
         ),
     ),
     (
         motion.AccelerometerScaleWrong("", 0.102, 0.98, "g"),
         (
             "accelerometer has the wrong scale (slope 0.102, correlation 0.98 over the speed's derivative): "
-            "the log may hold g"
+            "the log may contain g"
         ),
     ),
     (
