@@ -121,8 +121,8 @@ def run_command(line: str) -> Outcome:
 
 
 def run_example(text: str, names: dict[str, object], page: str) -> None:
-    """Run a Python block: as a doctest if it has prompts, else as a program."""
-    if ">>>" not in text:
+    """Run a Python block: as a doctest if it begins with a prompt, else as a program."""
+    if not text.lstrip().startswith(">>>"):
         exec(compile(text, page, "exec"), names)
         return
     test = doctest.DocTestParser().get_doctest(text, names, page, page, 0)
