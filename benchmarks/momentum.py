@@ -87,7 +87,7 @@ def _core(run: Run, machine: LinearAxis, bandwidth: float) -> Callable[[], objec
 
     def residual() -> Array:
         values, status = np.empty(len(run.time)), np.empty(len(run.time), dtype=np.uint8)
-        _observe(drive.time, net_force, momentum, missing, missing, bandwidth, -np.inf, values, status)
+        _observe(drive.time, net_force, momentum, missing, missing, drive.coupled, bandwidth, -np.inf, values, status)
         return values
 
     return residual
