@@ -1,8 +1,8 @@
-"""A sample without the rows that add nothing to what the rows before them show about the dialect.
+"""Shorten the sample of a table to the lines that determine its dialect.
 
-Nearly all tables are a head and then rows of one shape: plain numbers or empty cells, one separator. The dialect of
-such a table follows from its head and some of the rows: the first ones, those in which a mark (1.5, 1,5, 1.234) is
-first seen, and one with a number for each column that has empty cells. Every other sample is left as it is.
+Most tables have a head, and then rows of one shape: a number or nothing in each cell, and one separator. The head and
+some rows determine the dialect: the first rows, the first row with each kind of decimal mark (1.5, 1,5, 1.234), and
+one row with a number for each column that also has empty cells. Any other sample is not shortened.
 """
 
 from __future__ import annotations
@@ -13,11 +13,15 @@ import numpy as np
 
 from cdtool.channels import TablePins
 from cdtool.formats.csv.alike_rows_kernel import (
+    COMMA,
+    COMMA_OR_THOUSANDS,
     FIRST_BYTE,
     FIRST_LINE,
     FIRST_ROW,
     LAST_BYTE,
     NUMBERS,
+    POINT,
+    POINT_OR_THOUSANDS,
     ROW_BYTE,
     ROWS,
     WIDTH,
@@ -27,25 +31,24 @@ from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_kernel import Integers
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
 
-# Fewer rows are soon looked at one by one, and of more lines above them the head is no plain one.
+# Samples with fewer rows, or with more lines above the rows, are not shortened.
 _FEWEST_ROWS, _MOST_ABOVE = 100, 40
 _MOST_COLUMNS = 512
-# Of the rows at least so many are shown, and twice as many as there are lines above: the lower two thirds of the sample
-# are then rows, as in the whole one.
-_SHOWN_ROWS = 12
-# Decimal points are looked for in the first rows of a sample only, commas in all of them.
-_MARKS_LOOKED = 200
-# Cells are looked at in every n-th row, at most about so many rows.
-_KINDS_LOOKED = 400
+# The shortened sample has at least this many rows, and twice as many as lines above: its lower two thirds, from which
+# the separator is found, then contain rows only, as in the whole sample.
+_FIRST_ROWS = 12
+# As in find_dialect: decimal points are searched for in the first rows only, commas in all rows.
+_SEARCHED_ROWS = 200
+# As in find_dialect: the kind of a column is determined from about this many rows, evenly spread.
+_SPREAD_ROWS = 400
 
 
 @dataclass(frozen=True)
 class ShorterSample:
-    """A `stream` of fewer rows that shows the same dialect.
+    """A `stream` with fewer rows but the same dialect.
 
-    Of the whole sample the `rows` from line `first` (from 1) on are alike; `left_out` of them are not in `stream`.
-    `above` are the bytes of the lines above them, `shape` is all that these rows show: samples with the same lines
-    above and the same shape have the same dialect.
+    The whole sample has `rows` alike rows from line `first` (from 1); `left_out` of them are not in `stream`. `above`
+    are the bytes of the lines above them. Samples with equal `above` and equal `shape` have the same dialect.
     """
 
     stream: bytes
@@ -59,7 +62,7 @@ class ShorterSample:
     has_empty_cells: bool
 
     def whole(self, dialect: Dialect) -> Dialect | None:
-        """Return the dialect of the whole sample by that of the shorter one; None where that may be another one."""
+        """Return the dialect of the whole sample, given that of `stream`; None if the two may differ."""
         if (dialect.separator, dialect.width) != (self.separator, self.width) or dialect.first_line > self.first:
             return None
         if self.has_empty_cells and dialect.first_line < self.first:
@@ -70,7 +73,7 @@ class ShorterSample:
 
 
 def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample | None:
-    """Return the sample without the rows that add nothing; None where its rows are not alike, or are few."""
+    """Return the shortened sample; None if its rows are not alike or are few."""
     pinned_line = max(pins.skip_lines, int(pins.header or 0), int(pins.units or 0))
     if text.recoded or text.line_end != b"\n" or pinned_line > _MOST_ABOVE or _begins_rows(pins.comment or ""):
         return None
@@ -80,7 +83,7 @@ def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample 
         return None
     found, marks = np.zeros(4, dtype=np.int64), np.full((4, 2), -1, dtype=np.int64)
     columns = np.zeros((_MOST_COLUMNS, 5), dtype=np.int64)
-    starts = np.zeros(2 * _MOST_ABOVE + _SHOWN_ROWS + 1, dtype=np.int64)
+    starts = np.zeros(2 * _MOST_ABOVE + _FIRST_ROWS + 1, dtype=np.int64)
     data = np.frombuffer(stream[:end] + b"\n\n\n\n", dtype=np.uint8)
     stop = end if stream[end - 1 : end] == b"\n" else end + 1
     alike = find_alike_rows(data, stop, separator[0], _MOST_ABOVE, len(starts), found, marks, columns, starts)
@@ -89,18 +92,18 @@ def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample 
         return None
     columns = columns[:width]
     kinds = _kinds(columns, rows)
-    seen = _marks_looked_at(marks)
+    seen = _searched_marks(marks)
     if kinds is None or seen is None:
         return None
-    shown = _SHOWN_ROWS + 2 * first
-    more = {int(marks[mark, ROW_BYTE]) for mark in seen if marks[mark, FIRST_ROW] >= shown}
-    more |= {int(each[LAST_BYTE]) for each in columns if 0 < each[NUMBERS] < rows} - set(starts[:shown].tolist())
+    count = _FIRST_ROWS + 2 * first
+    more = {int(marks[mark, ROW_BYTE]) for mark in seen if marks[mark, FIRST_ROW] >= count}
+    more |= {int(each[LAST_BYTE]) for each in columns if 0 < each[NUMBERS] < rows} - set(starts[:count].tolist())
     lines = [stream[at : stream.find(b"\n", at, end) + 1 or end] for at in sorted(more)]
     return ShorterSample(
-        stream=stream[: int(starts[shown])] + b"".join(lines),
+        stream=stream[: int(starts[count])] + b"".join(lines),
         first=first + 1,
         rows=rows,
-        left_out=rows - shown - len(lines),
+        left_out=rows - count - len(lines),
         above=stream[:begin],
         shape=(separator, kinds, tuple(seen)),
         separator=separator.decode(),
@@ -110,12 +113,12 @@ def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample 
 
 
 def _begins_rows(comment: str) -> bool:
-    """Whether a pinned comment mark may begin a row of numbers."""
+    """Return whether rows of numbers may start with a pinned comment mark."""
     return bool(comment) and comment[0] in "+-.,;|\t nN0123456789"
 
 
 def _separator(stream: bytes, end: int) -> bytes | None:
-    """The separator of a line in the middle of the sample; None where it is not clear."""
+    """Return the separator in a line in the middle of the sample; None if the line has no separator or several."""
     middle = stream.rfind(b"\n", 0, end // 2) + 1
     line = stream[middle : stream.find(b"\n", middle, end)]
     strong = [letter for letter in (b"\t", b";", b"|") if letter in line]
@@ -125,8 +128,8 @@ def _separator(stream: bytes, end: int) -> bytes | None:
 
 
 def _kinds(columns: Integers, rows: int) -> str | None:
-    """One letter a column, N numbers or M nothing; None where the rows that are looked at may miss its numbers."""
-    apart = rows // _KINDS_LOOKED + 2  # at most so many rows from one that is looked at to the next
+    """Return one letter per column: N numbers, M nothing; None if the spread rows may miss the numbers of a column."""
+    apart = rows // _SPREAD_ROWS + 2  # the largest distance between two of the spread rows
     letters = []
     for count, _, longest, last, _ in columns.tolist():
         if 0 < count < rows and (longest < apart or last - longest < (rows + _MOST_ABOVE) / 3):
@@ -135,12 +138,13 @@ def _kinds(columns: Integers, rows: int) -> str | None:
     return "".join(letters)
 
 
-def _marks_looked_at(marks: Integers) -> list[int] | None:
-    """The kinds of marks in the rows that are looked through for them; None where that depends on the lines above."""
-    first = marks[:, FIRST_ROW].tolist()
-    points, commas = (first[0], first[2]), (first[1], first[3])
-    if max(points) >= 0 and max(commas) >= 0:
+def _searched_marks(marks: Integers) -> list[int] | None:
+    """Return the kinds of decimal marks in the searched rows; None if these depend on the lines above."""
+    first = marks[:, FIRST_ROW]
+    points, commas = first[[POINT, POINT_OR_THOUSANDS]], first[[COMMA, COMMA_OR_THOUSANDS]]
+    if points.max() >= 0 and commas.max() >= 0:
         return None
-    if any(_MARKS_LOOKED - _MOST_ABOVE <= row < _MARKS_LOOKED for row in points):
+    if ((points >= _SEARCHED_ROWS - _MOST_ABOVE) & (points < _SEARCHED_ROWS)).any():
         return None
-    return [kind for kind, row in enumerate(first) if row >= 0 and (row < _MARKS_LOOKED or kind in (1, 3))]
+    kinds = (POINT, COMMA, POINT_OR_THOUSANDS, COMMA_OR_THOUSANDS)
+    return [kind for kind in kinds if first[kind] >= 0 and (first[kind] < _SEARCHED_ROWS or commas.max() >= 0)]

@@ -1,4 +1,4 @@
-"""The rows at the end of a sample that have one shape: a plain number, or nothing, in each of equally many cells."""
+"""Find the rows of one shape at the end of a sample: equally many cells, each a plain number or empty."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from cdtool.formats.csv.number_kernel import BYTES, Bytes
 from cdtool.formats.csv.row_kernel import Integers
 from cdtool.kernels import kernel
 
-# Results in `found`: rows, cells of a row, the line (from 0) and the byte of the first row.
+# Fields of `found`: number of rows, cells per row, line (from 0) and byte of the first row.
 ROWS, WIDTH, FIRST_LINE, FIRST_BYTE = range(4)
-# What a number shows about the decimal mark: it is a point, or a comma; or a point, or a comma, that may instead part
-# thousands (1.234). Each has the first and the last row with such a number, and the byte where the first one begins.
+# Kinds of marks: a decimal point or comma; or one that may be a thousands separator instead (1.234). Fields of each:
+# the first row (from 0) with such a number; -1 for none; and the byte of that row.
 POINT, COMMA, POINT_OR_THOUSANDS, COMMA_OR_THOUSANDS = range(4)
 FIRST_ROW, ROW_BYTE = range(2)
-# Of each column: its numbers, the run of them in successive rows that lasts, the last of the longest runs and the row
-# (from 0) that ends it, the byte of the last row with a number. Runs count up to LONG.
+# Fields of each column: count of numbers, current run of numbers in successive rows, longest run, row (from 0) at the
+# end of its last occurrence, byte of the last row with a number. Runs are counted up to LONG.
 NUMBERS, RUN, LONGEST_RUN, RUN_END, LAST_BYTE = range(5)
 LONG = 128
 
@@ -32,9 +32,9 @@ def find_alike_rows(
 ) -> bool:
     """Find the rows of one shape at the end of `data[:stop]`, whose last byte is a line feed.
 
-    False where they begin behind line `most_above`, where the lines end without one, or where a row has more cells than
-    `columns` has rows. `marks` is (4, 2), `columns` (k, 5); `starts` takes the bytes at which the first `most_starts`
-    rows begin. At least 4 bytes follow `stop`. Blank lines between rows are passed over.
+    Return False if they begin after line `most_above`, if no row is found, or if a row has more cells than `columns`
+    has rows. `marks` is (4, 2), `columns` (k, 5); `starts` receives the first bytes of the first `most_starts` rows. At
+    least 3 bytes must follow `stop`. Blank lines between rows are ignored.
     """
     rows = 0
     width = 0

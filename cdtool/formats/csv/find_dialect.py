@@ -50,7 +50,7 @@ _STRONG = "\t;|"
 _SHOWN_ENCODINGS = {"cp1252": "Windows-1252", "latin-1": "Latin-1"}
 _LOOKED = 200
 _MOST = 12
-# Dialects of the last tables: those of alike files are soon confirmed.
+# Dialects of previous tables, for files with an equal head and rows of the same shape.
 _KNOWN: dict[tuple[object, ...], Dialect] = {}
 _MOST_KNOWN = 64
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
@@ -224,7 +224,7 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
 
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
-    """The dialect of a sample, without footer and ambiguous marks: from fewer of its rows if these show the same."""
+    """Return the dialect, footer and ambiguous marks not considered, from a shortened sample if that is sufficient."""
     refuse_long_line(text, stream)
     shorter = shorter_sample(text, stream, pins)
     if shorter is None:
@@ -234,7 +234,7 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     if dialect is None:
         try:
             dialect = shorter.whole(_by_lines(path, text, shorter.stream, pins))
-        except RecordingError:  # the whole sample has the line that it names
+        except RecordingError:  # the number of a line in the message may be wrong: read the whole sample
             dialect = None
         if dialect is None:
             return _by_lines(path, text, stream, pins)
@@ -245,7 +245,7 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
 
 
 def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
-    """The dialect by all lines of a sample."""
+    """Return the dialect from all lines of a sample."""
     lines = classify_lines(path, text, stream, pins)
     grid = split_rows(path, lines, pins)
     head = grid.head
