@@ -22,7 +22,7 @@ import pytest
 
 from tests.data_folder import is_present
 
-BOUND_S = 0.5
+BOUND_S = 0.4
 SLOW_TESTS = Path(__file__).with_name("slow_tests.txt")
 ROOT = Path(__file__).parents[1]
 MODULES = {"selenium": "browser", "subprocess": "external"}
