@@ -48,6 +48,10 @@ class SignatureError(CdtoolError):
     """A signature cannot be learned or read, or does not belong to the machine, detector or log."""
 
 
+class WorkerError(CdtoolError):
+    """A process that works for this one ended before its result."""
+
+
 class NothingValidError(SignatureError):
     """The detector cannot assess any sample of the runs to learn from, because of detector and motion."""
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +48,12 @@ class Series:
             raise RecordingError("time does not strictly increase", "clean it with cdtool.clock.clean_time")
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "values", _frozen(values))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore a series that was sent from another process: its arrays are read-only as before."""
+        for name in ("time", "values"):
+            state[name].flags.writeable = False
+        self.__dict__.update(state)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -165,6 +172,8 @@ class Contact:
 
 
 def _frozen(values: npt.ArrayLike) -> FloatArray:
-    array = np.ascontiguousarray(values, dtype=np.float64).view()
-    array.flags.writeable = False
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
     return array

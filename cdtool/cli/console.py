@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from cdtool.findings import Finding
     from cdtool.workflows.detection import Detected
-    from cdtool.workflows.runs import Progress
+    from cdtool.workflows.workers import Progress
 
 _SHOWN = 10
 _ERROR, _SHORTEST_HINT = "error: ", 140

@@ -7,32 +7,24 @@ from dataclasses import replace
 from typing import Any
 
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.evaluation.explanation.explanation import explain_operation
-from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
-from cdtool.evaluation.explanation.words import words
 from cdtool.evaluation.force.verdict import ForceVerdict
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, RecordingResult, Results, Skipped
 from cdtool.evaluation.traces.choice import TraceChoice
-from cdtool.evaluation.traces.trace import Trace, make_trace
-from cdtool.evaluation.truth.matching import Matching
+from cdtool.evaluation.traces.trace import Trace
 from cdtool.findings import Finding, Remark
 from cdtool.findings.scoring import PlotsLeftOut
-from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
-from cdtool.workflows.benchmark.scoring import Scored
+from cdtool.workflows.benchmark.log_outcome import LogOutcome, OperationOutcome, WantedTraces
 from cdtool.workflows.contacts.impact_free import unchecked
-from cdtool.workflows.contacts.judged_operation import Judged
-from cdtool.workflows.detector_inputs import inputs_of
 
 
 class Gathering:
     """The rows of a benchmark, log by log in the order of the file, and the selected traces.
 
-    `names` are the detectors; `learned` maps the hashes of the logs learned from to their names; `normals` is their
-    normal motion.
+    `names` are the detectors; `learned` maps the hashes of the logs learned from to their names.
     """
 
     def __init__(
@@ -41,13 +33,11 @@ class Gathering:
         names: Sequence[str],
         factors: Mapping[str, FloatArray],
         learned: Mapping[str, str],
-        normals: NormalMotions = NormalMotions(absent=Absence.FEW_RUNS),  # noqa: B008
     ) -> None:
         self.setup = setup
         self.names = tuple(names)
         self.learned = learned
-        self.normals = normals
-        self.scored: list[Scored] = []
+        self.outcomes: list[LogOutcome] = []
         self.skipped: list[Skipped] = []
         self.findings = [RecordingFinding.of(str(setup.path), Finding(Remark(words))) for words in setup.migrated]
         # By detector: the unit of the value compared with the limits, which may differ from that of the signal.
@@ -57,34 +47,49 @@ class Gathering:
         self._tests: dict[tuple[str, str], list[ForceVerdict]] = {}
         self._scored: dict[str, str] = {}
         self._unchecked: list[tuple[str, Finding]] = []
+        self._traces: dict[int, Trace] = {}
         self._logs = 0
         self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
 
-    def add(self, group: str, scored: Scored) -> None:
+    def wanted(self, log: int) -> WantedTraces:
+        """Return which traces of log number `log` are wanted as far as is known now: no fewer than at its turn."""
+        return WantedTraces(log, self._choice.copy())
+
+    def add(self, group: str, outcome: LogOutcome) -> None:
         """Add one log's rows; raises ConfigurationError if the same log, under any name, was learned from."""
+        log = self._logs
         self._logs += 1
-        self.skipped += scored.skipped
-        self.findings += scored.findings
-        self._unchecked += scored.unchecked
-        if scored.recording is None:
+        self.skipped += outcome.skipped
+        self.findings += outcome.findings
+        self._unchecked += outcome.unchecked
+        if outcome.recording is None:
             return
-        self._refuse_learned(scored.recording)
-        for judged in scored.judged:
-            for detection, matching, swept in zip(judged.detections, judged.matchings, judged.sweeps, strict=True):
-                self.units.setdefault(detection.detector, detection.statistic.unit)
-                self._exposure.setdefault((group, detection.detector), Exposure()).add(detection)
-                self._sweep.add(group, detection, swept, matching)
-            _offer(self._choice, self._logs - 1, judged, self.setup, self.normals)
-        for name in {detection.detector for judged in scored.judged for detection in judged.detections}:
+        self._refuse_learned(outcome.recording)
+        for operation in outcome.operations:
+            for item in operation.detectors:
+                self.units.setdefault(item.detector, item.unit)
+                self._exposure.setdefault((group, item.detector), Exposure()).add(item)
+                self._sweep.add(group, item)
+            self._offer(log, group, operation)
+        for name in {item.detector for operation in outcome.operations for item in operation.detectors}:
             self._exposure[group, name].recordings += 1
-        if scored.recording.point:
-            self._tests.setdefault((group, scored.recording.point), []).extend(scored.verdicts.values())
-        self.scored.append(replace(scored, judged=[], verdicts={}, log=None, matched=None))
+        if outcome.recording.point:
+            self._tests.setdefault((group, outcome.recording.point), []).extend(outcome.verdicts)
+        self.outcomes.append(replace(outcome, operations=(), verdicts=()))
+
+    def _offer(self, log: int, group: str, operation: OperationOutcome) -> None:
+        panels = len(operation.detectors)
+        number = self._choice.offer(log, group, panels, operation.striking, operation.slowest)
+        if number is not None:
+            assert operation.trace is not None, "a trace that is kept was wanted"
+            kept = self._choice.kept()
+            self._traces = {n: trace for n, trace in self._traces.items() if n in kept} | {number: operation.trace}
 
     @property
     def traces(self) -> tuple[Trace, ...]:
         """Return the selected traces."""
-        return self._choice.kept()
+        why = self._choice.kept()
+        return tuple(replace(self._traces[number], chosen=why[number]) for number in why)
 
     def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
         """Return all results; raises RecordingError if no log could be scored."""
@@ -100,11 +105,11 @@ class Gathering:
             provenance=provenance,
             detectors=self.names,
             groups=self.setup.groups,
-            recordings=tuple(item.recording for item in self.scored if item.recording),
-            contacts=tuple(row for item in self.scored for row in item.contacts),
-            false_alarms=tuple(row for item in self.scored for row in item.false_alarms),
+            recordings=tuple(item.recording for item in self.outcomes if item.recording),
+            contacts=tuple(row for item in self.outcomes for row in item.contacts),
+            false_alarms=tuple(row for item in self.outcomes for row in item.false_alarms),
             exposure=tuple(item.result(group, name) for (group, name), item in self._exposure.items()),
-            forces=tuple(row for item in self.scored for row in item.forces),
+            forces=tuple(row for item in self.outcomes for row in item.forces),
             points=tuple(point_rows(self._tests, profiles)),
             sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
             calibration=tuple(calibration),
@@ -124,35 +129,3 @@ class Gathering:
                 "which is used for learning",
                 "use a recording either in [learn] or for scoring",
             )
-
-
-def _offer(choice: TraceChoice, number: int, judged: Judged, setup: BenchmarkFile, normals: NormalMotions) -> None:
-    pairs = list(zip(judged.detections, judged.matchings, strict=True))
-    missed = [item.detector for item, made in pairs if any(match.outcome == "missed" for match in made.matches)]
-    false = [item.detector for item, made in pairs if made.false_alarms]
-    words = [f"missed by {', '.join(missed)}"] if missed else []
-    words += [f"false alarm of {', '.join(false)}"] if false else []
-    slowest = max((match.latency for _, made in pairs for match in made.matches if match.alarm), default=0.0)
-
-    def make(why: str) -> Trace:
-        compared = normals.for_one_operation()
-        return make_trace(
-            judged.group,
-            judged.operation,
-            judged.contacts,
-            judged.detections,
-            judged.matchings,
-            [_explained(detection, matching, setup, compared) for detection, matching in pairs],
-            why,
-        )
-
-    choice.offer(number, judged.group, len(judged.detections), "; ".join(words), slowest, make)
-
-
-def _explained(detection: Detection, matching: Matching, setup: BenchmarkFile, normals: NormalMotions) -> list[str]:
-    """Return why each alarm was raised and each contact missed; empty for external alarms."""
-    if detection.threshold is None:
-        return []
-    inputs = inputs_of(detection.detector, setup.machine_file)
-    found = explain_operation(detection, matching, setup.activation, inputs, normals)
-    return [line for item in found for line in words(item)]

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
@@ -24,11 +20,7 @@ from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
-
-Item = TypeVar("Item")
-Made = TypeVar("Made")
-# Called after each piece of work with the amount done and the total.
-Progress = Callable[[int, int], None]
+from cdtool.workflows.workers import Progress, in_order
 
 
 @dataclass(frozen=True)
@@ -51,38 +43,6 @@ def find_logs(patterns: Iterable[str], base: Path, key: str) -> list[Path]:
             raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", "check the path")
         found.update(dict.fromkeys(matches))
     return list(found)
-
-
-def in_order(
-    work: Callable[[Item], Made], items: Sequence[Item], jobs: int, progress: Progress | None
-) -> Iterator[Made]:
-    """Yield `work` of each item, in order for any `jobs`; kernels and parsers run without the interpreter lock."""
-    if jobs <= 1:
-        for i, item in enumerate(items, 1):
-            yield work(item)
-            if progress:
-                progress(i, len(items))
-        return
-    with ThreadPoolExecutor(jobs) as pool, _cancelling(pool):
-        # At most this many are in progress: finished results wait for the caller and need memory.
-        ahead = deque(pool.submit(work, item) for item in items[: 2 * jobs])
-        for i in range(1, len(items) + 1):
-            made = ahead.popleft().result()
-            if i + 2 * jobs <= len(items):
-                ahead.append(pool.submit(work, items[i + 2 * jobs - 1]))
-            yield made
-            if progress:
-                progress(i, len(items))
-
-
-@contextmanager
-def _cancelling(pool: ThreadPoolExecutor) -> Iterator[None]:
-    """Cancel work that has not begun if the block ends early."""
-    try:
-        yield
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
 
 
 def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
@@ -130,10 +90,19 @@ def load_operations(
     return recording, operations_of(recording, how)
 
 
-def _as_logged(path: Path, machine_file: MachineFile) -> LoggedRecording:
-    logged = read_as_logged(path, machine_file)
-    _with_channels(path, logged.recording)
-    return logged
+@dataclass(frozen=True)
+class _AsLogged:
+    """Reads a log through a machine file; one that cannot be read gives the error."""
+
+    machine_file: MachineFile
+
+    def __call__(self, path: Path) -> LoggedRecording | CdtoolError:
+        try:
+            logged = read_as_logged(path, self.machine_file)
+            _with_channels(path, logged.recording)
+        except CdtoolError as fault:
+            return fault
+        return logged
 
 
 def _with_channels(path: Path, recording: Recording) -> Recording:
@@ -174,30 +143,18 @@ def load_runs(
     by_bytes: dict[str, str] = {}
     without: list[tuple[str, Finding]] = []
 
-    def read(path: Path) -> LoggedRecording | CdtoolError:
+    logged = list(in_order(_AsLogged(machine_file), paths, len(paths), jobs, reading.progress))
+    known = ranges or PlausibleRanges.learned([item.recording for item in logged if isinstance(item, LoggedRecording)])
+    for path, item in zip(paths, logged, strict=True):
         try:
-            return _as_logged(path, machine_file)
-        except CdtoolError as fault:
-            return fault
-
-    def cut(item: tuple[Path, LoggedRecording | CdtoolError]) -> tuple[Recording, list[Operation]] | CdtoolError:
-        path, logged = item
-        if isinstance(logged, CdtoolError):
-            return logged
-        try:
-            recording = logged.on_load_side(machine_file.machine, known, to_learn=True)
+            if isinstance(item, CdtoolError):
+                raise item
+            recording = item.on_load_side(machine_file.machine, known, to_learn=True)
             recording = replace(recording, name=shown_path(path, base))
-            return recording, operations_of(recording, reading.operations)
+            parts = operations_of(recording, reading.operations)
         except CdtoolError as fault:
-            return fault
-
-    logged = list(zip(paths, in_order(read, paths, jobs, reading.progress), strict=True))
-    known = ranges or PlausibleRanges.learned([it.recording for _, it in logged if isinstance(it, LoggedRecording)])
-    for path, loaded in zip(paths, in_order(cut, logged, jobs, None), strict=True):
-        if isinstance(loaded, CdtoolError):
-            skipped.append(unread(path, base, loaded))
+            skipped.append(unread(path, base, fault))
             continue
-        recording, parts = loaded
         first = by_bytes.setdefault(recording.digest, recording.name) if recording.digest else recording.name
         if first != recording.name:
             skipped.append(Skipped(recording.name, f"has the same content as {first}: used once"))

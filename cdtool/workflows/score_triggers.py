@@ -12,6 +12,7 @@ import numpy as np
 
 from cdtool.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.evaluation.evaluated import Evaluated, evaluate
+from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.limits import ALL
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.traces.trace import Trace
@@ -24,9 +25,11 @@ from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
 from cdtool.workflows.benchmark.scoring import Scored, score_log
 from cdtool.workflows.gathering import Gathering
-from cdtool.workflows.runs import Progress, in_order, shown_path
+from cdtool.workflows.runs import shown_path
+from cdtool.workflows.workers import Progress, in_order
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
@@ -101,28 +104,41 @@ def score(
     gathered.skipped += [Skipped(name, _STRANGER) for name in strangers]
     gathered.findings += _unlisted(given, said, known, listed_only)
 
-    def detect(operations: Sequence[Operation], _: Scored) -> list[list[Detection]]:
-        return [detect_one(operation) for operation in operations]
-
-    def detect_one(operation: Operation) -> list[Detection]:
-        log = operation.name.removesuffix(f"#{operation.number}")
-        shift = operation.recording.origin if clock == "source" else 0.0
-        asked = [name for name in names if log in said[name] or not listed_only]
-        return [_detection(operation, name, said[name].get(log, Triggered()), shift) for name in asked]
-
-    def one(item: tuple[str, Path]) -> Scored:
-        scored = score_log(setup, item[0], item[1], detect, {})
-        for name in names:
-            scored.skipped += _beside(scored, name, said[name], clock)
-        return scored
-
     if listed_only:
         work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
-    for (group, _), scored in zip(work, in_order(one, work, jobs, progress), strict=True):
-        gathered.add(group, scored)
+    scoring = _TriggerScoring(setup, said, clock, listed_only)
+    asked = ((group, path, gathered.wanted(log)) for log, (group, path) in enumerate(work))
+    for (group, _), outcome in zip(work, in_order(scoring, asked, len(work), jobs, progress), strict=True):
+        gathered.add(group, outcome)
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
     return Score(evaluate(results, rules), gathered.traces, (Path(triggers), *setup.inputs))
+
+
+@dataclass(frozen=True)
+class _TriggerScoring:
+    """Scores one log by the triggers that are `said` about it, by detector and recording."""
+
+    setup: BenchmarkFile
+    said: Mapping[str, Mapping[str, Triggered]]
+    clock: str
+    listed_only: bool
+
+    def __call__(self, item: tuple[str, Path, WantedTraces]) -> LogOutcome:
+        group, path, wanted = item
+        scored = score_log(self.setup, group, path, self._detect, {})
+        for name, said in self.said.items():
+            scored.skipped += _beside(scored, name, said, self.clock)
+        return outcome_of(scored, self.setup, NormalMotions(), wanted)
+
+    def _detect(self, operations: Sequence[Operation], _: Scored) -> list[list[Detection]]:
+        return [self._of_operation(operation) for operation in operations]
+
+    def _of_operation(self, operation: Operation) -> list[Detection]:
+        log = operation.name.removesuffix(f"#{operation.number}")
+        shift = operation.recording.origin if self.clock == "source" else 0.0
+        asked = [name for name, said in self.said.items() if log in said or not self.listed_only]
+        return [_detection(operation, name, self.said[name].get(log, Triggered()), shift) for name in asked]
 
 
 def _unlisted(

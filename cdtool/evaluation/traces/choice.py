@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
-from dataclasses import dataclass, field
-
-from cdtool.evaluation.traces.trace import Trace
+from dataclasses import dataclass, field, replace
 
 # Operations with a miss or a false alarm, the slowest ones, and those taken evenly from all.
 MOST_STRIKING, MOST_SLOW, MOST_SAMPLED = 70, 20, 20
@@ -15,49 +12,64 @@ MOST_KEPT = MOST_STRIKING + MOST_SLOW + MOST_SAMPLED
 
 @dataclass
 class TraceChoice:
-    """Selection of at most `MOST_KEPT` traces from operations in order; `work` is the number of logs.
+    """Selection of at most `MOST_KEPT` operations, and one of each group, from operations in order.
 
-    A trace is computed only for an operation that is kept at that moment, so that thousands need no memory.
+    `work` is the number of logs. The choice becomes stricter with each operation: one that is not kept when it is
+    offered is not kept later, and one that a choice after fewer operations does not keep is not kept either.
     """
 
     work: int
     left_out: int = 0
-    _striking: dict[int, Trace] = field(default_factory=dict)
-    _sampled: dict[int, Trace] = field(default_factory=dict)
-    _slow: list[tuple[float, int, Trace]] = field(default_factory=list)
-    _first: dict[str, tuple[int, int, Trace]] = field(default_factory=dict)
+    _striking: dict[int, str] = field(default_factory=dict)
+    _sampled: set[int] = field(default_factory=set)
+    _slow: list[tuple[float, int]] = field(default_factory=list)
+    _first: dict[str, tuple[int, int]] = field(default_factory=dict)
     _taken: int = 0
 
-    def offer(
-        self, log: int, group: str, panels: int, striking: str, slowest: float, make: Callable[[str], Trace]
-    ) -> None:
-        """One operation of log number `log`: how many detectors judged it, what is striking in it, its slowest latency.
+    def offer(self, log: int, group: str, panels: int, striking: str, slowest: float) -> int | None:
+        """Return the operation's number if it is kept at this moment, otherwise None.
 
-        `make` gives the trace for the reason why it is kept.
+        `log` is the number of its log, `panels` that of the detectors that judged it, `striking` states what is
+        striking in it, `slowest` is its longest latency [s].
         """
         number = self._taken
         self._taken += 1
-        if group not in self._first or panels > self._first[group][0]:
-            self._first[group] = (panels, number, make("example of its group"))
-        if striking:
-            if len(self._striking) < MOST_STRIKING:
-                self._striking[number] = make(striking)
-            else:
-                self.left_out += 1
-            return
-        if log % max(1, -(-self.work // MOST_SAMPLED)) == 0 and len(self._sampled) < MOST_SAMPLED:
-            self._sampled[number] = make("evenly sampled from all")
-            return
-        if slowest > 0.0 and (len(self._slow) < MOST_SLOW or slowest > self._slow[0][0]):
-            item = (slowest, -number, make("among the slowest"))
-            if len(self._slow) < MOST_SLOW:
-                heapq.heappush(self._slow, item)
-            else:
-                heapq.heapreplace(self._slow, item)
+        is_first = group not in self._first or panels > self._first[group][0]
+        if is_first:
+            self._first[group] = panels, number
+        return number if self._taken_up(number, log, striking, slowest) or is_first else None
 
-    def kept(self) -> tuple[Trace, ...]:
-        """The traces in the order in which they came."""
-        chosen = {number: trace for _, number, trace in self._first.values()}
-        chosen |= {-number: trace for _, number, trace in self._slow}
-        chosen |= self._sampled | self._striking
-        return tuple(chosen[number] for number in sorted(chosen))
+    def _taken_up(self, number: int, log: int, striking: str, slowest: float) -> bool:
+        if striking:
+            if len(self._striking) == MOST_STRIKING:
+                self.left_out += 1
+                return False
+            self._striking[number] = striking
+            return True
+        if log % max(1, -(-self.work // MOST_SAMPLED)) == 0 and len(self._sampled) < MOST_SAMPLED:
+            self._sampled.add(number)
+            return True
+        if slowest > 0.0 and len(self._slow) < MOST_SLOW:
+            heapq.heappush(self._slow, (slowest, -number))
+            return True
+        if slowest > 0.0 and slowest > self._slow[0][0]:
+            heapq.heapreplace(self._slow, (slowest, -number))
+            return True
+        return False
+
+    def kept(self) -> dict[int, str]:
+        """Return the numbers of the operations that are kept, in order, and why."""
+        why = {number: "example of its group" for _, number in self._first.values()}
+        why |= {-number: "among the slowest" for _, number in self._slow}
+        why |= dict.fromkeys(self._sampled, "evenly sampled from all") | self._striking
+        return dict(sorted(why.items()))
+
+    def copy(self) -> TraceChoice:
+        """Return a choice that continues alone."""
+        return replace(
+            self,
+            _striking=dict(self._striking),
+            _sampled=set(self._sampled),
+            _slow=list(self._slow),
+            _first=dict(self._first),
+        )

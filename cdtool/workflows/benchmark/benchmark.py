@@ -10,9 +10,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from cdtool.detectors import DETECTORS
+from cdtool.detectors.base import Detector
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.false_alarm_budget import Budget
@@ -23,6 +22,8 @@ from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut, LimitsUnchecked
 from cdtool.kernel_warm_up import compile_loaded
 from cdtool.operations import Operation
+from cdtool.plausible import PlausibleRanges
+from cdtool.recording import FloatArray
 from cdtool.registry import plugin_packages
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
@@ -35,11 +36,13 @@ from cdtool.workflows.benchmark.benchmark_file import (
     with_only,
 )
 from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds, that_can_run
-from cdtool.workflows.benchmark.scoring import Scored, detect_with, score_log
+from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
+from cdtool.workflows.benchmark.scoring import detect_with, score_log
 from cdtool.workflows.gathering import Gathering
-from cdtool.workflows.runs import Progress, RunReading, in_order, load_runs, shown_path
+from cdtool.workflows.runs import RunReading, load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normal_motions
 from cdtool.workflows.signature.threshold_settings import set_by_hand
+from cdtool.workflows.workers import Progress, in_order
 
 
 @dataclass(frozen=True)
@@ -128,34 +131,46 @@ def benchmark(
         left_out.append(RecordingFinding.of(str(setup.path), unchecked))
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
-    detect = detect_with(setup, used, learned.thresholds, learned.unusable)
     factors = _factors(setup, learned.thresholds)
-    gathered = Gathering(
-        setup,
-        setup.detectors,
-        factors,
-        {op.recording.digest: op.recording.name for op in learn.operations},
-        NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS),
-    )
+    sources = {operation.recording.digest: operation.recording.name for operation in learn.operations}
+    gathered = Gathering(setup, setup.detectors, factors, sources)
     gathered.skipped += [*learn.skipped, *learned.skipped]
     gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
     gathered.findings += [*learn.findings, *left_out, *learned.not_assessable]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-
-    def score(item: tuple[str, Path]) -> Scored:
-        return score_log(setup, item[0], item[1], detect, factors, learn.ranges)
-
-    for (group, _), scored in zip(work, in_order(score, work, jobs, progress), strict=True):
-        gathered.add(group, scored)
-        seconds["reading"] += scored.reading
-        seconds["detecting"] += scored.detecting
+    normals = NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS)
+    scoring = _LogScoring(setup, tuple(used), learned.thresholds, learned.unusable, factors, learn.ranges, normals)
+    asked = ((group, path, gathered.wanted(log)) for log, (group, path) in enumerate(work))
+    for (group, _), outcome in zip(work, in_order(scoring, asked, len(work), jobs, progress), strict=True):
+        gathered.add(group, outcome)
+        seconds["reading"] += outcome.reading
+        seconds["detecting"] += outcome.detecting
     provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))
     provenance["units"] |= gathered.units
     results = gathered.results(provenance, learned.calibration)
     return Benchmark(evaluate(results, setup.limits), gathered.traces, seconds, setup.inputs)
 
 
-def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, np.ndarray]:
+@dataclass(frozen=True)
+class _LogScoring:
+    """Scores one log with every detector: what `score_log` needs for any log of the benchmark."""
+
+    setup: BenchmarkFile
+    detectors: tuple[Detector, ...]
+    thresholds: Mapping[str, tuple[FittedThreshold, ...]]
+    unusable: Mapping[str, str]
+    factors: Mapping[str, FloatArray]
+    ranges: PlausibleRanges
+    normals: NormalMotions
+
+    def __call__(self, item: tuple[str, Path, WantedTraces]) -> LogOutcome:
+        group, path, wanted = item
+        detect = detect_with(self.setup, self.detectors, self.thresholds, self.unusable)
+        scored = score_log(self.setup, group, path, detect, self.factors, self.ranges)
+        return outcome_of(scored, self.setup, self.normals, wanted)
+
+
+def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, FloatArray]:
     """Return the safety factors of the sweep by detector; empty without an impact-free group."""
     if HOLDOUT not in setup.impacts:
         return {}

@@ -10,10 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.evaluation.results import ExposureResult, SweepResult
-from cdtool.evaluation.sweep import Swept
-from cdtool.evaluation.truth.matching import Matching
-from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
+from cdtool.workflows.benchmark.log_outcome import DetectorOutcome
 
 
 @dataclass
@@ -27,15 +25,13 @@ class Exposure:
     samples: int = 0
     by_reason: Counter[str] = field(default_factory=Counter)
 
-    def add(self, detection: Detection) -> None:
+    def add(self, outcome: DetectorOutcome) -> None:
         """Add one operation."""
         self.operations += 1
-        self.seconds += detection.assessed_seconds
-        self.not_assessable += detection.verdict.outcome == "not_assessable"
-        size = detection.statistic.status.size
-        self.samples += size
-        for reason, share in detection.statistic.shares().items():
-            self.by_reason[reason] += round(share * size)
+        self.seconds += outcome.seconds
+        self.not_assessable += outcome.is_not_assessable
+        self.samples += outcome.samples
+        self.by_reason.update(outcome.by_reason)
 
     def result(self, group: str, detector: str) -> ExposureResult:
         """Return the row of results.json."""
@@ -55,22 +51,21 @@ class SweepRows:
     _latency: dict[tuple[str, str], list[FloatArray]] = field(default_factory=dict)
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
 
-    def add(self, group: str, detection: Detection, swept: Swept | None, matching: Matching) -> None:
+    def add(self, group: str, outcome: DetectorOutcome) -> None:
         """Add one operation of one detector."""
-        name = detection.detector
+        name, swept = outcome.detector, outcome.swept
         if swept is None:
             return
         if group == self.impact_free:
-            if detection.assessed_seconds <= 0.0:
+            if outcome.seconds <= 0.0:
                 return  # an operation without an assessable sample does not count as exposure
             self._false_alarms[name] = self._false_alarms.get(name, 0) + swept.false_alarms
             operations, seconds = self._watched.get(name, (0, 0.0))
-            self._watched[name] = operations + 1, seconds + detection.assessed_seconds
+            self._watched[name] = operations + 1, seconds + outcome.seconds
             return
-        outcomes = [match.outcome for match in matching.matches]
-        seen = np.array([outcome in ("detected", "missed") for outcome in outcomes], dtype=bool)
+        seen = np.array([item in ("detected", "missed") for item in outcome.outcomes], dtype=bool)
         self._latency.setdefault((name, group), []).append(swept.latency[:, seen])
-        self._blind[name, group] += outcomes.count("not_assessable")
+        self._blind[name, group] += outcome.outcomes.count("not_assessable")
 
     def rows(self, detectors: Sequence[str], groups: Sequence[str]) -> Iterator[SweepResult]:
         """Return a row for each detector, group of impacts and safety factor."""

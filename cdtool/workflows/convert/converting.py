@@ -27,7 +27,7 @@ from cdtool.workflows.channel_rows import channel_rows
 from cdtool.workflows.log_rows import LogRows
 
 if TYPE_CHECKING:
-    from cdtool.workflows.runs import Progress
+    from cdtool.workflows.workers import Progress
 
 _WRITERS = {
     ".csv": "cdtool.formats.csv_writing:write_csv_table",

@@ -18,11 +18,12 @@ from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import Progress, RunReading, check_joints, load_runs
+from cdtool.workflows.runs import RunReading, check_joints, load_runs
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.signature.normal_runs import normal_motions
 from cdtool.workflows.signature.threshold_settings import set_by_hand
+from cdtool.workflows.workers import Progress
 
 
 @dataclass(frozen=True)

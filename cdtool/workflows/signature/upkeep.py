@@ -27,10 +27,11 @@ from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import Progress, RunReading, Runs, load_runs
+from cdtool.workflows.runs import RunReading, Runs, load_runs
 from cdtool.workflows.signature.fitting import Pair, signals_of
 from cdtool.workflows.signature.learning import learned_run
 from cdtool.workflows.signature.normal_runs import with_operation
+from cdtool.workflows.workers import Progress
 
 # False-alarm probability per operation that the runs must demonstrate, and the smallest one that can be required.
 TARGET, LEAST_TARGET = 1e-3, 1e-9

@@ -1,0 +1,142 @@
+"""Work on many items, in this process or in several, with the results in the order of the items.
+
+Reading and judging a log hold Python's interpreter lock most of the time, so threads would not save time: jobs are
+processes. They are started when the work begins and receive it once. On Linux they are forked from this process and
+share its compiled kernels; elsewhere, and if this process has several threads, they are new processes of Python.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from itertools import islice
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from cdtool.errors import WorkerError
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing.context import BaseContext
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+# Called after each piece of work with the amount done and the total.
+Progress = Callable[[int, int], None]
+
+# In a worker: what is done with each item.
+_work: Callable[[Any], Any] | None = None
+
+
+def in_order(
+    work: Callable[[Item], Made], items: Iterable[Item], total: int, jobs: int = 1, progress: Progress | None = None
+) -> Iterator[Made]:
+    """Yield `work` of each item, in order, whatever the number of `jobs`.
+
+    With more than one job, `work` and the items must be picklable. An item is taken from `items` when its work begins,
+    at most two per job before its result is yielded, so that waiting results need little memory.
+
+    Parameters
+    ----------
+    work : callable
+        Returns the result of one item.
+    items : iterable
+        The items.
+    total : int
+        Their number.
+    jobs : int, optional
+        Number of processes; with 1, or with a single item, the work is done in this process.
+    progress : callable, optional
+        Called after each item with the number done and the total.
+
+    Yields
+    ------
+    object
+        The result of each item.
+
+    Raises
+    ------
+    WorkerError
+        A process ended before its result.
+
+    Examples
+    --------
+    >>> list(in_order(abs, [-1, 2, -3], total=3))
+    [1, 2, 3]
+    """
+    made = map(work, items) if min(jobs, total) <= 1 else _by_processes(work, items, min(jobs, total))
+    for number, result in enumerate(made, 1):
+        yield result
+        if progress:
+            progress(number, total)
+
+
+def _by_processes(work: Callable[[Item], Made], items: Iterable[Item], jobs: int) -> Iterator[Made]:
+    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+
+    waiting = iter(items)
+    with ProcessPoolExecutor(jobs, _context(), initializer=_begin, initargs=(work,)) as pool, _stopping(pool):
+        ahead = deque(pool.submit(_do, item) for item in islice(waiting, 2 * jobs))
+        while ahead:
+            try:
+                made = ahead.popleft().result()
+            except BrokenProcessPool as fault:
+                raise WorkerError(
+                    "a worker process ended before its result", "with too little memory, use a smaller --jobs"
+                ) from fault
+            yield made
+            ahead.extend(pool.submit(_do, item) for item in islice(waiting, 1))
+
+
+def _context() -> BaseContext:
+    """Return how processes are started: a fork with other threads could keep a lock for ever."""
+    from multiprocessing import get_context
+
+    alone = threading.active_count() == 1
+    return get_context("fork" if sys.platform == "linux" and alone else "spawn")
+
+
+def _begin(work: Callable[[Any], Any]) -> None:
+    """Prepare a worker: it leaves Ctrl-C to the first process, and ends with it even if that is killed."""
+    global _work
+    _work = work
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _do(item: Any) -> Any:
+    assert _work is not None
+    try:
+        return _work(item)
+    except SystemExit:  # told to end: temporary files are removed by now
+        os._exit(1)
+
+
+@contextmanager
+def _stopping(pool: ProcessPoolExecutor) -> Iterator[None]:
+    """If the block ends early, cancel work that has not begun and end the processes started in it."""
+    from multiprocessing import active_children
+
+    others = set(active_children())
+    try:
+        yield
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(active_children()) - others:
+            child.terminate()
+        raise
