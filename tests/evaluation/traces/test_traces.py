@@ -8,6 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
 from cdtool.evaluation.traces.choice import MOST_KEPT, TraceChoice
@@ -101,30 +103,54 @@ def test_the_file_is_strict_json_with_unassessable_samples(tmp_path):
     json.loads(text, parse_constant=lambda name: pytest.fail(name))
 
 
-def choose(outcomes: list[tuple[str, float]], work: int | None = None) -> tuple[Trace, ...]:
+def choose(outcomes: list[tuple[str, float]], work: int | None = None) -> dict[int, str]:
     choice = TraceChoice(work or len(outcomes))
-    base = trace()
     for number, (striking, slowest) in enumerate(outcomes):
-        choice.offer(
-            number, "stiff", 1, striking, slowest, lambda why, n=number: replace(base, recording=str(n), chosen=why)
-        )
+        choice.offer(number, "stiff", 1, striking, slowest)
     return choice.kept()
 
 
 def test_all_missed_the_slowest_and_a_sample_are_kept_in_order():
     outcomes = [("missed by gm" if i % 500 == 7 else "", float(i % 997)) for i in range(3000)]
     kept = choose(outcomes)
-    numbers = [int(item.recording) for item in kept]
+    numbers = list(kept)
     assert numbers == sorted(numbers) and len(kept) <= MOST_KEPT + 1
     assert {7, 507, 1007, 1507, 2007, 2507} <= set(numbers)
     slowest = sorted(range(3000), key=lambda i: -(i % 997))[:3]
     assert set(slowest) <= set(numbers)
-    assert sum(item.chosen == "evenly sampled from all" for item in kept) == 20
+    assert sum(why == "evenly sampled from all" for why in kept.values()) == 20
 
 
 def test_misses_beyond_the_maximum_are_counted():
     choice = TraceChoice(500)
-    base = trace()
     for number in range(500):
-        choice.offer(number, "stiff", 1, "missed by gm", 0.0, lambda why: replace(base, chosen=why))
+        choice.offer(number, "stiff", 1, "missed by gm", 0.0)
     assert len(choice.kept()) <= MOST_KEPT and choice.left_out == 500 - 70
+
+
+OPERATIONS = st.lists(
+    st.tuples(
+        st.sampled_from(["stiff", "soft"]),
+        st.integers(1, 3),
+        st.sampled_from(["", "", "", "missed by gm"]),
+        st.sampled_from([0.0, 0.01, 0.02, 0.03, 0.5]),
+    ),
+    max_size=300,
+)
+
+
+@given(OPERATIONS, st.integers(0, 20), st.integers(1, 3))
+def test_what_a_choice_keeps_was_wanted_by_every_earlier_state_of_it(operations, behind, of_a_log):
+    """Workers decide from the state of some logs before: none of the traces kept at the end may be missing."""
+    logs = [operations[i : i + of_a_log] for i in range(0, len(operations), of_a_log)]
+    choice, states, wanted = TraceChoice(len(logs)), [], set()
+    for log, inside in enumerate(logs):
+        states.append(choice.copy())
+        early, number = states[max(0, log - behind)].copy(), log * of_a_log
+        for operation in inside:
+            was_wanted = early.offer(log, *operation) is not None
+            if choice.offer(log, *operation) is not None:
+                assert was_wanted
+            wanted |= {number} if was_wanted else set()
+            number += 1
+    assert set(choice.kept()) <= wanted

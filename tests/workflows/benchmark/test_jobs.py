@@ -1,0 +1,79 @@
+"""A benchmark in several processes: everything that goes to a worker and back, and the same bytes for any number."""
+
+import pickle
+import threading
+from pathlib import Path
+
+import pytest
+
+import cdtool
+from cdtool.evaluation.results_file import to_json
+from cdtool.evaluation.traces.file import encode_traces
+from cdtool.thresholds import THRESHOLDS
+from cdtool.workflows import runs
+from cdtool.workflows.benchmark import benchmark as benchmark_module
+
+FILE = """machine = "machine.toml"
+threshold = "{threshold}"
+
+[learn]
+logs = ["free/*.csv"]
+[holdout]
+logs = ["holdout/*.csv"]
+[impacts.stiff]
+logs = ["stiff/*.csv", "damaged/*.csv"]
+[onset]
+above_n = 20.0
+back_to_n = 8.0
+"""
+
+
+@pytest.fixture(scope="module")
+def gate(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("gate")
+    cdtool.simulate_gate(folder, {"free": 11, "holdout": 3, "stiff": 4}, seed=16)
+    damaged = folder / "damaged"
+    damaged.mkdir()
+    (damaged / "1.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
+    text = (folder / "stiff" / "01.csv").read_text(encoding="utf-8").splitlines()
+    (damaged / "2.csv").write_text("\n".join(text[:2000] + text[2400:]) + "\n", encoding="utf-8")
+    return folder
+
+
+def run(folder: Path, threshold: str, jobs: int = 1) -> bytes:
+    file = folder / f"{threshold}.toml"
+    file.write_text(FILE.format(threshold=threshold), encoding="utf-8")
+    detectors = ["all"] if threshold == "signature" else ["momentum", "friction_ekf"]
+    done = cdtool.benchmark(file, detectors=detectors, jobs=jobs)
+    assert done.traces and done.results.skipped
+    return to_json(done.results).encode() + encode_traces(done.traces)
+
+
+@pytest.mark.parametrize("threshold", THRESHOLDS.names())
+def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, threshold, monkeypatch):
+    alone = run(gate, threshold)
+    sent = []
+
+    def by_pickles(work, items, total, jobs=1, progress=None):
+        work = pickle.loads(pickle.dumps(work))
+        for item in items:
+            result = pickle.dumps(work(pickle.loads(pickle.dumps(item))))
+            sent.append(len(result))
+            yield pickle.loads(result)
+
+    monkeypatch.setattr(benchmark_module, "in_order", by_pickles)
+    monkeypatch.setattr(runs, "in_order", by_pickles)
+    assert run(gate, threshold) == alone
+    assert len(sent) == 20
+
+
+@pytest.mark.parametrize("others", [0, 1], ids=["forked", "spawned"])
+def test_results_and_traces_are_the_same_bytes_for_any_number_of_jobs(gate, others):
+    stop = threading.Event()
+    threads = [threading.Thread(target=stop.wait) for _ in range(others)]
+    for thread in threads:
+        thread.start()
+    try:
+        assert len({run(gate, "signature", jobs) for jobs in (1, 3)}) == 1
+    finally:
+        stop.set()
