@@ -1,66 +1,164 @@
-"""The whole `cdtool benchmark` of 114 simulated gate recordings: seconds, and the share of each part.
+"""What one more recording costs `cdtool benchmark`: five detectors on 7 s of a gate at 1 kHz, read from CSV.
 
-    python benchmarks/whole_benchmark.py [--jobs N]
+CPU time from the first scored log to the last, per log: start-up, learning, final statistics and reports are not in it.
+The peer is `bare_script.py`. 200 and 2,000 recordings, with one job and with two, at least five rounds; every run is a
+new process.
 
-Reading, detecting and reporting each run from CSV on disk to the report folder with its plots. With more than one job,
-reading and detecting are the workers' sums: they may exceed the time on the clock.
+python benchmarks/whole_benchmark.py            # some minutes; 1 GB in the temporary folder
+python benchmarks/whole_benchmark.py --guard    # 50 recordings in one process, some seconds: for a CI pipeline
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
-from timing import environment, table
+import bare_script
+from timing import Spread, main, ratio, table, verdict
 
-from cdtool.report.outputs import write_outputs
-from cdtool.report.writers.base import Report
 from cdtool.simulation.gate_recordings import write_gate_recordings
-from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
+from cdtool.workflows.benchmark.benchmark import benchmark
 
-COUNTS = {"free": 14, "holdout": 40, "stiff": 30, "soft": 30}
+COUNTS = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
+COPIES = 10
 SEED = 1
-ROUNDS = 3
+ROUNDS = 5
+AT_MOST_MS = 12.0
+AT_LEAST_FASTER = 1.8
+AT_MOST_MORE_MIB = 250.0
+# The guard: 12 ms against the bare script's 3.3 ms are 3.6 times its cost; it fails at twice that.
+GUARD_COUNTS = {"free": 11, "holdout": 17, "stiff": 17, "soft": 16}
+GUARD_ROUNDS = 3
+GUARD_AT_MOST = 7.3
+
+_RUN = "import json, sys; from whole_benchmark import run; print(json.dumps(run(sys.argv[1], int(sys.argv[2]))))"
+_BARE = "import sys; from whole_benchmark import bare; print(bare(sys.argv[1]))"
 
 
-def measure(jobs: int) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        logs = Path(folder) / "gate"
-        begin = perf_counter()
-        written = write_gate_recordings(logs, COUNTS, SEED, file_format="csv")
-        print(f"{written} recordings simulated and written in {perf_counter() - begin:.1f} s (not counted below)")
-        size = sum(path.stat().st_size for path in logs.rglob("*.csv")) * 1e-6
-        rows = []
-        for number in range(1, ROUNDS + 1):
-            begin = perf_counter()
-            done = benchmark(logs / "benchmark.toml", jobs=jobs)
-            reported = perf_counter()
-            write_outputs(Report(done.evaluated, done.traces), [_new_folder(Path(folder), number)])
-            end = perf_counter()
-            rows.append(_row(number, end - begin, reported - begin, end - reported, done))
-        print(f"{size:.0f} MB of CSV, {len(done.results.detectors)} detectors, {jobs} job(s)\n")
-        table(("round", "total s", "reading", "detecting", "reporting", "rest", "recordings/s"), rows)
-    print("shares of the total; round 1 also compiles or loads kernels and imports pandas and matplotlib")
+def run(folder: str, jobs: int) -> dict[str, float]:
+    """Return CPU time [s] of this process and time on the clock [s] per scored log, and peak memory [MiB]."""
+    import resource
+
+    seen: list[tuple[int, float, float]] = []
+    done = benchmark(
+        Path(folder) / "benchmark.toml",
+        jobs=jobs,
+        progress=lambda number, _: seen.append((number, process_time(), perf_counter())),
+    )
+    # Workers start with the first logs; afterwards each log that comes back took its share of the time.
+    first, last = seen[2 * jobs], seen[-1]
+    logs = last[0] - first[0]
+    assert last[0] == len(done.results.recordings)
+    peaks = [resource.getrusage(who).ru_maxrss / 1024.0 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return {
+        "cpu": (last[1] - first[1]) / logs,
+        "clock": (last[2] - first[2]) / logs,
+        "logs": logs,
+        "peak": peaks[0],
+        "worker": peaks[1] if jobs > 1 else 0.0,
+    }
 
 
-def _new_folder(parent: Path, number: int) -> Path:
-    folder = parent / f"report_{number}"
-    folder.mkdir()
-    return folder
+def bare(folder: str) -> float:
+    """Return the CPU time of the bare script per scored log [s]."""
+    return bare_script.cost(*_logs(Path(folder)))
 
 
-def _row(number: int, total: float, analysing: float, reporting: float, done: Benchmark) -> tuple[object, ...]:
-    reading, detecting = done.seconds["reading"], done.seconds["detecting"]
-    rest = max(analysing - reading - detecting, 0.0)
-    shares = (f"{100 * part / total:.0f} %" for part in (reading, detecting, reporting, rest))
-    return (number, f"{total:.2f}", *shares, f"{sum(COUNTS.values()) / total:.0f}")
+def _logs(folder: Path) -> tuple[list[Path], list[Path]]:
+    scored = [path for group in ("holdout", "stiff", "soft") for path in sorted((folder / group).glob("*.csv"))]
+    return sorted((folder / "free").glob("*.csv")), scored
+
+
+def measure() -> bool:
+    with tempfile.TemporaryDirectory() as name:
+        few, many = Path(name) / "200", Path(name) / "2000"
+        write_gate_recordings(few, COUNTS, SEED, file_format="csv")
+        _multiply(few, many)
+        found: dict[str, list[dict[str, float]]] = {"200, 1 job": [], "2000, 1 job": [], "2000, 2 jobs": []}
+        peers = []
+        for number in range(-1, ROUNDS):
+            made = {
+                "200, 1 job": _in_process(_RUN, few, 1),
+                "2000, 1 job": _in_process(_RUN, many, 1),
+                "2000, 2 jobs": _in_process(_RUN, many, 2),
+            }
+            peer = float(_in_process(_BARE, few))
+            if number >= 0:
+                peers.append(peer)
+                for key, text in made.items():
+                    found[key].append(json.loads(text))
+            print(f"round {number + 1} of {ROUNDS}", file=sys.stderr, flush=True)
+    return _judged(found, peers)
+
+
+def _judged(found: dict[str, list[dict[str, float]]], peers: list[float]) -> bool:
+    alone, together = found["2000, 1 job"], found["2000, 2 jobs"]
+    held = [
+        verdict(f"CPU time per recording, {key}, ms", _spread(found[key], "cpu", 1e3), AT_MOST_MS, at_most=True)
+        for key in ("200, 1 job", "2000, 1 job")
+    ]
+    faster = ratio([item["clock"] for item in alone], [item["clock"] for item in together])
+    held.append(verdict("1 job / 2 jobs, time on the clock", faster, AT_LEAST_FASTER))
+    more = Spread.of([item["worker"] for item in together])
+    held.append(verdict("memory of a worker, MiB", more, AT_MOST_MORE_MIB, at_most=True))
+    rows = [
+        (key, _spread(each, "cpu", 1e3), _spread(each, "clock", 1e3), _spread(each, "peak"))
+        for key, each in found.items()
+    ]
+    rows.append(("bare script", Spread.of([1e3 * item for item in peers]), "", ""))
+    print()
+    table(("recordings", "CPU ms (low-high)", "clock ms (low-high)", "peak MiB (low-high)"), rows)
+    print("per recording. With 2 jobs the CPU time is that of the first process, without its workers'.")
+    return all(held)
+
+
+def _spread(each: list[dict[str, float]], key: str, times: float = 1.0) -> Spread:
+    return Spread.of([times * item[key] for item in each])
+
+
+def _multiply(few: Path, many: Path) -> None:
+    """Write each scored log several times, each with another last digit in a cell: equal logs are refused."""
+    shutil.copytree(few, many, ignore=shutil.ignore_patterns("contacts.csv"))
+    for path in _logs(many)[1]:
+        head, first, rest = path.read_text(encoding="utf-8").split("\n", 2)
+        for copy in range(1, COPIES):
+            text = f"{head}\n{first[:-1]}{copy}\n{rest}"
+            path.with_name(f"{path.stem}_{copy}.csv").write_text(text, encoding="utf-8", newline="\n")
+
+
+def _in_process(code: str, *arguments: object) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        check=True,
+        capture_output=True,
+        text=True,
+        cwd=Path(__file__).parent,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    return done.stdout.splitlines()[-1]
+
+
+def guard() -> bool:
+    """Compare with the bare script in this process, in turns: the ratio of two costs, whatever the machine's speed."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_gate_recordings(folder, GUARD_COUNTS, SEED, file_format="csv")
+        pairs = [(run(str(folder), 1)["cpu"], bare(str(folder))) for _ in range(1 + GUARD_ROUNDS)][1:]
+    ours, theirs = (min(each) for each in zip(*pairs, strict=True))
+    smallest = Spread.of([ours / theirs])
+    print(f"cdtool {1e3 * ours:.1f} ms of CPU time per recording, bare script {1e3 * theirs:.1f} ms")
+    return verdict("cdtool benchmark / bare script, smallest CPU time", smallest, GUARD_AT_MOST, at_most=True)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--jobs", type=int, default=1, help="logs analysed side by side")
-    arguments = parser.parse_args()
-    print(f"== cdtool benchmark of {sum(COUNTS.values())} gate recordings\n{environment()}", flush=True)
-    measure(arguments.jobs)
+    parser.add_argument("--guard", action="store_true", help="only the ratio to the bare script, in one process")
+    chosen = parser.parse_args()
+    main("cdtool benchmark, per recording", guard if chosen.guard else measure)

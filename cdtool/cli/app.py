@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperGroup
 
 from cdtool.cli.streams import lost_output, open_standard_streams
-from cdtool.errors import CdtoolError, UsageError, WorkerError
+from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
 from cdtool.plain_text import one_line
 
@@ -220,8 +220,6 @@ def _show_fault(fault: Exception) -> Fact:
 
 
 def _known_fault(fault: Exception) -> tuple[CdtoolError, Fact] | None:
-    if isinstance(fault, WorkerError):
-        return fault, Fact.NOTHING_USABLE
     if isinstance(fault, CdtoolError):
         return fault, Fact.WRONG_USAGE
     if isinstance(fault, OSError):
