@@ -45,7 +45,7 @@ class SpeedCurve:
     @cached_property
     def grid(self) -> FloatArray:
         """The grid points (g,)."""
-        points: FloatArray = self.step * np.arange(len(self.mean))
+        points: FloatArray = np.arange(len(self.mean), dtype=np.float64) * self.step
         return points
 
     @cached_property
