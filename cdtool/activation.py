@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypedDict
 
@@ -102,32 +102,35 @@ class Activation:
         return needed
 
     def alarms(
-        self, statistic: Signal, band: Band, inner: Band | None = None, begins: Sequence[float] = ()
+        self,
+        statistic: Signal,
+        band: Band,
+        inner: Band | None = None,
+        begins: Sequence[float] = (),
+        needed: Callable[[], npt.NDArray[np.int64]] | None = None,
     ) -> tuple[tuple[Alarm, ...], tuple[Alarm, ...]]:
         """Return alarms and all crossings (debounced exits from the band, armed or not) of all joints, in time order.
 
         `inner`: the band within which an alarm is re-armed, with hysteresis; `begins` [s]: start of operations, at
-        which every alarm is re-armed.
+        which every alarm is re-armed. `needed` returns the debounce on the statistic's clock, if that is known.
         """
-        needed = self.needed(statistic.time)
-        fresh = begins_at(statistic.time, begins)
         alarms: list[Alarm] = []
         crossings: list[Alarm] = []
+        time, nearer = statistic.time, inner or band
+        outside, calm = (np.empty(len(time), dtype=np.bool_) for _ in range(2))
         for joint in range(statistic.values.shape[1]):
-            value = np.ascontiguousarray(statistic.values[:, joint])
-            lower = np.ascontiguousarray(band.lower[:, joint])
-            upper = np.ascontiguousarray(band.upper[:, joint])
+            value, lower, upper = (_column(item, joint) for item in (statistic.values, band.lower, band.upper))
+            inner_lower, inner_upper = (_column(item, joint) for item in (nearer.lower, nearer.upper))
+            if not _mark(value, lower, upper, inner_lower, inner_upper, outside, calm):
+                continue
             status = np.ascontiguousarray(statistic.status[:, joint])
-            outside = (value > upper) | (value < lower)
-            calm = ~outside
-            if inner is not None:
-                calm &= ~((value > inner.upper[:, joint]) | (value < inner.lower[:, joint]))
-            at, armed = crossings_of(statistic.time, outside, calm, status, needed, self.wait, fresh)
+            debounce = needed() if needed else self.needed(time)
+            at, armed = crossings_of(time, outside, calm, status, debounce, self.wait, begins_at(time, begins))
             for k, was_armed in zip(at, armed, strict=True):
                 above = bool(value[k] > upper[k])
                 limit = float(upper[k] if above else lower[k])
                 side = "above" if above else "below"
-                crossing = Alarm(float(statistic.time[k]), joint, side, float(value[k]), limit)  # type: ignore[arg-type]
+                crossing = Alarm(float(time[k]), joint, side, float(value[k]), limit)  # type: ignore[arg-type]
                 crossings.append(crossing)
                 if was_armed:
                     alarms.append(crossing)
@@ -172,6 +175,29 @@ class Activation:
         since = np.minimum(np.maximum.accumulate(np.where(outside, places, -1)) + 1, len(known) - 1)
         armed = np.flatnonzero(~outside & (places > since) & (time - time[since] >= self.wait))
         return float(time[armed[0]]) if len(armed) else math.inf
+
+
+def _column(values: FloatArray, joint: int) -> FloatArray:
+    return np.ascontiguousarray(values[:, joint], dtype=np.float64)
+
+
+@kernel(f"boolean({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, b1[::1], b1[::1])")
+def _mark(
+    value: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    inner_lower: FloatArray,
+    inner_upper: FloatArray,
+    outside: BoolArray,
+    calm: BoolArray,
+) -> bool:
+    """Mark the values `outside` their limits, and those inside the inner limits too; return whether any is outside."""
+    any_outside = False
+    for k in range(len(value)):
+        outside[k] = value[k] > upper[k] or value[k] < lower[k]
+        calm[k] = not (outside[k] or value[k] > inner_upper[k] or value[k] < inner_lower[k])
+        any_outside = any_outside or outside[k]
+    return any_outside
 
 
 def begins_at(time: FloatArray, begins: Sequence[float]) -> BoolArray:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +73,19 @@ class Signal:
         """Return the median sample period [s]; 0 below two samples."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
+    def changed(self, **fields: Any) -> Signal:
+        """Return the signal with other fields on the same clock: its period stays known, if it is known."""
+        signal = replace(self, **fields)
+        if "period" in vars(self):
+            vars(signal)["period"] = self.period
+        return signal
+
+    def with_period(self, period: float) -> Signal:
+        """Return the signal with its median sample period [s], known from another signal on the same clock."""
+        signal = replace(self)
+        vars(signal)["period"] = period
+        return signal
+
     def watching(self, joints: Sequence[str]) -> Signal:
         """Return only the columns of these joints, in their order here; all columns if `joints` is empty.
 
@@ -84,8 +97,7 @@ class Signal:
             if joint not in self.joints:
                 raise ConfigurationError(f"unknown joint '{joint}'", nearest(joint, self.joints))
         columns = [i for i, joint in enumerate(self.joints) if joint in joints]
-        return replace(
-            self,
+        return self.changed(
             values=np.ascontiguousarray(self.values[:, columns]),
             status=np.ascontiguousarray(self.status[:, columns]),
             joints=tuple(self.joints[i] for i in columns),
@@ -98,7 +110,9 @@ class Signal:
         return slice(int(first), int(last))
 
     def part(self, rows: slice) -> Signal:
-        """Return these rows of the signal."""
+        """Return these rows of the signal; the signal itself for all rows."""
+        if rows == slice(None):
+            return self
         lost = None if self.lost is None else self.lost[rows]
         return replace(self, time=self.time[rows], values=self.values[rows], status=self.status[rows], lost=lost)
 
@@ -122,7 +136,9 @@ class Band:
     upper: FloatArray
 
     def part(self, rows: slice) -> Band:
-        """Return these rows of the band."""
+        """Return these rows of the band; the band itself for all rows."""
+        if rows == slice(None):
+            return self
         return Band(self.lower[rows], self.upper[rows])
 
 

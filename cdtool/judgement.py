@@ -5,8 +5,8 @@ With several classes of motion, the threshold that applies is selected sample by
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,8 @@ from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.base import FittedThreshold, as_matrix
+from cdtool.thresholds.comparison_kernel import LIMITED, OPEN_ABOVE, OPEN_BELOW, lower_factors, merge_share
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 
 
@@ -29,6 +30,21 @@ class _Share:
     signal: Signal
     rows: slice
     judges: BoolArray
+
+    @cached_property
+    def evaluated(self) -> tuple[Signal, Band]:
+        """Return the statistic and its band on these rows; raises RecordingError if the threshold fails."""
+        return checked_evaluation(self.threshold, self.recording, self.signal)
+
+    def at_share(self, share: float) -> tuple[Signal, Band]:
+        """Return `evaluated` at that share of the safety factor."""
+        changed = checked_factor(self.threshold, share * self.threshold.safety_factor)
+        return checked_evaluation(changed, self.recording, self.signal)
+
+    @cached_property
+    def met_at(self) -> tuple[Signal, FloatArray]:
+        """Return the statistic, and for each sample (rows, J) the safety factor at which its limit would be met."""
+        return checked_exceedance(self.threshold, self.recording, self.signal, self.evaluated)
 
 
 @dataclass(frozen=True)
@@ -53,11 +69,11 @@ class Judgement:
     @cached_property
     def evaluated(self) -> tuple[Signal, Band]:
         """Return the statistic and its band; raises RecordingError if a threshold fails."""
-        return self._with(lambda threshold: threshold)
+        return self._merged([share.evaluated for share in self._shares])
 
     def narrower(self, share: float) -> Band:
         """Return the band at that share of the safety factor."""
-        return self._with(lambda threshold: checked_factor(threshold, share * threshold.safety_factor))[1]
+        return self._merged([item.at_share(share) for item in self._shares])[1]
 
     @cached_property
     def met_at(self) -> FloatArray:
@@ -65,11 +81,11 @@ class Judgement:
         met = np.full(self.signal.values.shape, np.inf)
         judged = np.zeros(met.shape, dtype=bool)
         for share in self._shares:
-            statistic, exceeded = checked_exceedance(share.threshold, share.recording, share.signal)
-            use = statistic.valid & share.judges[:, np.newaxis]
-            met[share.rows] = np.where(use, np.minimum(met[share.rows], exceeded), met[share.rows])
-            judged[share.rows] |= use
-        return np.where(judged, met, -np.inf)
+            statistic, own = share.met_at
+            status = np.ascontiguousarray(statistic.status, dtype=np.uint8)
+            lower_factors(own, status, share.judges, share.rows.start, met, judged)
+        met[~judged] = -np.inf
+        return met
 
     @cached_property
     def _shares(self) -> tuple[_Share, ...]:
@@ -89,39 +105,46 @@ class Judgement:
         rows = slice(0, len(self.signal.time)) if whole else self.signal.rows(stroke.start, after)
         recording = self.recording if whole else self.recording.section(stroke.start, after)
         part = self.signal.part(rows)
-        elsewhere = ~judges[rows, np.newaxis] & part.valid
-        status = np.where(elsewhere, Status.OTHER_SPEED, part.status).astype(np.uint8)
-        return _Share(threshold, recording, replace(part, status=status), rows, judges[rows])
+        judges = judges[rows]
+        if not judges.all():
+            elsewhere = ~judges[:, np.newaxis] & part.valid
+            part = part.changed(status=np.where(elsewhere, Status.OTHER_SPEED, part.status).astype(np.uint8))
+        return _Share(threshold, recording, part, rows, judges)
 
-    def _with(self, changed: Callable[[FittedThreshold], FittedThreshold]) -> tuple[Signal, Band]:
+    def _merged(self, evaluated: Sequence[tuple[Signal, Band]]) -> tuple[Signal, Band]:
         """Merge several classes: the band that a sample exceeds least applies, so it is outside only if outside all."""
         shares = self._shares
         if len(shares) == 1 and shares[0].judges.all():
-            return checked_evaluation(changed(shares[0].threshold), shares[0].recording, shares[0].signal)
+            return evaluated[0]
         shape = self.signal.values.shape
-        values, unit = self.signal.values.copy(), self.signal.unit
+        values, unit = np.array(self.signal.values, order="C"), self.signal.unit
         recent = speed_is_recent(self.recording, self.classes, self.signal.time, self.hold)[:, np.newaxis]
         unjudged = np.where(recent, Status.OTHER_SPEED, Status.GAP)
         status = np.where(self.signal.valid, unjudged, self.signal.status).astype(np.uint8)
         lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
-        open_below, open_above, limited = (np.zeros(shape, dtype=bool) for _ in range(3))
-        for share in shares:
-            statistic, band = checked_evaluation(changed(share.threshold), share.recording, share.signal)
-            rows, judges, unit = share.rows, share.judges[:, np.newaxis], statistic.unit
-            valid = statistic.valid & judges
-            outside = np.where(valid, np.fmax(statistic.values - band.upper, band.lower - statistic.values), np.inf)
-            taken = valid & ((outside < least[rows]) | (status[rows] != Status.VALID))
-            unknown = judges & ~statistic.valid & (status[rows] == Status.OTHER_SPEED)
-            sources = ((values, statistic.values), (lower, band.lower), (upper, band.upper), (least, outside))
-            for target, source in sources:
-                target[rows] = np.where(taken, source, target[rows])
-            status[rows] = np.where(taken, Status.VALID, np.where(unknown, statistic.status, status[rows]))
-            open_below[rows] |= valid & np.isneginf(band.lower)
-            open_above[rows] |= valid & np.isposinf(band.upper)
-            limited[rows] |= valid & (np.isfinite(band.lower) | np.isfinite(band.upper))
+        marks = np.zeros(shape, dtype=np.uint8)
+        for share, (statistic, band) in zip(shares, evaluated, strict=True):
+            unit = statistic.unit
+            own_values, own_lower, own_upper = (
+                as_matrix(item, share.signal.values.shape) for item in (statistic.values, band.lower, band.upper)
+            )
+            merge_share(
+                own_values,
+                np.ascontiguousarray(statistic.status, dtype=np.uint8),
+                own_lower,
+                own_upper,
+                share.judges,
+                share.rows.start,
+                values,
+                status,
+                lower,
+                upper,
+                least,
+                marks,
+            )
         # If each class monitors a different side, together they monitor none.
-        status[open_below & open_above & limited] = Status.NO_LIMIT
-        return replace(self.signal, values=values, status=status, unit=unit), Band(lower, upper)
+        status[marks == (OPEN_BELOW | OPEN_ABOVE | LIMITED)] = Status.NO_LIMIT
+        return self.signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
 
 
 def judged(

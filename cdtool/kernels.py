@@ -45,12 +45,17 @@ class Kernel:
     A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one. Kernels
     called only by kernels are compiled without an entry from Python, which takes as long to compile as a small kernel.
     If such a kernel is also called from Python, it is compiled again, unless `entry` is set.
+
+    If `fused`, a product and a sum may be rounded once, as C compilers do; if not, each is rounded, as by numpy.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: str, entry: bool = False) -> None:
+    def __init__(
+        self, function: Callable[..., Any], signature: str, entry: bool = False, *, fused: bool = True
+    ) -> None:
         self.function = function
         self.signature = signature
         self.entry = entry
+        self.fused = fused
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Callable[..., Any] | None = None
@@ -98,9 +103,12 @@ class Kernel:
         return (self._compiled or self.compiled)(*arguments)
 
 
-def kernel(signature: str, *, entry: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
-    """Mark a function as a kernel with the given numba signature; `entry`: both Python and kernels call it."""
-    return lambda function: Kernel(function, signature, entry)
+def kernel(signature: str, *, entry: bool = False, fused: bool = True) -> Callable[[Callable[..., Any]], Kernel]:
+    """Mark a function as a kernel with the given numba signature; `entry`: both Python and kernels call it.
+
+    `fused=False`: with the bits of numpy, see `Kernel`.
+    """
+    return lambda function: Kernel(function, signature, entry, fused=fused)
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -214,7 +222,8 @@ def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[...
     global _told
     njit: Any = numba.njit
     function, signature = named(item, suffix), _signature(item)
-    options = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, **options}
+    fastmath: set[str] | bool = {"contract"} if item.fused else False
+    options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **options}
     with _no_collection():
         try:
             compiled: Callable[..., Any] = njit(signature, cache=True, **options)(function)

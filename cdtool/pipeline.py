@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.activation import Activation
 from cdtool.clock import previous_value
@@ -201,7 +203,18 @@ def _signal_of_log(operation: Operation, machine: Machine, detector: Detector, w
     lost = _lost_inputs(detector, recording, machine, signal)
     if signal.lost is not None:
         lost = signal.lost if lost is None else lost | signal.lost
-    return replace(signal, joints=signal.joints or recording.joints, lost=lost).watching(watched)
+    if lost is not signal.lost or not signal.joints:
+        signal = replace(signal, joints=signal.joints or recording.joints, lost=lost)
+    return _with_period(signal, recording).watching(watched)
+
+
+def _with_period(signal: Signal, recording: Recording) -> Signal:
+    """Return the signal with its median sample period; on a clock of the recording, that of the channel."""
+    own = recording.own_clock(signal.time)
+    if own is None:
+        return signal
+    period = next(series.period for series in recording.channels.values() if series.time is own)
+    return signal.with_period(period if len(own) > 1 else 0.0)
 
 
 def _rows(signal: Signal, operation: Operation) -> slice:
@@ -223,14 +236,15 @@ def _judge_log(
     statistic, band = judgement.evaluated
     inner = judgement.narrower(1.0 - activation.hysteresis) if activation.hysteresis else None
     begins = [stroke.applies for stroke in judgement.strokes[1:]]
-    alarms, crossings = activation.alarms(statistic, band, inner, begins)
+    needed = partial(_debounce, judgement.recording, activation, statistic.time)
+    alarms, crossings = activation.alarms(statistic, band, inner, begins, needed)
     rearmed = dict(zip(alarms, activation.rearmed(statistic, band, alarms, inner, begins), strict=True))
     found = []
     for item in operations:
         rows = _rows(signal, item)
         part = statistic.part(rows)
         own = [tuple(alarm for alarm in of_log if _within(alarm, part)) for of_log in (alarms, crossings)]
-        verdict = replace(_verdict(part, own[0], own[1]), rearmed=tuple(rearmed[alarm] for alarm in own[0]))
+        verdict = _verdict(part, own[0], own[1], tuple(rearmed[alarm] for alarm in own[0]))
         detection = Detection(
             item,
             detector,
@@ -252,11 +266,22 @@ def _within(alarm: Alarm, part: Signal) -> bool:
     return bool(len(part.time)) and part.time[0] <= alarm.time <= part.time[-1]
 
 
-def _verdict(statistic: Signal, alarms: tuple[Alarm, ...], crossings: tuple[Alarm, ...]) -> Verdict:
+def _debounce(recording: Recording, activation: Activation, clock: FloatArray) -> npt.NDArray[np.int64]:
+    """Return the debounce in samples on a clock; for one of the recording's own clocks, it is computed once."""
+    own = recording.own_clock(clock)
+    if own is None:
+        return activation.needed(clock)
+    return recording.derived(("debounce", activation.debounce), lambda: activation.needed(own), own)
+
+
+def _verdict(
+    statistic: Signal, alarms: tuple[Alarm, ...], crossings: tuple[Alarm, ...], rearmed: tuple[float, ...]
+) -> Verdict:
     if alarms:
-        return Verdict("alarm", alarms, crossings=crossings)
-    other = float(np.mean(statistic.status == Status.OTHER_SPEED)) if statistic.status.size else 0.0
-    if statistic.valid.any() and other < _ANOTHER_MOTION:
+        return Verdict("alarm", alarms, crossings=crossings, rearmed=rearmed)
+    status = statistic.status
+    other = np.count_nonzero(status == Status.OTHER_SPEED) / status.size if status.size else 0.0
+    if other < _ANOTHER_MOTION and statistic.valid.any():
         return Verdict("no alarm", crossings=crossings)
     return Verdict("not_assessable", reason=statistic.why_not())
 

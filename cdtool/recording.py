@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.derived import StoresDerived
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
 
@@ -27,7 +28,7 @@ CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
 
 
 @dataclass(frozen=True)
-class Series:
+class Series(StoresDerived):
     """One channel: `time` (n,) s strictly increasing, `values` (n, J) float64 in `unit`; NaN = no sample.
 
     Raises RecordingError if the shapes do not match or the time does not increase.
@@ -76,7 +77,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(StoresDerived):
     """One log: its channels as Series, on the load side, each at its own rate.
 
     `origin` is added to every time to obtain the source's own clock [s] (0 unless that is an epoch). A missing channel
@@ -137,13 +138,38 @@ class Recording:
         return replace(self, channels={name: series for name, series in parts.items() if len(series)})
 
     def section(self, start: float, end: float) -> Recording:
-        """Return the recording cut to start <= time <= end [s] with all its channels, even those without a sample."""
+        """Return the recording cut to start <= time <= end [s] with all its channels, even those without a sample.
+
+        The same times return the same object.
+        """
+        return self.derived(("section", start, end), lambda: self._section(start, end))
+
+    def _section(self, start: float, end: float) -> Recording:
         return replace(self, channels={name: series.between(start, end) for name, series in self.channels.items()})
 
     def without_ground_truth(self) -> Recording:
-        """Return the data available to a detector or threshold: no load cell, no label."""
+        """Return the data available to a detector or threshold: no load cell, no label; each time the same object."""
+        if not any(name in GROUND_TRUTH for name in self.channels):
+            return self
+        return self.derived("without ground truth", self._without_ground_truth)
+
+    def _without_ground_truth(self) -> Recording:
         seen = {name: series for name, series in self.channels.items() if name not in GROUND_TRUTH}
         return replace(self, channels=seen)
+
+    def own_clock(self, clock: FloatArray) -> FloatArray | None:
+        """Return the times of the first channel whose times equal those of `clock` [s]; None without such a channel.
+
+        Equal clocks have the same object, so that it identifies results on this clock. The speed counts as the first.
+        """
+        if any(series.time is clock for series in self.channels.values()):
+            return self.derived("own clock", lambda: self._first_equal(clock), clock)
+        return self._first_equal(clock)
+
+    def _first_equal(self, clock: FloatArray) -> FloatArray | None:
+        names = sorted(self.channels, key=lambda name: name != "speed")
+        times = (self.channels[name].time for name in names)
+        return next((time for time in times if time is clock or np.array_equal(time, clock)), None)
 
 
 @dataclass(frozen=True)

@@ -25,24 +25,32 @@ def lost_samples(recording: Recording, channels: Iterable[str], clock: FloatArra
     9 steps. Before the first sample of a channel, none is lost. The result is causal.
     """
     lost: BoolArray | None = None
+    own = recording.own_clock(clock)
     for name in channels:
         if name in recording and len(recording[name]):
-            of_channel = _lost_in_channel(recording[name], clock)
-            if of_channel.any():
+            of_channel = _lost_once(recording[name], clock, own)
+            if of_channel is not None:
                 lost = of_channel if lost is None else lost | of_channel
     return lost
 
 
-def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray:
+def _lost_once(series: Series, clock: FloatArray, own: FloatArray | None) -> BoolArray | None:
+    """Return where a channel lost samples, None without any; computed once on the recording's `own` clock."""
+    if own is None:
+        return _lost_in_channel(series, clock)
+    return series.derived("lost samples", lambda: _lost_in_channel(series, own), own)
+
+
+def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray | None:
     missing: BoolArray = ~np.isfinite(series.values)
-    if len(series.time) == len(clock) and np.array_equal(series.time, clock):
-        return missing
+    if series.time is clock or np.array_equal(series.time, clock):
+        return missing if missing.any() else None
     at = np.searchsorted(series.time, clock, side="right") - 1
     newest = np.maximum(at, 0)
     age = clock - series.time[newest]
     late = (age > _LATE * _longest_usual_step(series.time)[newest]) | (_shares_clock(age) & (age > 0.0))
     lost: BoolArray = (missing[newest] | late[:, np.newaxis]) & (at >= 0)[:, np.newaxis]
-    return lost
+    return lost if lost.any() else None
 
 
 def _longest_usual_step(time: FloatArray) -> FloatArray:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from cdtool.detection import Signal, Status
+from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import Detector
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, RecordingError
-from cdtool.recording import Recording
+from cdtool.kernels import kernel
+from cdtool.recording import FloatArray, Recording
 from cdtool.value_words import fault_and_place
+
+_HIGHEST_STATUS = int(max(Status))
 
 
 def checked_signal(detector: Detector, recording: Recording, machine: Machine) -> Signal:
@@ -76,15 +80,29 @@ def _breach(signal: Any, recording: Recording) -> str:
     lost = signal.lost
     if lost is not None and (np.shape(lost) != shape or np.asarray(lost).dtype != np.bool_):
         return f"returns marks of lost samples that are not {shape} of bool, samples by joints"
-    if np.any(status > max(Status)):
-        return f"returns a status of {int(status.max())}: 0 to {max(Status):d} are known"
+    highest, unusable = _of_samples(values, status)
+    if highest > _HIGHEST_STATUS:
+        return f"returns a status of {highest}: 0 to {_HIGHEST_STATUS} are known"
     if len(set(signal.joints)) < len(signal.joints):
         return f"names a joint twice: {', '.join(signal.joints)}"
-    if len(time) > 1 and not np.all(np.diff(time) > 0.0):
+    # The times of a channel increase.
+    if not any(series.time is time for series in recording.channels.values()) and not np.all(time[1:] > time[:-1]):
         return "returns times that do not strictly increase"
-    unusable = int(np.count_nonzero(~np.isfinite(values) & (status == Status.VALID)))
     # NaN exceeds no limit: the detector would detect nothing without reporting it.
     return f"returns {unusable} values that are marked as valid but not finite" if unusable else ""
+
+
+@kernel("UniTuple(int64, 2)(Array(float64, 2, 'A', readonly=True), Array(uint8, 2, 'A', readonly=True))")
+def _of_samples(values: FloatArray, status: StatusArray) -> tuple[int, int]:
+    """Return the highest status, and the number of valid values that are not finite."""
+    highest = 0
+    unusable = 0
+    for k in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            highest = max(highest, int(status[k, j]))
+            if status[k, j] == Status.VALID and not math.isfinite(values[k, j]):
+                unusable += 1
+    return highest, unusable
 
 
 def _fault(detector: Detector, recording: Recording, problem: str) -> RecordingError:

@@ -45,8 +45,19 @@ def judging_classes(
     Until a class has begun its stroke all of them apply. Then those apply that have fitted since they began; one that
     has departed applies for `hold` [s] more, also beyond the end of its stroke; one that has completed its stroke
     applies to the rest after it for as long. It applies again once it fits and no other class does, or has fitted for
-    `hold`. Where there was no speed for `hold`, none applies.
+    `hold`. Where there was no speed for `hold`, none applies. On the clock of one of the recording's channels it is
+    decided once, for all detectors that learned the same classes.
     """
+    own = recording.own_clock(clock)
+    if own is None:
+        return _judging_classes(recording, classes, strokes, clock, hold)
+    key = ("judging classes", tuple(item.content for item in classes), tuple(strokes), hold)
+    return list(recording.derived(key, lambda: tuple(_judging_classes(recording, classes, strokes, own, hold)), own))
+
+
+def _judging_classes(
+    recording: Recording, classes: Sequence[MotionClass], strokes: Sequence[Stroke], clock: FloatArray, hold: float
+) -> list[Judging]:
     speed = recording["speed"]
     if not len(speed):
         return []
@@ -66,7 +77,7 @@ def judging_classes(
             fits[first:last, j] = agrees[-(last - first) :]
         fresh[first] = True
         completed_by[first] = item.rests - _COMPLETED
-    known = _known(speed, classes)
+    known = _known(speed, [motion.joint for motion in classes])
     now = np.zeros((n, count), dtype=np.bool_)
     before = np.zeros((n, count), dtype=np.bool_)
     opposed = np.array(
@@ -81,8 +92,18 @@ def speed_is_recent(
     recording: Recording, classes: Sequence[MotionClass], clock: FloatArray, hold: float = HOLD
 ) -> BoolArray:
     """Return where on `clock` (n,) [s] the last `hold` [s] contain a speed of every joint that leads a class."""
+    own, joints = recording.own_clock(clock), tuple(sorted({motion.joint for motion in classes}))
+    if own is None:
+        return _speed_is_recent(recording["speed"], joints, clock, hold)
     speed = recording["speed"]
-    last = speed.time[_known(speed, classes)]
+    return speed.derived(("speed is recent", joints, hold), lambda: _speed_is_recent(speed, joints, own, hold), own)
+
+
+def _speed_is_recent(speed: Series, joints: Sequence[int], clock: FloatArray, hold: float) -> BoolArray:
+    known = _known(speed, joints)
+    if clock is speed.time and known.all() and hold >= 0.0:
+        return known
+    last = speed.time[known]
     if not len(last):
         return np.zeros(len(clock), dtype=bool)
     at = np.searchsorted(last, clock, side="right") - 1
@@ -90,8 +111,8 @@ def speed_is_recent(
     return recent
 
 
-def _known(speed: Series, classes: Sequence[MotionClass]) -> BoolArray:
-    known: BoolArray = np.all(np.isfinite(speed.values[:, [motion.joint for motion in classes]]), axis=1)
+def _known(speed: Series, joints: Sequence[int]) -> BoolArray:
+    known: BoolArray = np.all(np.isfinite(speed.values[:, list(joints)]), axis=1)
     return known
 
 
@@ -105,6 +126,8 @@ def _on_clock(
     recent: BoolArray,
 ) -> list[Judging]:
     """Return the decision at the last speed sample at or before each time of `clock`, where one is `recent`."""
+    if len(firsts) == 1 and firsts[0] == 0:
+        return _in_the_only_stroke(time, now, clock, recent)
     at = np.maximum(np.searchsorted(time, clock, side="right") - 1, 0)
     stroke_of = np.searchsorted(firsts, np.arange(len(time)), side="right") - 1
     stroke = stroke_of[at]
@@ -118,6 +141,13 @@ def _on_clock(
             where = (own & (stroke == number)) | (held & (held_from == number))
             found.append(Judging(number, j, where))
     return found
+
+
+def _in_the_only_stroke(time: FloatArray, now: BoolArray, clock: FloatArray, recent: BoolArray) -> list[Judging]:
+    """Return `_on_clock` for a log of a single stroke: no class departed in an earlier one."""
+    at = slice(None) if clock is time else np.maximum(np.searchsorted(time, clock, side="right") - 1, 0)
+    where = now[at] & recent[:, np.newaxis]
+    return [Judging(0, j, np.ascontiguousarray(where[:, j])) for j in range(now.shape[1]) if where[:, j].any()]
 
 
 @kernel(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import FloatArray, Recording, Series
 
@@ -45,6 +47,12 @@ class MotionClass:
     def without_course(self) -> MotionClass:
         """The class by its name alone: joint, direction and nominal speed."""
         return replace(self, course=None)
+
+    @cached_property
+    def content(self) -> tuple[object, ...]:
+        """What decides which motion fits the class, its course included: hashable, equal for equal classes."""
+        course = self.course.content if self.course else None
+        return self.direction, self.nominal_speed, self.joint, course
 
     @property
     def described(self) -> str:
@@ -88,14 +96,27 @@ def measured_class(recording: Recording) -> MotionClass:
 
 def _class_by(recording: Recording, channels: Sequence[str]) -> MotionClass:
     for channel in channels:
-        if channel in recording:
-            series = recording[channel]
-            joint = leading_joint(series)
-            present = np.isfinite(series.values[:, joint])
-            if present.any():
-                found = _class_of(series.time[present], series.values[present, joint], joint)
-                return replace(found, unit=series.unit)
+        if channel in recording and (found := _class_of_speed(recording[channel])):
+            return found
     return MotionClass(0, 0.0)
+
+
+def _class_of_speed(series: Series) -> MotionClass | None:
+    """Return the class of a speed, computed once; None without a sample."""
+    return series.derived("class of motion", lambda: _class_over(series))
+
+
+def _class_over(series: Series) -> MotionClass | None:
+    joint = leading_joint(series)
+    speed = series.values[:, joint]
+    present = np.isfinite(speed)
+    if not present.any():
+        return None
+    if not present.all():
+        series = Series(series.time[present], series.values[present], series.unit)
+        speed = series.values[:, joint]
+    period = series.period if len(series) > 1 else 0.0
+    return replace(_class_of(series.time, np.ascontiguousarray(speed), joint, period), unit=series.unit)
 
 
 def leading_joint(series: Series) -> int:
@@ -110,31 +131,64 @@ def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
     """Return the mean speed (n,) over `seconds` about each sample: travel by time, so that jitter of stamps cancels."""
     if len(time) < 2:
         return speed
-    steps = np.diff(time)
-    # The first step is unknown: the second replaces it, so that the first sample counts too.
-    ends = np.concatenate(([time[0] - steps[0]], time))
-    travel = np.concatenate(([0.0], np.cumsum(np.concatenate((steps[:1], steps)) * speed)))
-    before, after = np.maximum(time - 0.5 * seconds, ends[0]), np.minimum(time + 0.5 * seconds, ends[-1])
-    mean: FloatArray = (np.interp(after, ends, travel) - np.interp(before, ends, travel)) / (after - before)
+    mean = np.empty(len(time))
+    _average(np.ascontiguousarray(time), np.ascontiguousarray(speed), 0.5 * seconds, mean)
     return mean
 
 
-def _class_of(time: FloatArray, speed: FloatArray, joint: int) -> MotionClass:
-    period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[::1])", fused=False)
+def _average(time: FloatArray, speed: FloatArray, half: float, mean: FloatArray) -> None:
+    """Fill the mean speed over `half` [s] before and after each sample."""
+    count = len(time)
+    # The first step is unknown: the second replaces it, so that the first sample counts too.
+    ends = np.empty(count + 1)
+    travel = np.empty(count + 1)
+    ends[0], travel[0] = time[0] - (time[1] - time[0]), 0.0
+    for k in range(count):
+        ends[k + 1] = time[k]
+        moved = (time[max(k, 1)] - time[max(k, 1) - 1]) * speed[k]
+        travel[k + 1] = travel[k] + moved if k else moved
+    first = 0
+    last = 0
+    for k in range(count):
+        before, after = max(time[k] - half, ends[0]), min(time[k] + half, ends[count])
+        while first < count and ends[first + 1] <= before:
+            first += 1
+        while last < count and ends[last + 1] <= after:
+            last += 1
+        start, end = travel[first], travel[last]
+        if ends[first] != before:
+            start += (travel[first + 1] - travel[first]) / (ends[first + 1] - ends[first]) * (before - ends[first])
+        if ends[last] != after:
+            end += (travel[last + 1] - travel[last]) / (ends[last + 1] - ends[last]) * (after - ends[last])
+        mean[k] = (end - start) / (after - before)
+
+
+def _class_of(time: FloatArray, speed: FloatArray, joint: int, period: float) -> MotionClass:
     seconds = max(_AVERAGED_SECONDS, _AVERAGED_SAMPLES * period)
     smooth = averaged(time, speed, seconds)
-    in_motion = period * float(np.count_nonzero(np.abs(smooth) > _MOVING * np.abs(smooth).max()))
+    size = np.abs(smooth)
+    in_motion = period * float(np.count_nonzero(size > _MOVING * size.max()))
     if in_motion * _AVERAGED_SHARE < seconds:
         smooth = averaged(time, speed, max(in_motion * _AVERAGED_SHARE, period)) if period else speed
-    size = np.abs(smooth)
-    moving = size > _MOVING * size.max()
-    if not moving.any():
+        size = np.abs(smooth)
+    # In order of size, the samples above a level are the last ones, and their median is in the middle of these.
+    ordered = np.sort(size)
+    moving = ordered[int(np.searchsorted(ordered, _MOVING * ordered[-1], side="right")) :]
+    if not len(moving):
         return MotionClass(0, 0.0, joint)
-    usual = float(np.median(size[moving]))
+    usual, level = _middle(moving), 0.0
     for _ in range(2):
-        fast = smooth[size >= _FAST * usual]
-        usual = float(np.median(np.abs(fast)))
+        level = _FAST * usual
+        usual = _middle(ordered[int(np.searchsorted(ordered, level, side="left")) :])
+    fast = smooth[size >= level]
     # Equal motion in both directions has the direction of the first: noise must not decide.
     lead = float(np.sum(fast)) if abs(float(np.sum(fast))) > _ONE_WAY * float(np.sum(np.abs(fast))) else float(fast[0])
     direction = 1 if lead > 0.0 else -1
     return MotionClass(direction, usual, joint)
+
+
+def _middle(ordered: FloatArray) -> float:
+    """Return the median of values in ascending order."""
+    half = len(ordered) // 2
+    return float(ordered[half] if len(ordered) % 2 else 0.5 * (ordered[half - 1] + ordered[half]))

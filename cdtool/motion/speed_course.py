@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
 from cdtool.clock import integrate
-from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, confirmed, progress
+from cdtool.motion.course_kernel import fit_course
+from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray, Recording
 
@@ -20,8 +22,8 @@ _POINTS, _REACH = 400, 4
 _TIME_RESERVE = 1.5
 # A grid point is known where this share of the runs has been.
 _COVERAGE = 0.8
-# A speed fits within this many spreads of the mean, and within this share of the nominal speed in any case.
-_SPREADS, TOLERANCE = 5.5, 0.05
+# A speed fits within this share of the nominal speed in any case.
+TOLERANCE = 0.05
 
 
 @dataclass(frozen=True)
@@ -40,11 +42,16 @@ class SpeedCurve:
         """The last grid point but one."""
         return self.step * max(len(self.mean) - 2, 0)
 
-    def at(self, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return mean and spread (n,) at the locations of `axis`; those of the first point where it is NaN."""
-        grid = self.step * np.arange(len(self.mean))
-        places = np.nan_to_num(axis)
-        return np.interp(places, grid, self.mean), np.interp(places, grid, self.spread)
+    @cached_property
+    def grid(self) -> FloatArray:
+        """The grid points (g,)."""
+        points: FloatArray = np.arange(len(self.mean), dtype=np.float64) * self.step
+        return points
+
+    @cached_property
+    def content(self) -> tuple[float, bytes, bytes]:
+        """Step, mean and spread, bit by bit: equal for equal curves."""
+        return self.step, self.mean.tobytes(), self.spread.tobytes()
 
 
 @dataclass(frozen=True)
@@ -58,15 +65,10 @@ class SpeedCourse:
     by_time: SpeedCurve
     by_travel: SpeedCurve
 
-    def expected(self, where: Progress) -> tuple[FloatArray, FloatArray]:
-        """Return mean and spread (n,) of the forward speed of impact-free runs at each sample of a stroke."""
-        by_time, by_travel = self.by_time.at(where.elapsed), self.by_travel.at(where.travel)
-        if self.alignment == "time":
-            return by_time
-        if self.alignment == "position":
-            return by_travel
-        mean, spread = (np.where(where.running, late, early) for early, late in zip(by_time, by_travel, strict=True))
-        return mean, spread
+    @cached_property
+    def content(self) -> tuple[object, ...]:
+        """Alignment and both curves, bit by bit: hashable, equal for equal courses."""
+        return self.alignment, self.by_time.content, self.by_travel.content
 
     def to_dict(self) -> dict[str, Any]:
         """Return both curves as JSON values."""
@@ -130,23 +132,32 @@ def fitting_samples(
     Before it has begun everything fits but a confirmed motion backward. Without a course (a class that was not
     learned) every speed up to the nominal one fits while accelerating, and the nominal one alone from there on. Causal.
     """
-    forward = direction * recording["speed"].values[:, joint]
+    speed = np.ascontiguousarray(recording["speed"].values[:, joint])
     where = stroke_progress(recording, direction, nominal_speed, joint)
-    begun = np.isfinite(where.elapsed)
-    least = TOLERANCE * nominal_speed
-    if course is None:
-        lowest = np.where(where.running, nominal_speed - least, -least)
-        highest = np.full(len(forward), nominal_speed + least)
-    else:
-        mean, spread = course.expected(where)
-        reach = np.maximum(_SPREADS * spread, least)
-        lowest, highest = mean - reach, mean + reach
-        # A stroke that ends at rest slows down within its last grid step.
-        ends = where.running & (np.nan_to_num(where.travel) >= course.by_travel.last) & (mean < 0.5 * nominal_speed)
-        lowest = np.where(ends, np.minimum(lowest, -least), lowest)
-    fits = (forward >= lowest) & (forward <= highest)
-    backward = confirmed(forward <= -START_SHARE * nominal_speed)
-    return begun, np.where(begun, fits, ~backward)
+    begun, fits = np.empty(len(speed), dtype=np.bool_), np.empty(len(speed), dtype=np.bool_)
+    shown = course or _UNKNOWN
+    fit_course(
+        speed,
+        where.elapsed,
+        where.travel,
+        where.running,
+        direction,
+        nominal_speed,
+        TOLERANCE * nominal_speed,
+        course is not None,
+        shown.alignment != "position",
+        shown.alignment != "time",
+        shown.by_time.grid,
+        shown.by_time.mean,
+        shown.by_time.spread,
+        shown.by_travel.grid,
+        shown.by_travel.mean,
+        shown.by_travel.spread,
+        shown.by_travel.last,
+        begun,
+        fits,
+    )
+    return begun, fits
 
 
 def _learned(runs: Sequence[tuple[FloatArray, FloatArray]], end: float) -> SpeedCurve:
@@ -184,3 +195,8 @@ def _curve_from(values: Mapping[str, Any]) -> SpeedCurve:
     if not (alike and np.isfinite((mean, spread)).all() and spread.min() >= 0.0 and 0.0 < step < math.inf):
         raise ValueError(f"a speed curve of means {mean.shape}, spreads {spread.shape} and step {step}")
     return SpeedCurve(step, mean, spread)
+
+
+_NO_CURVE = SpeedCurve(1.0, np.zeros(1), np.zeros(1))
+# In place of the course of a class that was not learned: the kernel takes arrays in any case, and does not use these.
+_UNKNOWN = SpeedCourse("time", _NO_CURVE, _NO_CURVE)

@@ -41,15 +41,22 @@ def strokes_so_far(recording: Recording, how: str, classes: Sequence[MotionClass
     By "motion" a stroke ends with a rest of 0.2 s after a motion, or where the motion turns round. A joint rests where
     its speed, averaged over the last 0.1 s, is below 10 % of the nominal speed of the slowest class that it leads;
     without classes, below 10 % of the highest speed of any joint so far. By "trigger" a stroke begins at each rising
-    edge.
+    edge. The strokes of a log are cut once for all detectors that learned the same classes.
     """
+    if how not in ("motion", "trigger"):
+        return [Stroke(-np.inf, -np.inf)]
+    key = ("strokes", how, tuple((item.joint, item.nominal_speed) for item in classes))
+    return list(recording.derived(key, lambda: tuple(_strokes(recording, how, classes))))
+
+
+def _strokes(recording: Recording, how: str, classes: Sequence[MotionClass]) -> list[Stroke]:
     begin = Stroke(-np.inf, -np.inf)
     if how == "trigger" and "trigger" in recording:
         series = recording["trigger"]
         high = np.nan_to_num(series.values[:, 0]) > 0.5
         edges = [float(series.time[k]) for k in np.flatnonzero(high[1:] & ~high[:-1]) + 1]
         return [begin, *(Stroke(edge, edge, edge) for edge in edges)]
-    if how != "motion" or "speed" not in recording or not len(recording["speed"]):
+    if how == "trigger" or "speed" not in recording or not len(recording["speed"]):
         return [begin]
     time, speed = recording["speed"].time, averaged_so_far(recording["speed"])
     leads = sorted({item.joint for item in classes})

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, replace
+from dataclasses import Field
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from cdtool.detection import Band, Signal, Status
 from cdtool.recording import FloatArray, Recording
+from cdtool.thresholds.comparison_kernel import factors_met
 
 
 class FittedThreshold(Protocol):
@@ -114,7 +115,12 @@ class Threshold(Protocol):
         ...
 
 
-def exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, FloatArray]:
+def exceedance(
+    threshold: FittedThreshold,
+    recording: Recording,
+    signal: Signal,
+    evaluated: tuple[Signal, Band] | None = None,
+) -> tuple[Signal, FloatArray]:
     """Return for each sample the safety factor at which its limit would be met.
 
     Parameters
@@ -125,6 +131,8 @@ def exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal)
         The recording on the load side.
     signal : Signal
         The detector's signal, values (n, J).
+    evaluated : tuple of (Signal, Band), optional
+        What `threshold.evaluate` returned for them; evaluated here by default.
 
     Returns
     -------
@@ -150,19 +158,20 @@ def exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal)
     [0.25, 1.5]
     """
     factor = threshold.safety_factor
-    statistic, band = threshold.evaluate(recording, signal)
+    statistic, band = evaluated or threshold.evaluate(recording, signal)
     _, wider = threshold.with_safety_factor(2.0 * factor).evaluate(recording, signal)
-    above = _met_at(statistic.values, band.upper, wider.upper, factor)
-    below = _met_at(-statistic.values, -band.lower, -wider.lower, factor)
-    return statistic, np.fmax(above, below)
+    shape = statistic.values.shape
+    limits = (as_matrix(limit, shape) for limit in (band.lower, band.upper, wider.lower, wider.upper))
+    met_at = np.empty(shape)
+    factors_met(as_matrix(statistic.values, shape), *limits, factor, met_at)
+    return statistic, met_at
 
 
-def _met_at(value: FloatArray, limit: FloatArray, wider: FloatArray, factor: float) -> FloatArray:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        met: FloatArray = factor + factor * (value - limit) / (wider - limit)
-    stuck = wider == limit
-    met = np.where(stuck, np.where(value > limit, np.inf, -np.inf), met)
-    return np.where(np.isnan(limit) | np.isposinf(limit), -np.inf, met)
+def as_matrix(values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return values as a kernel needs them: contiguous float64 of that shape; raises ValueError for another shape."""
+    if np.shape(values) != shape:
+        values = np.broadcast_to(values, shape)
+    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def with_limits(signal: Signal, lower: FloatArray, upper: FloatArray) -> tuple[Signal, Band]:
@@ -193,4 +202,4 @@ def with_limits(signal: Signal, lower: FloatArray, upper: FloatArray) -> tuple[S
     status = signal.status.copy()
     unknown = (np.isnan(lower) | np.isnan(upper)) & (status == Status.VALID)
     status[unknown] = Status.NO_LIMIT
-    return replace(signal, status=status), Band(lower, upper)
+    return signal.changed(status=status), Band(lower, upper)

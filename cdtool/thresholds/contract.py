@@ -9,7 +9,8 @@ import numpy as np
 from cdtool.detection import Band, Signal
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance
+from cdtool.thresholds.base import FittedThreshold, Threshold, as_matrix, exceedance
+from cdtool.thresholds.comparison_kernel import is_unknown_where_valid
 from cdtool.value_words import fault_and_place
 
 _HINT = "an error in the threshold: see docs/own-detector.md"
@@ -100,8 +101,8 @@ def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal:
         raise RecordingError(
             f"{recording.name}: threshold {name} returns another shape than the signal's {shape}", _HINT
         )
-    unknown = np.isnan(statistic.values) | np.isnan(band.lower) | np.isnan(band.upper)
-    if np.any(unknown & statistic.valid):
+    matrices = (as_matrix(item, shape) for item in (statistic.values, band.lower, band.upper))
+    if is_unknown_where_valid(*matrices, np.ascontiguousarray(statistic.status, dtype=np.uint8)):
         # NaN exceeds no limit: the threshold would detect nothing without reporting it.
         raise RecordingError(f"{recording.name}: threshold {name} returns NaN where its status is valid", _HINT)
     return statistic, band
@@ -141,7 +142,12 @@ def checked_factor(threshold: FittedThreshold, factor: float) -> FittedThreshold
         raise SignatureError(f"threshold {type(threshold).__name__} fails: {fault_and_place(fault)}", _HINT) from fault
 
 
-def checked_exceedance(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, FloatArray]:
+def checked_exceedance(
+    threshold: FittedThreshold,
+    recording: Recording,
+    signal: Signal,
+    evaluated: tuple[Signal, Band] | None = None,
+) -> tuple[Signal, FloatArray]:
     """Return `exceedance` of a threshold that may come from a plug-in.
 
     Parameters
@@ -152,6 +158,8 @@ def checked_exceedance(threshold: FittedThreshold, recording: Recording, signal:
         The recording on the load side.
     signal : Signal
         The detector's signal, values (n, J).
+    evaluated : tuple of (Signal, Band), optional
+        What `checked_evaluation` returned for them.
 
     Returns
     -------
@@ -170,7 +178,7 @@ def checked_exceedance(threshold: FittedThreshold, recording: Recording, signal:
     See `exceedance`.
     """
     try:
-        return exceedance(threshold, recording, signal)
+        return exceedance(threshold, recording, signal, evaluated)
     except CdtoolError:
         raise
     except Exception as fault:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from cdtool.motion import MotionClass
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.base import with_limits
+from cdtool.thresholds.limits_kernel import PlaceArray, limits_at, locate
 from cdtool.thresholds.signature_curve import Curve, resample
 from cdtool.value_words import value_in_words
 
@@ -48,15 +49,48 @@ class FittedSignature:
         if signal.joints != self.joints:
             learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
             raise SignatureError(f"learned for the joints {learned}, not for {given}", "learn a signature for these")
-        where = self.progress(recording, signal.time)
-        shape = signal.values.shape
-        lower, upper = np.full(shape, np.nan), np.full(shape, np.nan)
-        for curve, axis, use in self._curves(where):
-            low, high = self.limits(curve)
-            for j in range(shape[1]):
-                lower[use, j] = curve.at(low[:, j], axis[use])
-                upper[use, j] = curve.at(high[:, j], axis[use])
-        return with_limits(signal, lower, upper)
+        if signal.values.shape[1] != self.by_time.count.shape[1]:
+            learned, given = (str(item.shape[1]) for item in (self.by_time.count, signal.values))
+            raise SignatureError(f"learned for {learned} joints, not for {given}", "learn a signature for these")
+        places = self._places(self.progress(recording, signal.time))
+        lower, upper = np.empty(signal.values.shape), np.empty(signal.values.shape)
+        status = np.empty(signal.values.shape, dtype=np.uint8)
+        limits_at(*places, *self._lower, *self._upper, signal.status, lower, upper, status)
+        return signal.changed(status=status), Band(lower, upper)
+
+    def _places(self, where: Progress) -> tuple[PlaceArray, PlaceArray, FloatArray]:
+        """Return where each sample is on the grids, see `locate`; found once for all signatures with these grids."""
+        time, travel = self.by_time, self.by_position
+        key = (self.alignment, time.step, len(time.count), time.end, travel.step, len(travel.count))
+        return where.derived(key, lambda: self._located(where))
+
+    def _located(self, where: Progress) -> tuple[PlaceArray, PlaceArray, FloatArray]:
+        time, travel = self.by_time, self.by_position
+        uses_time, uses_travel = self.alignment != "position", self.alignment != "time"
+        place, nearest = (np.empty(len(where.elapsed), dtype=np.int32) for _ in range(2))
+        beyond = np.empty(len(where.elapsed))
+        grids = (time.grid, time.step, time.end, travel.grid, travel.step)
+        locate(where.elapsed, where.travel, where.running, uses_time, uses_travel, *grids, place, nearest, beyond)
+        return place, nearest, beyond
+
+    @cached_property
+    def _lower(self) -> tuple[FloatArray, FloatArray, bool]:
+        return self._table(0)
+
+    @cached_property
+    def _upper(self) -> tuple[FloatArray, FloatArray, bool]:
+        return self._table(1)
+
+    def _table(self, side: int) -> tuple[FloatArray, FloatArray, bool]:
+        """Return a limit at the grid points of both curves, its slopes to the next one, and if it is infinite there."""
+        curves = (self.by_time, self.by_position)
+        limits = [self.limits(curve)[side] for curve in curves]
+        slopes = []
+        for curve, limit in zip(curves, limits, strict=True):
+            with np.errstate(invalid="ignore"):
+                slopes += [np.diff(limit, axis=0) / np.diff(curve.grid)[:, np.newaxis], np.zeros((1, limit.shape[1]))]
+        table = np.concatenate(limits)
+        return table, np.concatenate(slopes), bool(np.isinf(table).any())
 
     def limits(self, curve: Curve) -> tuple[FloatArray, FloatArray]:
         """Return lower and upper limit (g, J) on the grid of a curve: mean -+ k s, infinite without a limit."""
@@ -101,7 +135,12 @@ class FittedSignature:
 
     def with_safety_factor(self, factor: float) -> FittedSignature:
         """Return the signature with its limits at `factor` spreads from the mean."""
-        return replace(self, safety_factor=factor)
+        return self._doubled if factor == 2.0 * self.safety_factor else replace(self, safety_factor=factor)
+
+    @cached_property
+    def _doubled(self) -> FittedSignature:
+        """With twice the safety factor: `exceedance` compares every log with it, its limits are computed once."""
+        return replace(self, safety_factor=2.0 * self.safety_factor)
 
     @property
     def watched(self) -> int:
@@ -178,17 +217,6 @@ class FittedSignature:
             RUNNING_SHARE * speed,
             self.motion.joint,
         )
-
-    def _curves(self, where: Progress) -> list[tuple[Curve, FloatArray, Any]]:
-        started = np.isfinite(where.elapsed)
-        if self.alignment == "time":
-            return [(self.by_time, where.elapsed, started)]
-        if self.alignment == "position":
-            return [(self.by_position, where.travel, started)]
-        return [
-            (self.by_time, np.minimum(where.elapsed, self.by_time.end), started & ~where.running),
-            (self.by_position, where.travel, started & where.running),
-        ]
 
 
 def axes_of(by_time: Curve, by_position: Curve, where: Progress) -> tuple[tuple[Curve, FloatArray], ...]:

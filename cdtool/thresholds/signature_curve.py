@@ -44,13 +44,14 @@ class Curve:
         shape = (math.floor(end / step) + 1, joints)
         return cls(step, window, np.zeros(shape), np.zeros(shape), np.zeros(shape))
 
-    @property
+    @cached_property
     def grid(self) -> FloatArray:
-        """The grid points (g,)."""
+        """The grid points (g,), read-only."""
         points: FloatArray = np.arange(len(self.count), dtype=np.float64) * self.step
+        points.flags.writeable = False
         return points
 
-    @property
+    @cached_property
     def end(self) -> float:
         """The last grid point that enough runs have reached."""
         covered = np.flatnonzero((self.count >= self.enough).all(axis=1))
