@@ -1,8 +1,9 @@
 """Work on many items, in this process or in several, with the results in the order of the items.
 
 Reading and judging a log hold Python's interpreter lock most of the time, so threads would not save time: jobs are
-processes. They are started when the work begins and receive it once. On Linux they are forked from this process and
-share its compiled kernels; elsewhere, and if this process has several threads, they are new processes of Python.
+processes. They are started when the work begins and receive it once. On Linux they are forked from this process after
+it has done the first item, so that they share its modules and compiled kernels; elsewhere, and if this process has
+several threads, they are new processes of Python.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def in_order(
     total : int
         Their number.
     jobs : int, optional
-        Number of processes; with 1, or with a single item, the work is done in this process.
+        Number of processes; with 1, or with one or two items, the work is done in this process.
     progress : callable, optional
         Called after each item with the number done and the total.
 
@@ -68,7 +69,7 @@ def in_order(
     >>> list(in_order(abs, [-1, 2, -3], total=3))
     [1, 2, 3]
     """
-    made = map(work, items) if min(jobs, total) <= 1 else _by_processes(work, items, min(jobs, total))
+    made = map(work, items) if min(jobs, total - 1) <= 1 else _by_processes(work, items, min(jobs, total - 1))
     for number, result in enumerate(made, 1):
         yield result
         if progress:
@@ -80,6 +81,8 @@ def _by_processes(work: Callable[[Item], Made], items: Iterable[Item], jobs: int
     from concurrent.futures.process import BrokenProcessPool
 
     waiting = iter(items)
+    for item in islice(waiting, 1):
+        yield work(item)
     with ProcessPoolExecutor(jobs, _context(), initializer=_begin, initargs=(work,)) as pool, _stopping(pool):
         ahead = deque(pool.submit(_do, item) for item in islice(waiting, 2 * jobs))
         while ahead:
