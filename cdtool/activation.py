@@ -212,7 +212,7 @@ def _calm_from(  # noqa: PLR0913  kernels take arrays and scalars separately
             inside = True
             inside_since = time[k]
         elif time[k] - inside_since >= wait:
-            return time[k]
+            return float(time[k])
     return math.inf
 
 
