@@ -18,8 +18,6 @@ from cdtool.recording import BoolArray, FloatArray
 
 # Default time outside the band before an alarm [s]: 9 samples at 1 kHz.
 DEBOUNCE_TIME = 9e-3
-# Number of samples searched first for the re-arming of an alarm.
-_LOOKED_AT = 4096
 _MOST_DEBOUNCE = 1_000_000_000
 
 
@@ -126,11 +124,11 @@ class Activation:
             status = np.ascontiguousarray(statistic.status[:, joint])
             debounce = needed() if needed else self.needed(time)
             at, armed = crossings_of(time, outside, calm, status, debounce, self.wait, begins_at(time, begins))
-            for k, was_armed in zip(at, armed, strict=True):
-                above = bool(value[k] > upper[k])
-                limit = float(upper[k] if above else lower[k])
-                side = "above" if above else "below"
-                crossing = Alarm(float(time[k]), joint, side, float(value[k]), limit)  # type: ignore[arg-type]
+            for k, was_armed in zip(at.tolist(), armed.tolist(), strict=True):
+                statistic_then, highest = float(value[k]), float(upper[k])
+                above = statistic_then > highest
+                limit = highest if above else float(lower[k])
+                crossing = Alarm(float(time[k]), joint, "above" if above else "below", statistic_then, limit)
                 crossings.append(crossing)
                 if was_armed:
                     alarms.append(crossing)
@@ -145,36 +143,22 @@ class Activation:
         begins: Sequence[float] = (),
     ) -> tuple[float, ...]:
         """Return when each of its alarms was re-armed [s], by the rule of `alarms`; infinite if it was not."""
-        fresh = statistic.time[begins_at(statistic.time, begins)].tolist()
+        fresh = statistic.time[begins_at(statistic.time, begins)].tolist() if alarms and len(begins) else []
         again = []
         for alarm in alarms:
             begun = next((time for time in fresh if time > alarm.time), math.inf)
-            again.append(min(self._calm_again(statistic, band, alarm, inner), begun))
+            again.append(min(self._calm_again(statistic, band, alarm, inner or band), begun))
         return tuple(again)
 
-    def _calm_again(self, statistic: Signal, band: Band, alarm: Alarm, inner: Band | None) -> float:
+    def _calm_again(self, statistic: Signal, band: Band, alarm: Alarm, inner: Band) -> float:
         """Return when the value had been inside for long enough after an alarm [s]; usually soon after it."""
-        first, count, length = int(np.searchsorted(statistic.time, alarm.time)), len(statistic.time), _LOOKED_AT
-        while math.isfinite(self.wait):
-            rows = slice(first, min(first + length, count))
-            at = self._calm_within(statistic, band, alarm.joint, inner, rows)
-            if math.isfinite(at) or rows.stop == count:
-                return at
-            length *= 4
-        return math.inf
-
-    def _calm_within(self, statistic: Signal, band: Band, joint: int, inner: Band | None, rows: slice) -> float:
-        known = rows.start + np.flatnonzero(statistic.status[rows, joint] != Status.GAP)
-        value, time = statistic.values[known, joint], statistic.time[known]
-        outside = (value > band.upper[known, joint]) | (value < band.lower[known, joint])
-        if inner is not None:
-            outside |= (value > inner.upper[known, joint]) | (value < inner.lower[known, joint])
-        outside &= statistic.status[known, joint] == Status.VALID
-        # For each sample inside, the first one since the value was last outside.
-        places = np.arange(len(known))
-        since = np.minimum(np.maximum.accumulate(np.where(outside, places, -1)) + 1, len(known) - 1)
-        armed = np.flatnonzero(~outside & (places > since) & (time - time[since] >= self.wait))
-        return float(time[armed[0]]) if len(armed) else math.inf
+        if not math.isfinite(self.wait):
+            return math.inf
+        limits = (band.lower, band.upper, inner.lower, inner.upper)
+        columns = (_column(item, alarm.joint) for item in (statistic.values, *limits))
+        status = np.ascontiguousarray(statistic.status[:, alarm.joint])
+        time = np.ascontiguousarray(statistic.time)
+        return float(_calm_from(time, *columns, status, int(np.searchsorted(time, alarm.time)), self.wait))
 
 
 def _column(values: FloatArray, joint: int) -> FloatArray:
@@ -194,10 +178,42 @@ def _mark(
     """Mark the values `outside` their limits, and those inside the inner limits too; return whether any is outside."""
     any_outside = False
     for k in range(len(value)):
-        outside[k] = value[k] > upper[k] or value[k] < lower[k]
-        calm[k] = not (outside[k] or value[k] > inner_upper[k] or value[k] < inner_lower[k])
-        any_outside = any_outside or outside[k]
+        outside[k] = (value[k] > upper[k]) | (value[k] < lower[k])
+        calm[k] = not (outside[k] | (value[k] > inner_upper[k]) | (value[k] < inner_lower[k]))
+        any_outside |= outside[k]
     return any_outside
+
+
+@kernel(
+    f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, "
+    "Array(uint8, 1, 'C', readonly=True), int64, float64)"
+)
+def _calm_from(  # noqa: PLR0913  kernels take arrays and scalars separately
+    time: FloatArray,
+    value: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    inner_lower: FloatArray,
+    inner_upper: FloatArray,
+    status: StatusArray,
+    first: int,
+    wait: float,
+) -> float:
+    """Return the first time from sample `first` on at which the value has been inside for `wait` [s]; else infinity."""
+    inside = False
+    inside_since = 0.0
+    for k in range(first, len(time)):
+        if status[k] == Status.GAP:
+            continue
+        beyond = value[k] > upper[k] or value[k] < lower[k] or value[k] > inner_upper[k] or value[k] < inner_lower[k]
+        if beyond and status[k] == Status.VALID:
+            inside = False
+        elif not inside:
+            inside = True
+            inside_since = time[k]
+        elif time[k] - inside_since >= wait:
+            return float(time[k])
+    return math.inf
 
 
 def begins_at(time: FloatArray, begins: Sequence[float]) -> BoolArray:
@@ -226,14 +242,16 @@ def crossings_of(
     `calm`: where the value is far enough inside to count towards the `rearm` seconds; `needed` (n,): the debounce in
     samples; `fresh`: where an operation begins.
     """
-    at = np.empty(len(time) if outside.any() else 0, dtype=np.int64)
+    # Nothing before the first sample outside counts: until then an alarm is armed.
+    first = int(outside.argmax()) if len(outside) else 0
+    at = np.empty(len(time) - first if len(outside) and outside[first] else 0, dtype=np.int64)
     armed = np.empty(len(at), dtype=np.bool_)
     clock = np.ascontiguousarray(time)
-    count = _activate(clock, outside, calm, status, needed, rearm, fresh, at, armed) if len(at) else 0
+    count = _activate(clock, outside, calm, status, needed, rearm, fresh, first, at, armed) if len(at) else 0
     return at[:count], armed[:count]
 
 
-@kernel(f"int64({READ_ONLY}, b1[::1], b1[::1], uint8[::1], int64[::1], float64, b1[::1], int64[::1], b1[::1])")
+@kernel(f"int64({READ_ONLY}, b1[::1], b1[::1], uint8[::1], int64[::1], float64, b1[::1], int64, int64[::1], b1[::1])")
 def _activate(  # noqa: PLR0913  kernels take arrays and scalars separately
     time: FloatArray,
     outside: BoolArray,
@@ -242,6 +260,7 @@ def _activate(  # noqa: PLR0913  kernels take arrays and scalars separately
     needed: npt.NDArray[np.int64],
     rearm: float,
     fresh: BoolArray,
+    first: int,
     at: npt.NDArray[np.int64],
     armed_at: BoolArray,
 ) -> int:
@@ -251,7 +270,7 @@ def _activate(  # noqa: PLR0913  kernels take arrays and scalars separately
     armed = True
     inside = False
     inside_since = 0.0
-    for k in range(len(time)):
+    for k in range(first, len(time)):
         if fresh[k]:
             armed = True
         if status[k] == Status.GAP:

@@ -80,11 +80,9 @@ class Signal:
             vars(signal)["period"] = self.period
         return signal
 
-    def with_period(self, period: float) -> Signal:
-        """Return the signal with its median sample period [s], known from another signal on the same clock."""
-        signal = replace(self)
-        vars(signal)["period"] = period
-        return signal
+    def know_period(self, period: float) -> None:
+        """Store the median sample period [s], known from a channel on the same clock: it need not be computed."""
+        vars(self)["period"] = period
 
     def watching(self, joints: Sequence[str]) -> Signal:
         """Return only the columns of these joints, in their order here; all columns if `joints` is empty.

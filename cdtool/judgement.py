@@ -11,13 +11,21 @@ from functools import cached_property
 
 import numpy as np
 
-from cdtool.detection import Band, Signal, Status
+from cdtool.detection import Band, Signal, Status, StatusArray
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold, as_matrix
-from cdtool.thresholds.comparison_kernel import LIMITED, OPEN_ABOVE, OPEN_BELOW, lower_factors, merge_share
+from cdtool.thresholds.comparison_kernel import (
+    LIMITED,
+    OPEN_ABOVE,
+    OPEN_BELOW,
+    lower_factors,
+    mark_elsewhere,
+    merge_share,
+    take_only_class,
+)
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 
 
@@ -107,8 +115,9 @@ class Judgement:
         part = self.signal.part(rows)
         judges = judges[rows]
         if not judges.all():
-            elsewhere = ~judges[:, np.newaxis] & part.valid
-            part = part.changed(status=np.where(elsewhere, Status.OTHER_SPEED, part.status).astype(np.uint8))
+            status = np.empty(part.status.shape, dtype=np.uint8)
+            mark_elsewhere(np.ascontiguousarray(part.status), judges, status)
+            part = part.changed(status=status)
         return _Share(threshold, recording, part, rows, judges)
 
     def _merged(self, evaluated: Sequence[tuple[Signal, Band]]) -> tuple[Signal, Band]:
@@ -116,35 +125,32 @@ class Judgement:
         shares = self._shares
         if len(shares) == 1 and shares[0].judges.all():
             return evaluated[0]
-        shape = self.signal.values.shape
-        values, unit = np.array(self.signal.values, order="C"), self.signal.unit
-        recent = speed_is_recent(self.recording, self.classes, self.signal.time, self.hold)[:, np.newaxis]
-        unjudged = np.where(recent, Status.OTHER_SPEED, Status.GAP)
-        status = np.where(self.signal.valid, unjudged, self.signal.status).astype(np.uint8)
+        signal, shape = self.signal, self.signal.values.shape
+        recent = speed_is_recent(self.recording, self.classes, signal.time, self.hold)
+        values, unit = np.array(signal.values, order="C"), signal.unit
+        if len(shares) == 1 and shares[0].rows == slice(0, len(signal.time)):
+            lower, upper, status = np.empty(shape), np.empty(shape), np.empty(shape, dtype=np.uint8)
+            own, unit = _as_arrays(*evaluated[0]), evaluated[0][0].unit
+            seen = np.ascontiguousarray(signal.status)
+            take_only_class(*own, shares[0].judges, seen, recent, values, status, lower, upper)
+            return signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
+        elsewhere = np.where(recent, np.uint8(Status.OTHER_SPEED), np.uint8(Status.GAP))[:, np.newaxis]
+        status = np.where(signal.valid, elsewhere, signal.status)
         lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
         marks = np.zeros(shape, dtype=np.uint8)
         for share, (statistic, band) in zip(shares, evaluated, strict=True):
-            unit = statistic.unit
-            own_values, own_lower, own_upper = (
-                as_matrix(item, share.signal.values.shape) for item in (statistic.values, band.lower, band.upper)
-            )
-            merge_share(
-                own_values,
-                np.ascontiguousarray(statistic.status, dtype=np.uint8),
-                own_lower,
-                own_upper,
-                share.judges,
-                share.rows.start,
-                values,
-                status,
-                lower,
-                upper,
-                least,
-                marks,
-            )
+            own, unit = _as_arrays(statistic, band), statistic.unit
+            merge_share(*own, share.judges, share.rows.start, values, status, lower, upper, least, marks)
         # If each class monitors a different side, together they monitor none.
         status[marks == (OPEN_BELOW | OPEN_ABOVE | LIMITED)] = Status.NO_LIMIT
-        return self.signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
+        return signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
+
+
+def _as_arrays(statistic: Signal, band: Band) -> tuple[FloatArray, StatusArray, FloatArray, FloatArray]:
+    """Return values, status and limits (n, J) as a kernel needs them."""
+    shape = statistic.values.shape
+    status = np.ascontiguousarray(statistic.status, dtype=np.uint8)
+    return as_matrix(statistic.values, shape), status, as_matrix(band.lower, shape), as_matrix(band.upper, shape)
 
 
 def judged(

@@ -46,16 +46,14 @@ class Kernel:
     called only by kernels are compiled without an entry from Python, which takes as long to compile as a small kernel.
     If such a kernel is also called from Python, it is compiled again, unless `entry` is set.
 
-    If `fused`, a product and a sum may be rounded once, as C compilers do; if not, each is rounded, as by numpy.
+    In an `exact` kernel no product is fused with a sum: each operation is rounded, as in numpy.
     """
 
-    def __init__(
-        self, function: Callable[..., Any], signature: str, entry: bool = False, *, fused: bool = True
-    ) -> None:
+    def __init__(self, function: Callable[..., Any], signature: str, entry: bool = False, exact: bool = False) -> None:
         self.function = function
         self.signature = signature
         self.entry = entry
-        self.fused = fused
+        self.exact = exact
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Callable[..., Any] | None = None
@@ -103,12 +101,13 @@ class Kernel:
         return (self._compiled or self.compiled)(*arguments)
 
 
-def kernel(signature: str, *, entry: bool = False, fused: bool = True) -> Callable[[Callable[..., Any]], Kernel]:
-    """Mark a function as a kernel with the given numba signature; `entry`: both Python and kernels call it.
+def kernel(signature: str, *, entry: bool = False, exact: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
+    """Mark a function as a kernel with the given numba signature.
 
-    `fused=False`: with the bits of numpy, see `Kernel`.
+    `entry`: both Python and kernels call it. `exact`: its numbers have the bits of the same formula in numpy; the
+    kernels that it calls must be exact too.
     """
-    return lambda function: Kernel(function, signature, entry, fused=fused)
+    return lambda function: Kernel(function, signature, entry, exact)
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -222,8 +221,8 @@ def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[...
     global _told
     njit: Any = numba.njit
     function, signature = named(item, suffix), _signature(item)
-    fastmath: set[str] | bool = {"contract"} if item.fused else False
-    options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **options}
+    fused: set[str] | bool = False if item.exact else {"contract"}
+    options = {"nogil": True, "error_model": "numpy", "fastmath": fused, **options}
     with _no_collection():
         try:
             compiled: Callable[..., Any] = njit(signature, cache=True, **options)(function)

@@ -203,18 +203,12 @@ def _signal_of_log(operation: Operation, machine: Machine, detector: Detector, w
     lost = _lost_inputs(detector, recording, machine, signal)
     if signal.lost is not None:
         lost = signal.lost if lost is None else lost | signal.lost
-    if lost is not signal.lost or not signal.joints:
-        signal = replace(signal, joints=signal.joints or recording.joints, lost=lost)
-    return _with_period(signal, recording).watching(watched)
-
-
-def _with_period(signal: Signal, recording: Recording) -> Signal:
-    """Return the signal with its median sample period; on a clock of the recording, that of the channel."""
     own = recording.own_clock(signal.time)
-    if own is None:
-        return signal
-    period = next(series.period for series in recording.channels.values() if series.time is own)
-    return signal.with_period(period if len(own) > 1 else 0.0)
+    if len(signal.time) > 1 and own is not None:
+        signal.know_period(next(series.period for series in recording.channels.values() if series.time is own))
+    if lost is not signal.lost or not signal.joints:
+        signal = signal.changed(joints=signal.joints or recording.joints, lost=lost)
+    return signal.watching(watched)
 
 
 def _rows(signal: Signal, operation: Operation) -> slice:

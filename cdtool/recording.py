@@ -162,9 +162,14 @@ class Recording(StoresDerived):
 
         Equal clocks have the same object, so that it identifies results on this clock. The speed counts as the first.
         """
-        if any(series.time is clock for series in self.channels.values()):
-            return self.derived("own clock", lambda: self._first_equal(clock), clock)
-        return self._first_equal(clock)
+        # By the identity of the channels' times, which exist as long as the recording.
+        known: dict[int, FloatArray] = self.derived("own clocks", dict)
+        own = known.get(id(clock))
+        if own is None:
+            own = self._first_equal(clock)
+            if own is not None and any(series.time is clock for series in self.channels.values()):
+                known[id(clock)] = own
+        return own
 
     def _first_equal(self, clock: FloatArray) -> FloatArray | None:
         names = sorted(self.channels, key=lambda name: name != "speed")

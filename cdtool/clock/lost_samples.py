@@ -36,21 +36,24 @@ def lost_samples(recording: Recording, channels: Iterable[str], clock: FloatArra
 
 def _lost_once(series: Series, clock: FloatArray, own: FloatArray | None) -> BoolArray | None:
     """Return where a channel lost samples, None without any; computed once on the recording's `own` clock."""
-    if own is None:
-        return _lost_in_channel(series, clock)
-    return series.derived("lost samples", lambda: _lost_in_channel(series, own), own)
+
+    def compute() -> BoolArray | None:
+        lost = _lost_in_channel(series, clock)
+        return lost if lost.any() else None
+
+    return compute() if own is None else series.derived("lost samples", compute, own)
 
 
-def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray | None:
+def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray:
     missing: BoolArray = ~np.isfinite(series.values)
-    if series.time is clock or np.array_equal(series.time, clock):
-        return missing if missing.any() else None
+    if len(series.time) == len(clock) and np.array_equal(series.time, clock):
+        return missing
     at = np.searchsorted(series.time, clock, side="right") - 1
     newest = np.maximum(at, 0)
     age = clock - series.time[newest]
     late = (age > _LATE * _longest_usual_step(series.time)[newest]) | (_shares_clock(age) & (age > 0.0))
     lost: BoolArray = (missing[newest] | late[:, np.newaxis]) & (at >= 0)[:, np.newaxis]
-    return lost if lost.any() else None
+    return lost
 
 
 def _longest_usual_step(time: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ _SLOW = 0.5
     f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), float64, float64, float64, "
     f"boolean, boolean, boolean, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, "
     "float64, b1[::1], b1[::1])",
-    fused=False,
+    exact=True,
 )
 def fit_course(
     speed: FloatArray,

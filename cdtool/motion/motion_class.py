@@ -136,7 +136,7 @@ def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
     return mean
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[::1])", fused=False)
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[::1])", exact=True)
 def _average(time: FloatArray, speed: FloatArray, half: float, mean: FloatArray) -> None:
     """Fill the mean speed over `half` [s] before and after each sample."""
     count = len(time)

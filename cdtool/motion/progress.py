@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.clock import previous_value
-from cdtool.derived import StoresDerived
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 
@@ -21,7 +20,7 @@ CONFIRM = 3
 
 
 @dataclass(frozen=True)
-class Progress(StoresDerived):
+class Progress:
     """On a signal's clock (n,): `elapsed` s since the motion began, `travel` since then, `running` after acceleration.
 
     NaN (and False) before the motion begins. Travel is a running maximum: it stays constant while the axis runs
@@ -93,7 +92,7 @@ def _begin(
     return starts, math.nan
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64, float64, float64[::1], float64[::1], b1[::1])", fused=False)
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64, float64, float64[::1], float64[::1], b1[::1])", exact=True)
 def _advance(  # noqa: PLR0913  kernels take arrays and scalars separately
     clock: FloatArray,
     position: FloatArray,

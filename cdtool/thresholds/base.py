@@ -161,9 +161,10 @@ def exceedance(
     statistic, band = evaluated or threshold.evaluate(recording, signal)
     _, wider = threshold.with_safety_factor(2.0 * factor).evaluate(recording, signal)
     shape = statistic.values.shape
-    limits = (as_matrix(limit, shape) for limit in (band.lower, band.upper, wider.lower, wider.upper))
+    limits = (band.lower, band.upper, wider.lower, wider.upper)
     met_at = np.empty(shape)
-    factors_met(as_matrix(statistic.values, shape), *limits, factor, met_at)
+    columns = (as_matrix(item, shape).reshape(-1) for item in (statistic.values, *limits))
+    factors_met(*columns, factor, met_at.reshape(-1))
     return statistic, met_at
 
 

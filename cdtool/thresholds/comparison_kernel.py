@@ -1,45 +1,38 @@
-"""A statistic compared with limits, sample by sample: unknown samples, factors that meet a limit, several classes."""
+"""A statistic compared with limits, sample by sample: unknown samples, factors that meet a limit, several classes.
+
+Without branches where possible, and along the samples before the joints: so the loops become vector instructions.
+"""
 
 from __future__ import annotations
 
 import math
 
 from cdtool.detection import Status, StatusArray
-from cdtool.kernels import kernel
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 _MATRIX = "Array(float64, 2, 'C', readonly=True)"
 _STATUS = "Array(uint8, 2, 'C', readonly=True)"
+_FLAT_STATUS = "Array(uint8, 1, 'C', readonly=True)"
 _ROWS = "Array(bool, 1, 'C', readonly=True)"
 
 # Marks of a sample: on which sides a class leaves it unlimited, and whether a class limits it.
 OPEN_BELOW, OPEN_ABOVE, LIMITED = 1, 2, 4
 
 
-@kernel(f"boolean({_MATRIX}, {_MATRIX}, {_MATRIX}, {_STATUS})")
-def is_unknown_where_valid(values: FloatArray, lower: FloatArray, upper: FloatArray, status: StatusArray) -> bool:
-    """Whether a sample (n, J) is valid although its value or one of its limits is NaN."""
-    for k in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            unknown = math.isnan(values[k, j]) or math.isnan(lower[k, j]) or math.isnan(upper[k, j])
-            if unknown and status[k, j] == Status.VALID:
-                return True
-    return False
-
-
-@kernel("float64(float64, float64, float64, float64)", fused=False)
-def _met_at(value: float, limit: float, wider: float, factor: float) -> float:
-    """Return the factor at which a value meets its limit, given at `factor` and `wider` at twice this factor."""
-    if math.isnan(limit) or limit == math.inf:
-        return -math.inf
-    if wider == limit:
-        return math.inf if value > limit else -math.inf
-    return factor + factor * (value - limit) / (wider - limit)
+@kernel(f"int64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {_FLAT_STATUS})")
+def unknown_but_valid(values: FloatArray, lower: FloatArray, upper: FloatArray, status: StatusArray) -> int:
+    """Return how many samples (m,) are valid although their value or one of their limits is NaN."""
+    count = 0
+    for i in range(len(values)):
+        unknown = (values[i] != values[i]) | (lower[i] != lower[i]) | (upper[i] != upper[i])
+        count += 1 if unknown & (status[i] == Status.VALID) else 0
+    return count
 
 
 @kernel(
-    f"void({_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, float64, float64[:,::1])",
-    fused=False,
+    f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64, float64[::1])",
+    exact=True,
 )
 def factors_met(
     values: FloatArray,
@@ -50,21 +43,66 @@ def factors_met(
     factor: float,
     met: FloatArray,
 ) -> None:
-    """Fill (n, J) the factor at which each value meets its limits, given at `factor` and `wider` at twice this factor.
+    """Fill (m,) the factor at which each value meets its limits, given at `factor` and `wider` at twice this factor.
 
     -inf where no limit is known or the value is not limited.
     """
-    for k in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            above = _met_at(values[k, j], upper[k, j], wider_upper[k, j], factor)
-            below = _met_at(-values[k, j], -lower[k, j], -wider_lower[k, j], factor)
-            met[k, j] = above if above >= below or math.isnan(below) else below
+    for i in range(len(values)):
+        value, limit, wider = values[i], upper[i], wider_upper[i]
+        above = factor + factor * (value - limit) / (wider - limit)
+        above = above if wider != limit else (math.inf if value > limit else -math.inf)
+        above = -math.inf if (limit != limit) | (limit == math.inf) else above
+        value, limit, wider = -values[i], -lower[i], -wider_lower[i]
+        below = factor + factor * (value - limit) / (wider - limit)
+        below = below if wider != limit else (math.inf if value > limit else -math.inf)
+        below = -math.inf if (limit != limit) | (limit == math.inf) else below
+        met[i] = above if (above >= below) | (below != below) else below
+
+
+@kernel(f"void({_STATUS}, {_ROWS}, uint8[:,::1])")
+def mark_elsewhere(status: StatusArray, judges: BoolArray, marked: StatusArray) -> None:
+    """Fill `marked` (n, J): `status`, with OTHER_SPEED where a valid sample is not one that a class `judges` (n,)."""
+    for j in range(status.shape[1]):
+        for k in range(status.shape[0]):
+            elsewhere = (status[k, j] == Status.VALID) & (not judges[k])
+            marked[k, j] = Status.OTHER_SPEED.value if elsewhere else status[k, j]
+
+
+@kernel(
+    f"void({_MATRIX}, {_STATUS}, {_MATRIX}, {_MATRIX}, {_ROWS}, {_STATUS}, {_ROWS}, "
+    "float64[:,::1], uint8[:,::1], float64[:,::1], float64[:,::1])"
+)
+def take_only_class(
+    own_values: FloatArray,
+    own_status: StatusArray,
+    own_lower: FloatArray,
+    own_upper: FloatArray,
+    judges: BoolArray,
+    signal_status: StatusArray,
+    recent: BoolArray,
+    values: FloatArray,
+    status: StatusArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> None:
+    """Fill `values`, `status` and limits (n, J) where the only class judges (n,), and what holds elsewhere.
+
+    There, a valid sample of the signal is of another speed, or missing without a `recent` speed (n,).
+    """
+    for j in range(status.shape[1]):
+        for k in range(status.shape[0]):
+            taken = judges[k] & (own_status[k, j] == Status.VALID)
+            values[k, j] = own_values[k, j] if taken else values[k, j]
+            lower[k, j] = own_lower[k, j] if taken else math.nan
+            upper[k, j] = own_upper[k, j] if taken else math.nan
+            elsewhere = Status.OTHER_SPEED.value if recent[k] else Status.GAP.value
+            state = elsewhere if signal_status[k, j] == Status.VALID else int(signal_status[k, j])
+            status[k, j] = own_status[k, j] if judges[k] & (taken | (state == Status.OTHER_SPEED.value)) else state
 
 
 @kernel(
     f"void({_MATRIX}, {_STATUS}, {_MATRIX}, {_MATRIX}, {_ROWS}, int64, "
     "float64[:,::1], uint8[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], uint8[:,::1])",
-    fused=False,
 )
 def merge_share(
     own_values: FloatArray,
@@ -81,11 +119,11 @@ def merge_share(
     marks: StatusArray,
 ) -> None:
     """Take a class's statistic and limits where it is exceeded `least` so far; its own arrays begin at row `first`."""
-    for i in range(own_values.shape[0]):
-        if not judges[i]:
-            continue
-        k = first + i
-        for j in range(own_values.shape[1]):
+    for j in range(own_values.shape[1]):
+        for i in range(own_values.shape[0]):
+            if not judges[i]:
+                continue
+            k = first + i
             if own_status[i, j] != Status.VALID:
                 if status[k, j] == Status.OTHER_SPEED:
                     status[k, j] = own_status[i, j]
@@ -104,13 +142,13 @@ def merge_share(
                 marks[k, j] |= LIMITED
 
 
-@kernel(f"void({_MATRIX}, {_STATUS}, {_ROWS}, int64, float64[:,::1], b1[:,::1])", fused=False)
+@kernel(f"void({_MATRIX}, {_STATUS}, {_ROWS}, int64, float64[:,::1], b1[:,::1])")
 def lower_factors(
     own_met: FloatArray, own_status: StatusArray, judges: BoolArray, first: int, met: FloatArray, judged: BoolArray
 ) -> None:
     """Take a class's factors where they are lower than those so far, and mark the samples that any class judges."""
-    for i in range(own_met.shape[0]):
-        for j in range(own_met.shape[1]):
+    for j in range(own_met.shape[1]):
+        for i in range(own_met.shape[0]):
             if judges[i] and own_status[i, j] == Status.VALID:
                 k = first + i
                 if own_met[i, j] < met[k, j] or math.isnan(own_met[i, j]):

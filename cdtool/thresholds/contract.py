@@ -10,7 +10,7 @@ from cdtool.detection import Band, Signal
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold, Threshold, as_matrix, exceedance
-from cdtool.thresholds.comparison_kernel import is_unknown_where_valid
+from cdtool.thresholds.comparison_kernel import unknown_but_valid
 from cdtool.value_words import fault_and_place
 
 _HINT = "an error in the threshold: see docs/own-detector.md"
@@ -101,8 +101,8 @@ def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal:
         raise RecordingError(
             f"{recording.name}: threshold {name} returns another shape than the signal's {shape}", _HINT
         )
-    matrices = (as_matrix(item, shape) for item in (statistic.values, band.lower, band.upper))
-    if is_unknown_where_valid(*matrices, np.ascontiguousarray(statistic.status, dtype=np.uint8)):
+    columns = (as_matrix(item, shape).reshape(-1) for item in (statistic.values, band.lower, band.upper))
+    if unknown_but_valid(*columns, np.ascontiguousarray(statistic.status, dtype=np.uint8).reshape(-1)):
         # NaN exceeds no limit: the threshold would detect nothing without reporting it.
         raise RecordingError(f"{recording.name}: threshold {name} returns NaN where its status is valid", _HINT)
     return statistic, band

@@ -52,17 +52,26 @@ class FittedSignature:
         if signal.values.shape[1] != self.by_time.count.shape[1]:
             learned, given = (str(item.shape[1]) for item in (self.by_time.count, signal.values))
             raise SignatureError(f"learned for {learned} joints, not for {given}", "learn a signature for these")
-        places = self._places(self.progress(recording, signal.time))
+        places = self._places(recording, signal.time)
         lower, upper = np.empty(signal.values.shape), np.empty(signal.values.shape)
         status = np.empty(signal.values.shape, dtype=np.uint8)
-        limits_at(*places, *self._lower, *self._upper, signal.status, lower, upper, status)
+        flat = np.ascontiguousarray(signal.status).reshape(-1)
+        limits_at(*places, *self._lower, *self._upper, flat, lower, upper, status.reshape(-1))
         return signal.changed(status=status), Band(lower, upper)
 
-    def _places(self, where: Progress) -> tuple[PlaceArray, PlaceArray, FloatArray]:
+    def _places(self, recording: Recording, clock: FloatArray) -> tuple[PlaceArray, PlaceArray, FloatArray]:
         """Return where each sample is on the grids, see `locate`; found once for all signatures with these grids."""
-        time, travel = self.by_time, self.by_position
-        key = (self.alignment, time.step, len(time.count), time.end, travel.step, len(travel.count))
-        return where.derived(key, lambda: self._located(where))
+        own = recording.own_clock(clock)
+        if own is None:
+            return self._located(self.progress(recording, clock))
+        return recording.derived(self._grids, lambda: self._located(self.progress(recording, own)), own)
+
+    @cached_property
+    def _grids(self) -> tuple[object, ...]:
+        """What decides where a sample is on the grids: the motion and the grids themselves."""
+        motion, time, travel = self.motion, self.by_time, self.by_position
+        grids = (self.alignment, time.step, len(time.count), time.end, travel.step, len(travel.count))
+        return "places", motion.direction, motion.nominal_speed, motion.joint, *grids
 
     def _located(self, where: Progress) -> tuple[PlaceArray, PlaceArray, FloatArray]:
         time, travel = self.by_time, self.by_position
@@ -82,15 +91,19 @@ class FittedSignature:
         return self._table(1)
 
     def _table(self, side: int) -> tuple[FloatArray, FloatArray, bool]:
-        """Return a limit at the grid points of both curves, its slopes to the next one, and if it is infinite there."""
+        """Return a limit at the grid points of both curves, its slopes to the next one, and if it is infinite there.
+
+        A last row is NaN, for samples outside the grids.
+        """
         curves = (self.by_time, self.by_position)
         limits = [self.limits(curve)[side] for curve in curves]
         slopes = []
         for curve, limit in zip(curves, limits, strict=True):
             with np.errstate(invalid="ignore"):
                 slopes += [np.diff(limit, axis=0) / np.diff(curve.grid)[:, np.newaxis], np.zeros((1, limit.shape[1]))]
-        table = np.concatenate(limits)
-        return table, np.concatenate(slopes), bool(np.isinf(table).any())
+        unknown = np.full((1, limits[0].shape[1]), np.nan)
+        table = np.concatenate((*limits, unknown))
+        return table, np.concatenate((*slopes, unknown)), bool(np.isinf(table).any())
 
     def limits(self, curve: Curve) -> tuple[FloatArray, FloatArray]:
         """Return lower and upper limit (g, J) on the grid of a curve: mean -+ k s, infinite without a limit."""

@@ -27,7 +27,7 @@ _TABLE = "Array(float64, 2, 'C', readonly=True)"
 @kernel(
     f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), boolean, boolean, {READ_ONLY}, float64, "
     f"float64, {READ_ONLY}, float64, int32[::1], int32[::1], float64[::1])",
-    fused=False,
+    exact=True,
 )
 def locate(
     elapsed: FloatArray,
@@ -46,14 +46,15 @@ def locate(
 ) -> None:
     """Fill each sample's last grid point, how far `beyond` it the sample is, and the nearest grid point.
 
-    -1 where the sample has none: before the motion begins, or outside the grid, which has a nearest point nevertheless.
+    Without one, one past the last: before the motion begins, or outside the grid, which still has a nearest point.
     If both time and travel are used, the time counts until the axis runs, and at most up to `time_end`.
     """
     time_place = 0
     travel_place = 0
+    none = len(time_grid) + len(travel_grid)
     for k in range(len(elapsed)):
-        place[k] = -1
-        nearest[k] = -1
+        place[k] = none
+        nearest[k] = none
         beyond[k] = 0.0
         if not math.isfinite(elapsed[k]):
             continue
@@ -88,7 +89,7 @@ def locate(
             beyond[k] = location - time_grid[time_place]
 
 
-@kernel(f"void({_PLACES}, {_PLACES}, {READ_ONLY}, {_TABLE}, {_TABLE}, boolean, float64[:,::1])", fused=False)
+@kernel(f"void({_PLACES}, {_PLACES}, {READ_ONLY}, {_TABLE}, {_TABLE}, boolean, float64[:,::1])", exact=True)
 def _limit_at(
     place: PlaceArray,
     nearest: PlaceArray,
@@ -100,30 +101,32 @@ def _limit_at(
 ) -> None:
     """Fill a limit (n, J) from its values and slopes at each grid point (g, J); NaN where it is not known.
 
-    Where the nearest grid point has an infinite limit, it is infinite: a straight line would be NaN there.
+    The last row of the table is NaN. Where the nearest grid point has an infinite limit, it is infinite: a straight
+    line would be NaN there.
     """
-    for k in range(len(place)):
-        at = place[k]
-        for j in range(table.shape[1]):
-            if has_infinite and nearest[k] >= 0 and math.isinf(table[nearest[k], j]):
-                limit[k, j] = table[nearest[k], j]
-            elif at < 0:
-                limit[k, j] = math.nan
-            elif beyond[k] == 0.0:
-                limit[k, j] = table[at, j]
-            else:
-                limit[k, j] = slope[at, j] * beyond[k] + table[at, j]
-                if math.isnan(limit[k, j]):
-                    # From the next point back: the slope is infinite or NaN, the distance does not matter.
-                    limit[k, j] = table[at + 1, j] - slope[at, j]
-                    if math.isnan(limit[k, j]) and table[at, j] == table[at + 1, j]:
-                        limit[k, j] = table[at, j]
+    for j in range(table.shape[1]):
+        for k in range(len(place)):
+            at = np.uint32(place[k])
+            value = table[at, j]
+            limit[k, j] = value if beyond[k] == 0.0 else slope[at, j] * beyond[k] + value
+        if not has_infinite:
+            continue
+        for k in range(len(place)):
+            at = np.uint32(place[k])
+            close = table[np.uint32(nearest[k]), j]
+            if math.isinf(close):
+                limit[k, j] = close
+            elif math.isnan(limit[k, j]) and beyond[k] != 0.0:
+                # From the next point back: the slope is infinite or NaN, the distance does not matter.
+                limit[k, j] = table[at + 1, j] - slope[at, j]
+                if math.isnan(limit[k, j]) and table[at, j] == table[at + 1, j]:
+                    limit[k, j] = table[at, j]
 
 
 @kernel(
     f"void({_PLACES}, {_PLACES}, {READ_ONLY}, {_TABLE}, {_TABLE}, boolean, {_TABLE}, {_TABLE}, boolean, "
-    "Array(uint8, 2, 'A', readonly=True), float64[:,::1], float64[:,::1], uint8[:,::1])",
-    fused=False,
+    "Array(uint8, 1, 'C', readonly=True), float64[:,::1], float64[:,::1], uint8[::1])",
+    exact=True,
 )
 def limits_at(
     place: PlaceArray,
@@ -140,11 +143,10 @@ def limits_at(
     upper: FloatArray,
     limited: StatusArray,
 ) -> None:
-    """Fill both limits (n, J), and `limited`: `status` with NO_LIMIT where a limit of a valid sample is not known."""
+    """Fill both limits (n, J), and `limited` (n J,): `status` with NO_LIMIT where a valid sample's limit is unknown."""
     _limit_at(place, nearest, beyond, lower_table, lower_slope, lower_has_infinite, lower)
     _limit_at(place, nearest, beyond, upper_table, upper_slope, upper_has_infinite, upper)
-    for k in range(lower.shape[0]):
-        for j in range(lower.shape[1]):
-            limited[k, j] = status[k, j]
-            if status[k, j] == Status.VALID and (math.isnan(lower[k, j]) or math.isnan(upper[k, j])):
-                limited[k, j] = Status.NO_LIMIT
+    low, high = lower.reshape(lower.size), upper.reshape(upper.size)
+    for i in range(len(status)):
+        unlimited = (status[i] == Status.VALID) & ((low[i] != low[i]) | (high[i] != high[i]))
+        limited[i] = Status.NO_LIMIT.value if unlimited else status[i]
