@@ -5,15 +5,16 @@ The points of the curve of latency against false alarms (activity monitor operat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.activation import Activation, begins_at, crossings_of
+from cdtool.activation import Activation, begins_at
 from cdtool.detection import Status
-from cdtool.evaluation.truth.matching import belongs, one_an_event, windows
+from cdtool.evaluation.sweep_kernel import count_alarms
+from cdtool.evaluation.truth.matching import windows
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, FloatArray
 
@@ -59,32 +60,71 @@ def sweep(
     --------
     `cdtool.benchmark` stores the result in `results.sweep`.
     """
-    statistic, met_at = detection.statistic, detection.exceedance()
+    (swept,) = sweep_operation([detection], contacts, activation, window, {detection.detector: factors})
+    assert swept is not None
+    return swept
+
+
+def sweep_operation(
+    detections: Sequence[Detection],
+    contacts: Sequence[Contact],
+    activation: Activation,
+    window: float,
+    factors: Mapping[str, FloatArray],
+) -> tuple[Swept | None, ...]:
+    """Return the `sweep` of each detection of one operation; None for a detector without `factors`."""
     spans = windows(contacts, window)
     order = np.argsort([contact.start for contact in contacts], kind="stable")
-    alone: list[list[float]] = [[] for _ in factors]
-    latency = np.full((len(factors), len(contacts)), np.nan)
-    needed = activation.needed(statistic.time)
-    fresh = begins_at(statistic.time, detection.begins)
-    for joint in range(met_at.shape[1]):
-        met = np.ascontiguousarray(met_at[:, joint])
-        status = np.ascontiguousarray(statistic.status[:, joint])
-        judged = met[status == Status.VALID]
-        highest = float(judged.max()) if len(judged) else -np.inf
-        for i in np.flatnonzero(factors < highest):
-            calm = met <= (1.0 - activation.hysteresis) * factors[i]
-            at, armed = crossings_of(statistic.time, met > factors[i], calm, status, needed, activation.wait, fresh)
-            times = statistic.time[at]
-            alone[i] += [float(time) for time in times[armed] if not belongs(time, spans)]
-            for column, (contact, opens, closes) in zip(order, spans, strict=True):
-                if contact.in_progress:
-                    continue
-                inside = times[(times >= opens) & (times <= closes)]
-                if len(inside):
-                    late = max(float(inside[0]) - contact.start, 0.0)
-                    latency[i, column] = np.fmin(latency[i, column], late)
-    counts = [len(one_an_event(times, activation.wait)) for times in alone]
-    return Swept(np.array(counts, dtype=np.int64), latency)
+    ends = [max(closes, contact.end) for contact, _, closes in spans]
+    columns = (
+        [contact.start for contact, _, _ in spans],
+        [opens for _, opens, _ in spans],
+        [closes for _, _, closes in spans],
+        ends,
+    )
+    in_time = [np.array(column, dtype=np.float64) for column in columns]
+    timed = np.array([not contact.in_progress for contact, _, _ in spans], dtype=bool)
+    clocks: list[tuple[FloatArray, npt.NDArray[np.int64]]] = []
+    found: list[Swept | None] = []
+    for detection in detections:
+        if detection.detector not in factors:
+            found.append(None)
+            continue
+        moved = factors[detection.detector]
+        ascending = np.argsort(moved, kind="stable")
+        false_alarms = np.zeros(len(moved), dtype=np.int64)
+        latency = np.full((len(moved), len(contacts)), np.nan)
+        statistic, limits = detection.statistic, np.ascontiguousarray(moved[ascending])
+        count_alarms(
+            np.ascontiguousarray(statistic.time),
+            np.ascontiguousarray(detection.exceedance()).ravel(),
+            np.ascontiguousarray(statistic.status).ravel(),
+            _debounce(clocks, statistic.time, activation),
+            np.flatnonzero(begins_at(statistic.time, detection.begins)),
+            limits,
+            (1.0 - activation.hysteresis) * limits,
+            activation.wait,
+            *in_time,
+            timed,
+            false_alarms,
+            latency,
+        )
+        swept = Swept(np.empty_like(false_alarms), np.empty_like(latency))
+        swept.false_alarms[ascending] = false_alarms
+        swept.latency[ascending[:, np.newaxis], order] = latency
+        found.append(swept)
+    return tuple(found)
+
+
+def _debounce(
+    clocks: list[tuple[FloatArray, npt.NDArray[np.int64]]], time: FloatArray, activation: Activation
+) -> npt.NDArray[np.int64]:
+    """Return the debounce at each time, computed once for equal clocks, which are kept in `clocks`."""
+    for clock, needed in clocks:
+        if np.array_equal(clock, time):
+            return needed
+    clocks.append((time, activation.needed(time)))
+    return clocks[-1][1]
 
 
 def critical_factor(detection: Detection, activation: Activation) -> float:

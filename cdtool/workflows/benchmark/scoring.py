@@ -19,7 +19,7 @@ from cdtool.evaluation.results import (
     RecordingResult,
     Skipped,
 )
-from cdtool.evaluation.sweep import sweep
+from cdtool.evaluation.sweep import sweep_operation
 from cdtool.findings import Finding
 from cdtool.findings.scoring import ForceUnassessable
 from cdtool.motion.applicable import HOLD
@@ -195,10 +195,5 @@ def _recording_result(
 
 
 def _swept(judged: Judged, setup: BenchmarkFile, window: float, factors: Mapping[str, FloatArray]) -> Judged:
-    sweeps = tuple(
-        sweep(item, judged.contacts, setup.activation, window, factors[item.detector])
-        if item.detector in factors
-        else None
-        for item in judged.detections
-    )
+    sweeps = sweep_operation(judged.detections, judged.contacts, setup.activation, window, factors)
     return replace(judged, sweeps=sweeps)
