@@ -59,7 +59,7 @@ def count_alarms(
         return
     joints = len(met_at) // max(len(time), 1)
     swept = np.empty(joints, dtype=np.bool_)
-    # By joint: the factors exceeded by the last sample, those raised, and those it was not calm for, each from 0 on.
+    # By joint: the factors exceeded by the last sample, those raised, and those it was not calm for; each counted from the first factor.
     outside = np.zeros(joints, dtype=np.int64)
     raised = np.zeros(joints, dtype=np.int64)
     restless = np.zeros(joints, dtype=np.int64)

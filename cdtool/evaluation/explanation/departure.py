@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.evaluation.explanation.departure_kernels import first_beyond, steepest_bend
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.transient import Transient
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels
 
 # A channel has left its normal band if it is farther from the mean than impact-free runs are, by this factor (the runs
@@ -89,8 +90,8 @@ class Track:
         shares = samples / self.out[part], level / self.level_out[part]
         at = _first_out(*shares)
         if at is None:
-            first = _first(np.abs(raw) > self.out[part])
-            if first is None:
+            first = first_beyond(np.where(np.abs(raw) > self.out[part], 2.0, 0.0), 1.0, _SUCCESSION)
+            if first < 0:
                 farthest = part.start + int(np.nanargmax(np.abs(raw)))
                 return self._movement_at(math.nan, "", "within its usual range", farthest)
             return self._movement_at(math.nan, _side(raw[first]), "outside since before", part.start + first)
@@ -216,18 +217,10 @@ def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool]
     found = []
     for values, of_level in ((samples, False), (level, True)):
         for sign in (1.0, -1.0):
-            k = _first(sign * values > 1.0)
-            if k is not None:
+            k = first_beyond(values, sign, _SUCCESSION)
+            if k >= 0:
                 found.append((k, sign > 0.0, of_level))
     return min(found) if found else None
-
-
-def _first(outside: BoolArray) -> int | None:
-    """Return the first of the consecutive samples that are outside; missing ones (False) interrupt them."""
-    if len(outside) < _SUCCESSION:
-        return None
-    run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)
-    return int(np.argmax(run)) if run.any() else None
 
 
 def _began(time: FloatArray, shares: FloatArray) -> int:
@@ -250,16 +243,9 @@ def _bend(time: FloatArray, shares: FloatArray, first: int) -> int:
     """
     begin = int(np.searchsorted(time, time[first] - _BEFORE_BEND))
     known = begin + np.flatnonzero(np.isfinite(shares[begin:]))
-    t, y = time[known] - time[begin], shares[known]
-    best, found = math.inf, first
-    for at in np.unique(np.linspace(first, len(shares) - _SUCCESSION, _BENDS).astype(int)):
-        after = np.maximum(t - (time[at] - time[begin]), 0.0)
-        design = np.column_stack((np.ones(len(t)), t, after))
-        fitted, *_ = np.linalg.lstsq(design, y, rcond=None)
-        error = float(np.sum((y - design @ fitted) ** 2))
-        if fitted[2] > 0.0 and error < best:
-            best, found = error, int(at)
-    return found
+    candidates = np.unique(np.linspace(first, len(shares) - _SUCCESSION, _BENDS).astype(np.int64))
+    since = time - time[begin]
+    return steepest_bend(since[known], shares[known], first, since[candidates], candidates)
 
 
 def _side(value: float) -> str:
