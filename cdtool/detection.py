@@ -140,6 +140,25 @@ class Band:
         return Band(self.lower[rows], self.upper[rows])
 
 
+def contiguous(statistic: Signal, band: Band) -> tuple[FloatArray, StatusArray, FloatArray, FloatArray]:
+    """Return values, status and both limits (n, J) as kernels need them; raises ValueError for limits of other shape.
+
+    A threshold of a plug-in may return a limit of all samples once, or a view that is not contiguous.
+    """
+    values = np.ascontiguousarray(statistic.values, dtype=np.float64)
+    status = np.ascontiguousarray(statistic.status, dtype=np.uint8)
+    lower, upper = (
+        limit if np.shape(limit) == values.shape else np.broadcast_to(limit, values.shape)
+        for limit in (band.lower, band.upper)
+    )
+    return (
+        values,
+        status,
+        np.ascontiguousarray(lower, dtype=np.float64),
+        np.ascontiguousarray(upper, dtype=np.float64),
+    )
+
+
 @dataclass(frozen=True)
 class Alarm:
     """An exit of the statistic from its band: time [s] of the sample that raised the alarm, debounce included.

@@ -11,13 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cdtool.detection import Band, Signal, Status, StatusArray
-from cdtool.motion import MotionClass
-from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
-from cdtool.motion.strokes import Stroke, strokes_so_far
-from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, as_matrix
-from cdtool.thresholds.comparison_kernel import (
+from cdtool.detection import Band, Signal, Status, contiguous
+from cdtool.judgement_kernel import (
     LIMITED,
     OPEN_ABOVE,
     OPEN_BELOW,
@@ -26,6 +21,11 @@ from cdtool.thresholds.comparison_kernel import (
     merge_share,
     take_only_class,
 )
+from cdtool.motion import MotionClass
+from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
+from cdtool.motion.strokes import Stroke, strokes_so_far
+from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 
 
@@ -130,27 +130,20 @@ class Judgement:
         values, unit = np.array(signal.values, order="C"), signal.unit
         if len(shares) == 1 and shares[0].rows == slice(0, len(signal.time)):
             lower, upper, status = np.empty(shape), np.empty(shape), np.empty(shape, dtype=np.uint8)
-            own, unit = _as_arrays(*evaluated[0]), evaluated[0][0].unit
+            own, unit = contiguous(*evaluated[0]), evaluated[0][0].unit
             seen = np.ascontiguousarray(signal.status)
             take_only_class(*own, shares[0].judges, seen, recent, values, status, lower, upper)
             return signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
         elsewhere = np.where(recent, np.uint8(Status.OTHER_SPEED), np.uint8(Status.GAP))[:, np.newaxis]
-        status = np.where(signal.valid, elsewhere, signal.status)
+        status = np.ascontiguousarray(np.where(signal.valid, elsewhere, signal.status))
         lower, upper, least = (np.full(shape, start) for start in (np.nan, np.nan, np.inf))
         marks = np.zeros(shape, dtype=np.uint8)
         for share, (statistic, band) in zip(shares, evaluated, strict=True):
-            own, unit = _as_arrays(statistic, band), statistic.unit
+            own, unit = contiguous(statistic, band), statistic.unit
             merge_share(*own, share.judges, share.rows.start, values, status, lower, upper, least, marks)
         # If each class monitors a different side, together they monitor none.
         status[marks == (OPEN_BELOW | OPEN_ABOVE | LIMITED)] = Status.NO_LIMIT
         return signal.changed(values=values, status=status, unit=unit), Band(lower, upper)
-
-
-def _as_arrays(statistic: Signal, band: Band) -> tuple[FloatArray, StatusArray, FloatArray, FloatArray]:
-    """Return values, status and limits (n, J) as a kernel needs them."""
-    shape = statistic.values.shape
-    status = np.ascontiguousarray(statistic.status, dtype=np.uint8)
-    return as_matrix(statistic.values, shape), status, as_matrix(band.lower, shape), as_matrix(band.upper, shape)
 
 
 def judged(

@@ -66,7 +66,7 @@ def test_it_is_released_with_its_owner():
     assert seen() is None
 
 
-def test_ground_truth_is_removed_once_and_nothing_is_removed_where_there_is_none():
+def test_ground_truth_is_removed_once_and_a_recording_without_it_stays_itself():
     whole = recording(speed=series(), force=series())
     bare = whole.without_ground_truth()
     assert tuple(bare.channels) == ("speed",)

@@ -83,7 +83,8 @@ def made_up_signal(recording: Recording, seed: int, joints: int, shift: float) -
     time = recording["speed"].time + shift
     status = rng.choice(np.array([0, 0, 0, 1, 3], dtype=np.uint8), (len(time), joints))
     values = np.where(status == 0, rng.choice([-1.0, 0.0, 0.5, 3.0], status.shape), np.nan)
-    return Signal(time, values, status, "N", joints=tuple("ab"[:joints]))
+    # In the order of columns, as a detector that computes joint by joint may return them.
+    return Signal(time, np.asfortranarray(values), np.asfortranarray(status), "N", joints=tuple("ab"[:joints]))
 
 
 @pytest.mark.parametrize("cut", ["whole", "motion"])

@@ -50,7 +50,7 @@ class MotionClass:
 
     @cached_property
     def content(self) -> tuple[object, ...]:
-        """What decides which motion fits the class, its course included: hashable, equal for equal classes."""
+        """What decides which motion fits the class, its learned speed included: hashable, equal for equal classes."""
         course = self.course.content if self.course else None
         return self.direction, self.nominal_speed, self.joint, course
 

@@ -11,7 +11,8 @@ from typing import Any, Self
 import numpy as np
 
 from cdtool.clock import integrate
-from cdtool.motion.course_kernel import fit_course
+from cdtool.kernels import read_only
+from cdtool.motion.course_kernel import Curves, Expected, fit_course
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray, Recording
@@ -43,12 +44,6 @@ class SpeedCurve:
         return self.step * max(len(self.mean) - 2, 0)
 
     @cached_property
-    def grid(self) -> FloatArray:
-        """The grid points (g,)."""
-        points: FloatArray = np.arange(len(self.mean), dtype=np.float64) * self.step
-        return points
-
-    @cached_property
     def content(self) -> tuple[float, bytes, bytes]:
         """Step, mean and spread, bit by bit: equal for equal curves."""
         return self.step, self.mean.tobytes(), self.spread.tobytes()
@@ -69,6 +64,19 @@ class SpeedCourse:
     def content(self) -> tuple[object, ...]:
         """Alignment and both curves, bit by bit: hashable, equal for equal courses."""
         return self.alignment, self.by_time.content, self.by_travel.content
+
+    @cached_property
+    def curves(self) -> Curves:
+        """The curves that its alignment uses, one after the other, as the kernel needs them."""
+        by_time, by_travel = self.alignment != "position", self.alignment != "time"
+        used = [curve for curve, is_used in ((self.by_time, by_time), (self.by_travel, by_travel)) if is_used]
+        return Curves(
+            read_only(np.concatenate([np.arange(len(curve.mean)) * curve.step for curve in used])),
+            read_only(np.concatenate([curve.mean for curve in used])),
+            read_only(np.concatenate([curve.spread for curve in used])),
+            float(len(self.by_time.mean)) if by_time else 0.0,
+            float(self.by_travel.last),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return both curves as JSON values."""
@@ -135,28 +143,9 @@ def fitting_samples(
     speed = np.ascontiguousarray(recording["speed"].values[:, joint])
     where = stroke_progress(recording, direction, nominal_speed, joint)
     begun, fits = np.empty(len(speed), dtype=np.bool_), np.empty(len(speed), dtype=np.bool_)
-    shown = course or _UNKNOWN
-    fit_course(
-        speed,
-        where.elapsed,
-        where.travel,
-        where.running,
-        direction,
-        nominal_speed,
-        TOLERANCE * nominal_speed,
-        course is not None,
-        shown.alignment != "position",
-        shown.alignment != "time",
-        shown.by_time.grid,
-        shown.by_time.mean,
-        shown.by_time.spread,
-        shown.by_travel.grid,
-        shown.by_travel.mean,
-        shown.by_travel.spread,
-        shown.by_travel.last,
-        begun,
-        fits,
-    )
+    expected = Expected(float(direction), float(nominal_speed), float(TOLERANCE * nominal_speed))
+    curves = course.curves if course else _NO_CURVES
+    fit_course(speed, where.elapsed, where.travel, where.running, expected, curves, begun, fits)
     return begun, fits
 
 
@@ -197,6 +186,5 @@ def _curve_from(values: Mapping[str, Any]) -> SpeedCurve:
     return SpeedCurve(step, mean, spread)
 
 
-_NO_CURVE = SpeedCurve(1.0, np.zeros(1), np.zeros(1))
-# In place of the course of a class that was not learned: the kernel takes arrays in any case, and does not use these.
-_UNKNOWN = SpeedCourse("time", _NO_CURVE, _NO_CURVE)
+_NOTHING = read_only(np.empty(0))
+_NO_CURVES = Curves(_NOTHING, _NOTHING, _NOTHING, time_points=0.0, travel_end=0.0)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
-from cdtool.detection import Band, Signal, Status
+from cdtool.detection import Band, Signal, Status, contiguous
 from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.comparison_kernel import factors_met
 
@@ -160,19 +160,12 @@ def exceedance(
     factor = threshold.safety_factor
     statistic, band = evaluated or threshold.evaluate(recording, signal)
     _, wider = threshold.with_safety_factor(2.0 * factor).evaluate(recording, signal)
-    shape = statistic.values.shape
-    limits = (band.lower, band.upper, wider.lower, wider.upper)
-    met_at = np.empty(shape)
-    columns = (as_matrix(item, shape).reshape(-1) for item in (statistic.values, *limits))
-    factors_met(*columns, factor, met_at.reshape(-1))
+    values, _, lower, upper = contiguous(statistic, band)
+    _, _, wider_lower, wider_upper = contiguous(statistic, wider)
+    met_at = np.empty(values.shape)
+    flat = (item.reshape(-1) for item in (values, lower, upper, wider_lower, wider_upper))
+    factors_met(*flat, factor, met_at.reshape(-1))
     return statistic, met_at
-
-
-def as_matrix(values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """Return values as a kernel needs them: contiguous float64 of that shape; raises ValueError for another shape."""
-    if np.shape(values) != shape:
-        values = np.broadcast_to(values, shape)
-    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def with_limits(signal: Signal, lower: FloatArray, upper: FloatArray) -> tuple[Signal, Band]:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdtool.detection import Band, Signal
+from cdtool.detection import Band, Signal, contiguous
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, Threshold, as_matrix, exceedance
+from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance
 from cdtool.thresholds.comparison_kernel import unknown_but_valid
 from cdtool.value_words import fault_and_place
 
@@ -101,8 +101,8 @@ def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal:
         raise RecordingError(
             f"{recording.name}: threshold {name} returns another shape than the signal's {shape}", _HINT
         )
-    columns = (as_matrix(item, shape).reshape(-1) for item in (statistic.values, band.lower, band.upper))
-    if unknown_but_valid(*columns, np.ascontiguousarray(statistic.status, dtype=np.uint8).reshape(-1)):
+    values, status, lower, upper = (item.reshape(-1) for item in contiguous(statistic, band))
+    if unknown_but_valid(values, lower, upper, status):
         # NaN exceeds no limit: the threshold would detect nothing without reporting it.
         raise RecordingError(f"{recording.name}: threshold {name} returns NaN where its status is valid", _HINT)
     return statistic, band

@@ -11,11 +11,12 @@ import numpy as np
 
 from cdtool.detection import Band, Signal
 from cdtool.errors import SignatureError, UsageError, nearest
+from cdtool.kernels import read_only
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.limits_kernel import PlaceArray, limits_at, locate
+from cdtool.thresholds.limits_kernel import Grids, PlaceArray, limits_at, locate
 from cdtool.thresholds.signature_curve import Curve, resample
 from cdtool.value_words import value_in_words
 
@@ -64,23 +65,33 @@ class FittedSignature:
         own = recording.own_clock(clock)
         if own is None:
             return self._located(self.progress(recording, clock))
-        return recording.derived(self._grids, lambda: self._located(self.progress(recording, own)), own)
+        return recording.derived(self._content_of_grids, lambda: self._located(self.progress(recording, own)), own)
 
     @cached_property
-    def _grids(self) -> tuple[object, ...]:
+    def _content_of_grids(self) -> tuple[object, ...]:
         """What decides where a sample is on the grids: the motion and the grids themselves."""
         motion, time, travel = self.motion, self.by_time, self.by_position
         grids = (self.alignment, time.step, len(time.count), time.end, travel.step, len(travel.count))
         return "places", motion.direction, motion.nominal_speed, motion.joint, *grids
 
     def _located(self, where: Progress) -> tuple[PlaceArray, PlaceArray, FloatArray]:
-        time, travel = self.by_time, self.by_position
-        uses_time, uses_travel = self.alignment != "position", self.alignment != "time"
         place, nearest = (np.empty(len(where.elapsed), dtype=np.int32) for _ in range(2))
         beyond = np.empty(len(where.elapsed))
-        grids = (time.grid, time.step, time.end, travel.grid, travel.step)
-        locate(where.elapsed, where.travel, where.running, uses_time, uses_travel, *grids, place, nearest, beyond)
+        locate(where.elapsed, where.travel, where.running, self._grids, place, nearest, beyond)
         return place, nearest, beyond
+
+    @cached_property
+    def _used(self) -> tuple[Curve, ...]:
+        """The curves that the alignment uses, that over time first."""
+        curves = {"time": (self.by_time,), "position": (self.by_position,)}
+        return curves.get(self.alignment, (self.by_time, self.by_position))
+
+    @cached_property
+    def _grids(self) -> Grids:
+        time, travel = self.by_time, self.by_position
+        points = read_only(np.concatenate([curve.grid for curve in self._used]))
+        time_points = float(len(time.count)) if self.alignment != "position" else 0.0
+        return Grids(points, time_points, float(time.step), float(time.end), float(travel.step))
 
     @cached_property
     def _lower(self) -> tuple[FloatArray, FloatArray, bool]:
@@ -91,14 +102,13 @@ class FittedSignature:
         return self._table(1)
 
     def _table(self, side: int) -> tuple[FloatArray, FloatArray, bool]:
-        """Return a limit at the grid points of both curves, its slopes to the next one, and if it is infinite there.
+        """Return a limit at the grid points of the curves, its slopes to the next one, and if it is infinite there.
 
         A last row is NaN, for samples outside the grids.
         """
-        curves = (self.by_time, self.by_position)
-        limits = [self.limits(curve)[side] for curve in curves]
+        limits = [self.limits(curve)[side] for curve in self._used]
         slopes = []
-        for curve, limit in zip(curves, limits, strict=True):
+        for curve, limit in zip(self._used, limits, strict=True):
             with np.errstate(invalid="ignore"):
                 slopes += [np.diff(limit, axis=0) / np.diff(curve.grid)[:, np.newaxis], np.zeros((1, limit.shape[1]))]
         unknown = np.full((1, limits[0].shape[1]), np.nan)

@@ -7,6 +7,7 @@ the motion alone: signatures of several detectors with the same grids share it.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,22 +25,28 @@ _PLACES = "Array(int32, 1, 'C', readonly=True)"
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 
 
+class Grids(NamedTuple):
+    """The grids of a signature's curves over time and over travel; a curve that is not used has no `points`.
+
+    The points over time are the first `time_points`; `time_end`: the last one that enough runs have reached.
+    """
+
+    points: FloatArray
+    time_points: float
+    time_step: float
+    time_end: float
+    travel_step: float
+
+
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), boolean, boolean, {READ_ONLY}, float64, "
-    f"float64, {READ_ONLY}, float64, int32[::1], int32[::1], float64[::1])",
+    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), Grids, int32[::1], int32[::1], float64[::1])",
     exact=True,
 )
 def locate(
     elapsed: FloatArray,
     travel: FloatArray,
     running: BoolArray,
-    uses_time: bool,
-    uses_travel: bool,
-    time_grid: FloatArray,
-    time_step: float,
-    time_end: float,
-    travel_grid: FloatArray,
-    travel_step: float,
+    grids: Grids,
     place: PlaceArray,
     nearest: PlaceArray,
     beyond: FloatArray,
@@ -49,44 +56,42 @@ def locate(
     Without one, one past the last: before the motion begins, or outside the grid, which still has a nearest point.
     If both time and travel are used, the time counts until the axis runs, and at most up to `time_end`.
     """
+    grid, time_points, points = grids.points, int(grids.time_points), len(grids.points)
+    uses_time, uses_travel = time_points > 0, points > time_points
     time_place = 0
-    travel_place = 0
-    none = len(time_grid) + len(travel_grid)
+    travel_place = time_points
     for k in range(len(elapsed)):
-        place[k] = none
-        nearest[k] = none
+        place[k] = points
+        nearest[k] = points
         beyond[k] = 0.0
         if not math.isfinite(elapsed[k]):
             continue
         by_travel = uses_travel and (running[k] or not uses_time)
         if by_travel:
-            location, step, last, first = travel[k], travel_step, len(travel_grid) - 1, len(time_grid)
+            location, step, at, first, last = travel[k], grids.travel_step, travel_place, time_points, points - 1
         else:
-            location, step, last, first = elapsed[k], time_step, len(time_grid) - 1, 0
-            if uses_travel and location > time_end:
-                location = time_end
+            location, step, at, first, last = elapsed[k], grids.time_step, time_place, 0, time_points - 1
+            if uses_travel and location > grids.time_end:
+                location = grids.time_end
         if math.isnan(location):
             nearest[k] = first
-            if last == 0:  # as numpy: a grid of a single point has its value there
+            if last == first:  # as numpy: a grid of a single point has its value there
                 place[k] = first
             continue
         steps = np.rint(location / step)
-        nearest[k] = first + (min(max(int(steps), 0), last) if abs(steps) < _TOO_MANY_STEPS else 0)
+        nearest[k] = first + (min(max(int(steps), 0), last - first) if abs(steps) < _TOO_MANY_STEPS else 0)
+        if location < grid[first] or location > grid[last]:
+            continue
+        while at < last and grid[at + 1] <= location:
+            at += 1
+        while grid[at] > location:
+            at -= 1
+        place[k] = at
+        beyond[k] = location - grid[at]
         if by_travel:
-            if travel_grid[0] <= location <= travel_grid[last]:
-                while travel_place < last and travel_grid[travel_place + 1] <= location:
-                    travel_place += 1
-                while travel_grid[travel_place] > location:
-                    travel_place -= 1
-                place[k] = first + travel_place
-                beyond[k] = location - travel_grid[travel_place]
-        elif time_grid[0] <= location <= time_grid[last]:
-            while time_place < last and time_grid[time_place + 1] <= location:
-                time_place += 1
-            while time_grid[time_place] > location:
-                time_place -= 1
-            place[k] = time_place
-            beyond[k] = location - time_grid[time_place]
+            travel_place = at
+        else:
+            time_place = at
 
 
 @kernel(f"void({_PLACES}, {_PLACES}, {READ_ONLY}, {_TABLE}, {_TABLE}, boolean, float64[:,::1])", exact=True)
