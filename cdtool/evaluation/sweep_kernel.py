@@ -50,16 +50,17 @@ def count_alarms(
     """Fill `false_alarms` (f,) and `latency` (f, contacts) [s], which is NaN at first.
 
     `met_at` and `status` (n J,) are those of all joints, sample by sample; at each sample in `begins`, every alarm is
-    armed again. `factors` (f,) increase; a value counts as
-    inside for a factor if it is at most its entry in `calm_factors`. Contacts are in order of time: an alarm from
-    `opens` to `closes` detects one if it is `timed`, and an alarm from `opens` to `releases` is not false.
+    armed again. `factors` (f,) increase; a value counts as inside for a factor if it is at most its entry in
+    `calm_factors`. Contacts are in order of time: an alarm from `opens` to `closes` detects one if it is `timed`, and
+    an alarm from `opens` to `releases` is not false.
     """
     count, contacts = len(factors), len(onsets)
     if count == 0:
         return
     joints = len(met_at) // max(len(time), 1)
     swept = np.empty(joints, dtype=np.bool_)
-    # By joint: the factors exceeded by the last sample, those raised, and those it was not calm for; each counted from the first factor.
+    # By joint: the number of factors that the last sample exceeded, that were raised, and that it was not calm for. They
+    # are the smallest ones.
     outside = np.zeros(joints, dtype=np.int64)
     raised = np.zeros(joints, dtype=np.int64)
     restless = np.zeros(joints, dtype=np.int64)
