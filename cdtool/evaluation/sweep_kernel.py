@@ -59,7 +59,7 @@ def count_alarms(
         return
     joints = len(met_at) // max(len(time), 1)
     swept = np.empty(joints, dtype=np.bool_)
-    # By joint: the number of factors that the last sample exceeded, that were raised, and that it was not calm for. They
+    # By joint: the number of factors that the last sample exceeded, were raised, and it was not calm for. They
     # are the smallest ones.
     outside = np.zeros(joints, dtype=np.int64)
     raised = np.zeros(joints, dtype=np.int64)

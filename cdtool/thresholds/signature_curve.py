@@ -133,6 +133,8 @@ class Curve:
     def at(self, values: FloatArray, axis: FloatArray) -> FloatArray:
         """Return values given on the grid at any location, interpolated by straight lines; NaN outside the grid."""
         result: FloatArray = np.interp(axis, self.grid, values, left=np.nan, right=np.nan)
+        if not np.isinf(values).any():
+            return result
         # A limit of infinity is infinity between two grid points too, where interpolation would give NaN.
         nearest = np.clip(np.rint(np.nan_to_num(axis) / self.step).astype(int), 0, len(values) - 1)
         return np.where(np.isinf(values[nearest]), values[nearest], result)
