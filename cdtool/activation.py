@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.clock.coarse_clock import recent_medians
+from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Alarm, Band, Signal, Status, StatusArray
 from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
@@ -95,8 +95,7 @@ class Activation:
             return np.full(len(time), self.debounce, dtype=np.int64)
         needed = np.full(len(time), 2, dtype=np.int64)
         if len(time) > 1:
-            steps = np.diff(time)
-            needed[1:] = np.maximum(np.rint(DEBOUNCE_TIME / recent_medians(steps, float(steps[0]))), 1.0)
+            needed[1:] = np.maximum(np.rint(DEBOUNCE_TIME / usual_steps(time)[1:]), 1.0)
         return needed
 
     def alarms(

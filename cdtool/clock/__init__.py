@@ -1,7 +1,8 @@
 """Causal alignment of channels to a detector's clock, and the correction of faulty time stamps.
 
 No function uses later samples: a value at time t is computed from samples at or before t. stamps.py makes the time
-stamps of a log strictly increasing; coarse_clock.py does so for a clock that is coarser than the samples.
+stamps of a log strictly increasing; coarse_clock.py does so for a clock that is coarser than the samples;
+held_samples.py aligns a channel to another clock.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 
 import numpy as np
 
-from cdtool.clock.coarse_clock import recent_medians
+from cdtool.clock.held_samples import HOLD_PERIODS, previous_value
 from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start, gap_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Series
@@ -27,31 +28,6 @@ __all__ = [
     "integrate",
     "previous_value",
 ]
-
-# A held value older than this many periods of its channel is missing.
-HOLD_PERIODS = 5.0
-
-
-def previous_value(series: Series, clock: FloatArray) -> FloatArray:
-    """Return the last sample at or before each time of `clock` [s] (m, J); NaN if it is missing or too old."""
-    if series.time is clock or (len(series.time) == len(clock) and np.array_equal(series.time, clock)):
-        return series.values
-    if not len(series.time):
-        return np.full((len(clock), series.joint_count), np.nan)
-    at = np.searchsorted(series.time, clock, side="right") - 1
-    held = series.values[np.maximum(at, 0)]
-    age = clock - series.time[np.maximum(at, 0)]
-    oldest = HOLD_PERIODS * _recent_period(series.time)[np.maximum(at, 0)]
-    return np.where(((at < 0) | (age > oldest))[:, np.newaxis], np.nan, held)
-
-
-def _recent_period(time: FloatArray) -> FloatArray:
-    """Return the median of the last steps [s] at each sample; infinite at the first sample."""
-    period = np.full(len(time), np.inf)
-    if len(time) > 1:
-        steps = np.diff(time)
-        period[1:] = recent_medians(steps, float(steps[0]))
-    return period
 
 
 def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 
+from cdtool.clock.recent_steps import recent_medians
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
-# The stamp step and the sample period are medians of this many preceding steps, so that they are causal.
-RECENT_STEPS = 9
 # A stamp step longer than this many usual ones contains a pause.
 _PAUSE = 1.5
 # Time constant of the fit in stamp changes: the fit must follow the drift between sample clock and stamp clock.
@@ -45,13 +44,6 @@ def fit_line(stamps: FloatArray) -> tuple[FloatArray, BoolArray]:
     time = np.full(len(stamps), np.nan)
     _follow(distinct, counts, step, time)
     return time, np.isfinite(time)
-
-
-def recent_medians(steps: FloatArray, before: float) -> FloatArray:
-    """Return the median of the last 9 steps at each step (n,); steps before the first are assumed to be `before`."""
-    padded = np.concatenate((np.full(RECENT_STEPS - 1, before), steps))
-    medians: FloatArray = np.median(np.lib.stride_tricks.sliding_window_view(padded, RECENT_STEPS), axis=1)
-    return medians
 
 
 @kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY})")

@@ -6,15 +6,17 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cdtool.clock.coarse_clock import RECENT_STEPS, recent_medians
+from cdtool.clock.held_samples import READ_MARKS, is_on_clock, newest_at
+from cdtool.clock.recent_steps import RECENT_STEPS, usual_steps
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # A channel is late if its newest sample is older than this many times its longest usual step.
 _LATE = 1.5
 # A step longer than this many times the median is not a usual one: samples are missing within it.
 _USUAL = 2.0
-# A channel shares a clock if it has samples at this share of the clock's last 20 samples.
-_SHARED_WINDOW, _SHARED_SHARE = 20, 0.75
+# A channel shares a clock if it has samples at this number of the clock's last 20 samples.
+_SHARED_WINDOW, _SHARED_SAMPLES = 20, 15
 
 
 def lost_samples(recording: Recording, channels: Iterable[str], clock: FloatArray) -> BoolArray | None:
@@ -46,31 +48,41 @@ def _lost_once(series: Series, clock: FloatArray, own: FloatArray | None) -> Boo
 
 def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray:
     missing: BoolArray = ~np.isfinite(series.values)
-    if len(series.time) == len(clock) and np.array_equal(series.time, clock):
+    if is_on_clock(series, clock):
         return missing
-    at = np.searchsorted(series.time, clock, side="right") - 1
-    newest = np.maximum(at, 0)
-    age = clock - series.time[newest]
-    late = (age > _LATE * _longest_usual_step(series.time)[newest]) | (_shares_clock(age) & (age > 0.0))
-    lost: BoolArray = (missing[newest] | late[:, np.newaxis]) & (at >= 0)[:, np.newaxis]
+    lost = np.empty((len(clock), series.joint_count), dtype=np.bool_)
+    _fill_lost(series.time, usual_steps(series.time), missing, np.ascontiguousarray(clock), lost)
     return lost
 
 
-def _longest_usual_step(time: FloatArray) -> FloatArray:
-    """Return, at each sample, the longest usual step [s] of the last 9; infinite at the first sample."""
-    longest = np.full(len(time), np.inf)
-    if len(time) > 1:
-        steps = np.diff(time)
-        padded = np.concatenate((np.full(RECENT_STEPS - 1, steps[0]), steps))
-        recent = np.lib.stride_tricks.sliding_window_view(padded, RECENT_STEPS).max(axis=1)
-        longest[1:] = np.minimum(recent, _USUAL * recent_medians(steps, float(steps[0])))
+@kernel(f"float64({READ_ONLY}, int64)")
+def _longest_recent_step(time: FloatArray, at: int) -> float:
+    """Return the longest of the last 9 steps up to sample `at`, which is not the first."""
+    longest = 0.0
+    for k in range(max(at - RECENT_STEPS + 1, 1), at + 1):
+        longest = max(longest, time[k] - time[k - 1])
     return longest
 
 
-def _shares_clock(age: FloatArray) -> BoolArray:
-    """Return where most of the preceding times of the clock were samples of the channel (n,)."""
-    own = np.concatenate(([0.0], np.cumsum(age == 0.0)))
-    index = np.arange(len(age))
-    before = own[index] - own[np.maximum(index - _SHARED_WINDOW, 0)]
-    shares: BoolArray = before >= _SHARED_SHARE * _SHARED_WINDOW
-    return shares
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_MARKS}, {READ_ONLY}, b1[:, ::1])")
+def _fill_lost(time: FloatArray, usual: FloatArray, missing: BoolArray, clock: FloatArray, lost: BoolArray) -> None:
+    """Fill `lost` (m, J); `usual` (n,): the median step up to each sample, `missing` (n, J): which have no value.
+
+    The longest usual step is the longest recent one, at most twice the median: never less than the median itself, so
+    that it is determined only for a sample older than 1.5 times that.
+    """
+    at = -1
+    # One bit for each of the last 20 times of the clock: whether the channel has a sample there.
+    shared = 0
+    count = 0
+    for k in range(len(clock)):
+        at = newest_at(time, clock[k], at)
+        age = clock[k] - time[max(at, 0)]
+        late = count >= _SHARED_SAMPLES and age > 0.0
+        if at > 0 and not late and age > _LATE * usual[at]:
+            late = age > _LATE * min(_longest_recent_step(time, at), _USUAL * usual[at])
+        for j in range(missing.shape[1]):
+            lost[k, j] = at >= 0 and (late or missing[at, j])
+        now_shared = 1 if age == 0.0 else 0
+        count += now_shared - ((shared >> (_SHARED_WINDOW - 1)) & 1)
+        shared = ((shared << 1) | now_shared) & ((1 << _SHARED_WINDOW) - 1)

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from cdtool.clock import previous_value
+from cdtool.clock.held_samples import READ_MARKS, READ_TABLE, is_held, is_on_clock, newest_at
 from cdtool.clock.lost_samples import lost_samples
+from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.kernels import kernel
-from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -298,7 +300,7 @@ class Drive:
     @property
     def interrupted(self) -> BoolArray:
         """(n, J): where a filter of force balances waits: no motion, or no torque after there was one."""
-        return self.speed_missing | (self.missing & (np.cumsum(~self.missing, axis=0) > 0))
+        return self.speed_missing | missing_after_first(self.missing)
 
 
 def drive_of(detector: Detector, recording: Recording, machine: Machine) -> Drive:
@@ -363,9 +365,8 @@ def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
     See `drive_of`, which also checks that everything needed is present.
     """
     speed = recording["speed"]
-    torque = previous_value(recording["torque"], speed.time)
-    torque_missing = ~np.isfinite(torque)
-    motion_missing = ~np.isfinite(speed.values)
+    torque, torque_missing = held_on(speed.time, recording["torque"])
+    motion_missing = speed_missing = ~np.isfinite(speed.values)
     position: FloatArray = np.broadcast_to(0.0, torque.shape)
     if machine.coupled:
         angles = previous_value(recording["position"], speed.time)
@@ -376,13 +377,95 @@ def drive_on_speed_clock(recording: Recording, machine: Machine) -> Drive:
         motion_missing = for_every_joint(motion_missing | lost)
     return Drive(
         speed.time,
-        hold_last(torque, torque_missing),
+        torque,
         position,
-        hold_last(speed.values, ~np.isfinite(speed.values)),
+        hold_last(speed.values, speed_missing),
         torque_missing | motion_missing,
         motion_missing,
         machine.coupled,
     )
+
+
+def held_on(clock: FloatArray, series: Series) -> tuple[FloatArray, BoolArray]:
+    """Return a channel on another clock, the last value held where a sample is missing.
+
+    Parameters
+    ----------
+    clock : ndarray of float, shape (n,)
+        Increasing times [s].
+    series : Series
+        The channel.
+
+    Returns
+    -------
+    held : ndarray of float, shape (n, J)
+        The values at these times, in the unit of the channel; 0 before the first one.
+    missing : ndarray of bool, shape (n, J)
+        Where the channel has no sample, or one that is too old (see `cdtool.clock.previous_value`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool.recording import Series
+    >>> torque = Series([0.1, 0.2, 0.3], [5.0, np.nan, 7.0], "N")
+    >>> held, missing = held_on(np.array([0.0, 0.15, 0.25, 0.35]), torque)
+    >>> held[:, 0].tolist(), missing[:, 0].tolist()
+    ([0.0, 5.0, 5.0, 7.0], [True, False, True, False])
+    """
+    if is_on_clock(series, clock):
+        missing: BoolArray = ~np.isfinite(series.values)
+        return hold_last(series.values, missing), missing
+    held = np.empty((len(clock), series.joint_count))
+    missing = np.empty(held.shape, dtype=np.bool_)
+    _fill_held(series.time, series.values, usual_steps(series.time), np.ascontiguousarray(clock), held, missing)
+    return held, missing
+
+
+@kernel(f"void({READ_ONLY}, {READ_TABLE}, {READ_ONLY}, {READ_ONLY}, float64[:, ::1], b1[:, ::1])")
+def _fill_held(
+    time: FloatArray, values: FloatArray, usual: FloatArray, clock: FloatArray, held: FloatArray, missing: BoolArray
+) -> None:
+    at = -1
+    for k in range(len(clock)):
+        at = newest_at(time, clock[k], at)
+        fresh = is_held(time, usual, clock[k], at)
+        for j in range(values.shape[1]):
+            present = fresh and math.isfinite(values[at, j])
+            missing[k, j] = not present
+            if present:
+                held[k, j] = values[at, j]
+            else:
+                held[k, j] = held[k - 1, j] if k > 0 else 0.0
+
+
+def missing_after_first(missing: BoolArray) -> BoolArray:
+    """Mark samples that are missing after there was a sample.
+
+    Parameters
+    ----------
+    missing : ndarray of bool, shape (n, J)
+        Where each joint has no sample.
+
+    Returns
+    -------
+    ndarray of bool, shape (n, J)
+        The same without the samples before the first one that is not missing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> missing_after_first(np.array([[True], [False], [True]]))[:, 0].tolist()
+    [False, False, True]
+    """
+    if not missing.any():
+        return missing
+    result = np.empty(missing.shape, dtype=np.bool_)
+    for j in range(missing.shape[1]):
+        # The first sample: argmin returns the first of the smallest, False.
+        first = int(np.argmin(missing[:, j]))
+        result[:, j] = missing[:, j]
+        result[: len(missing) if missing[first, j] else first, j] = False
+    return result
 
 
 def for_every_joint(missing: BoolArray) -> BoolArray:
@@ -431,11 +514,19 @@ def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:
     """
     if not missing.any():
         return values
-    rows = np.where(missing, -1, np.arange(len(values))[:, np.newaxis])
-    last = np.maximum.accumulate(rows, axis=0)
-    held = np.take_along_axis(values, np.maximum(last, 0), axis=0)
-    result: FloatArray = np.where(last < 0, 0.0, held)
-    return result
+    held = np.empty(values.shape)
+    _fill_last(np.ascontiguousarray(values), np.ascontiguousarray(missing), held)
+    return held
+
+
+@kernel(f"void({READ_TABLE}, {READ_MARKS}, float64[:, ::1])")
+def _fill_last(values: FloatArray, missing: BoolArray, held: FloatArray) -> None:
+    for k in range(len(values)):
+        for j in range(values.shape[1]):
+            if not missing[k, j]:
+                held[k, j] = values[k, j]
+            else:
+                held[k, j] = held[k - 1, j] if k > 0 else 0.0
 
 
 def observe_momentum(

@@ -9,7 +9,16 @@ import numpy as np
 
 from cdtool.clock import previous_value
 from cdtool.detection import Signal, Status
-from cdtool.detectors.base import for_every_joint, gain, hold_last, per_joint, require_channels, require_positive
+from cdtool.detectors.base import (
+    for_every_joint,
+    gain,
+    held_on,
+    hold_last,
+    missing_after_first,
+    per_joint,
+    require_channels,
+    require_positive,
+)
 from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
 from cdtool.detectors.look import GREY, Look
 from cdtool.dynamics import Gain, Machine
@@ -87,22 +96,20 @@ class DesiredDynamics:
         machine.require_inertia(self.name)
         reference = recording["reference_position"]
         time = reference.time
-        torque = previous_value(recording["torque"], time)
+        torque, torque_missing = held_on(time, recording["torque"])
         error = reference.values - previous_value(recording["position"], time)
         speed, acceleration = _rates(recording)
         motion_missing = ~np.isfinite(reference.values + speed + acceleration)
-        missing = motion_missing | ~np.isfinite(torque) | ~np.isfinite(error)
+        missing = motion_missing | torque_missing | ~np.isfinite(error)
         if machine.coupled:
             motion_missing, missing = for_every_joint(motion_missing), for_every_joint(missing)
         pose, speed, acceleration = (
             hold_last(item, ~np.isfinite(item)) for item in (reference.values, speed, acceleration)
         )
-        held = hold_last(torque, ~np.isfinite(torque))
-        balance = machine.force_balance(held, pose, speed) - machine.inertia_times(pose, acceleration)
+        balance = machine.force_balance(torque, pose, speed) - machine.inertia_times(pose, acceleration)
         cutoff = per_joint(self.cutoff, len(machine.joints))
         # A torque that is missing after it was present interrupts the low-pass, like a missing reference.
-        torque_missing = ~np.isfinite(torque)
-        waits = motion_missing | (torque_missing & (np.cumsum(~torque_missing, axis=0) > 0))
+        waits = motion_missing | missing_after_first(torque_missing)
         residual, _ = low_pass(time, balance, waits, cutoff)
         settle = settling_time(cutoff)
         started = started_at(time, waits, longest_gap(cutoff))

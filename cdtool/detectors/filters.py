@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock import GAP_PERIODS, HOLD_PERIODS
-from cdtool.clock.coarse_clock import recent_medians
+from cdtool.clock.held_samples import READ_MARKS, READ_TABLE
+from cdtool.clock.recent_steps import usual_steps
 from cdtool.detectors.base import BRIDGED
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
-_READ_BOOL = "Array(b1, 1, 'C', readonly=True)"
 # Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
 _SETTLE = 3.0 * math.sqrt(2.0)
 # No gap is cut into more steps than this.
@@ -104,50 +104,11 @@ def low_pass(
     2.0
     """
     filtered, rate = np.empty(values.shape), np.empty(values.shape)
-    corners = np.broadcast_to(np.asarray(cutoff, dtype=np.float64), values.shape[1])
-    longest = longest_gap(corners)
-    pieces = _pieces(time)
-    for j in range(values.shape[1]):
-        column, lost = np.ascontiguousarray(values[:, j]), np.ascontiguousarray(missing[:, j])
-        _low_pass(time, column, lost, pieces, 2.0 * math.pi * corners[j], longest[j], filtered[:, j], rate[:, j])
+    corners = np.array(np.broadcast_to(np.asarray(cutoff, dtype=np.float64), values.shape[1]))
+    columns = np.ascontiguousarray(values), np.ascontiguousarray(missing)
+    last, limits = np.empty(values.shape[1], dtype=np.int64), (2.0 * math.pi * corners, longest_gap(corners))
+    _low_pass(time, *columns, usual_steps(time), *limits, last, filtered, rate)
     return filtered, rate
-
-
-def _pieces(time: FloatArray) -> npt.NDArray[np.int64]:
-    """Return for each sample (n,) into how many usual steps its step is cut: 1 up to 5 of them, if no row is lost."""
-    pieces = np.ones(len(time), dtype=np.int64)
-    if len(time) > 2:
-        steps = np.diff(time)
-        usual = recent_medians(steps, float(steps[0]))[:-1]
-        long = steps[1:] > HOLD_PERIODS * usual
-        pieces[2:][long] = np.minimum(np.rint(steps[1:][long] / usual[long]), _MOST_PIECES).astype(np.int64)
-    return pieces
-
-
-def usual_steps(time: FloatArray) -> FloatArray:
-    """Return the median of the last 9 steps up to each sample.
-
-    Parameters
-    ----------
-    time : ndarray of float, shape (n,)
-        Strictly increasing times [s].
-
-    Returns
-    -------
-    ndarray of float, shape (n,)
-        The usual step [s]; infinite at the first sample.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> usual_steps(np.array([0.0, 0.25, 0.5, 1.5])).tolist()
-    [inf, 0.25, 0.25, 0.25]
-    """
-    usual = np.full(len(time), np.inf)
-    if len(time) > 1:
-        steps = np.diff(time)
-        usual[1:] = recent_medians(steps, float(steps[0]))
-    return usual
 
 
 def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
@@ -178,17 +139,8 @@ def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
     [7, 8]
     """
     result = np.zeros(lost.shape, dtype=bool)
-    if len(time) < 3:
-        return result
-    steps = np.diff(time)
-    usual = np.concatenate((steps[:1], steps[:1], recent_medians(steps, float(steps[0]))[:-1]))
-    for j in range(lost.shape[1]):
-        known = np.where(lost[:, j], np.nan, time)
-        # Time since the last sample that was not lost.
-        since = time - np.fmax.accumulate(np.concatenate(([time[0]], known[:-1])))
-        ends = time + np.minimum(since - usual, longest)
-        behind = (since > GAP_PERIODS * usual) & ~lost[:, j]
-        result[:, j] = time < np.maximum.accumulate(np.where(behind, ends, -np.inf)) - 0.5 * usual
+    if len(time) > 2:
+        _mark_unsettled(time, usual_steps(time), np.ascontiguousarray(lost), longest, result)
     return result
 
 
@@ -216,16 +168,8 @@ def started_at(time: FloatArray, missing: BoolArray, longest_gap: FloatArray | f
     [inf, 1.0, 1.0, 9.0]
     """
     starts = np.empty(missing.shape)
-    longest = np.broadcast_to(longest_gap, missing.shape[1])
-    for j in range(missing.shape[1]):
-        present = np.flatnonzero(~missing[:, j])
-        fresh = np.ones(len(present), dtype=bool)
-        fresh[1:] = np.diff(time[present]) > longest[j]
-        last = np.full(len(time), np.inf)
-        last[present[fresh]] = time[present[fresh]]
-        index = np.where(np.isfinite(last), np.arange(len(time)), -1)
-        index = np.maximum.accumulate(index) if len(index) else index
-        starts[:, j] = np.where(index >= 0, last[np.maximum(index, 0)], np.inf)
+    longest = np.array(np.broadcast_to(longest_gap, missing.shape[1]), dtype=np.float64)
+    _fill_starts(time, np.ascontiguousarray(missing), longest, starts)
     return starts
 
 
@@ -260,88 +204,158 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     (0.58, 2.0)
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
-    equations = np.empty((4, 5))
-    for j in range(values.shape[1]):
-        _polynomial_rates(time, np.ascontiguousarray(values[:, j]), samples, equations, first[:, j], second[:, j])
+    sums = np.empty((5, samples)), np.empty((4, 4)), np.empty((4, values.shape[1]))
+    _polynomial_rates(time, np.ascontiguousarray(values), samples, *sums, first, second)
     return first, second
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, {_READ_BOOL}, int64[::1], float64, float64, float64[:], float64[:])")
-def _low_pass(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
+@kernel(
+    f"void({READ_ONLY}, {READ_TABLE}, {READ_MARKS}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64[::1], "
+    "float64[:, ::1], float64[:, ::1])"
+)
+def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
     values: FloatArray,
     missing: BoolArray,
-    pieces: npt.NDArray[np.int64],
-    cutoff: float,
-    longest_gap: float,
+    usual: FloatArray,
+    cutoff: FloatArray,
+    longest_gap: FloatArray,
+    last: npt.NDArray[np.int64],
     filtered: FloatArray,
     rate: FloatArray,
 ) -> None:
-    """x1' = x2, x2' = w^2 (u - x1) - sqrt(2) w x2, trapezoid; w prewarped: (2 / T) tan(w T / 2)."""
+    """x1' = x2, x2' = w^2 (u - x1) - sqrt(2) w x2, trapezoid; w prewarped: (2 / T) tan(w T / 2).
+
+    `usual` (n,): the usual step up to each sample. A step of more than 5 of them is cut into as many as it contains.
+    `last` (J,) is overwritten.
+    """
     root = math.sqrt(2.0)
-    y = 0.0
-    slope = 0.0
-    last = -1
+    joints = values.shape[1]
+    for j in range(joints):
+        last[j] = -1
     for k in range(len(time)):
-        if not missing[k]:
-            step = time[k] - time[last] if last >= 0 else math.inf
-            if step > longest_gap:
-                y = values[k]
-                slope = 0.0
-            else:
-                parts = max(pieces[k], k - last)
-                half = 0.5 * step / parts
-                # Above its Nyquist frequency a filter cannot be prewarped: it stays just below.
-                w = math.tan(min(cutoff * half, 1.4)) / half
-                square = w * w
-                before = values[last]
-                for part in range(parts):
-                    after = values[k] if part == parts - 1 else before + (values[k] - before) / (parts - part)
-                    drive = half * square * (after + before)
-                    right_slope = slope * (1.0 - half * root * w) - half * square * y + drive
-                    right_y = y + half * slope
-                    slope = (right_slope - half * square * right_y) / (1.0 + half * root * w + half * half * square)
-                    y = right_y + half * slope
-                    before = after
-            last = k
-        filtered[k] = y
-        rate[k] = slope
+        pieces = 1
+        if k > 1 and time[k] - time[k - 1] > HOLD_PERIODS * usual[k - 1]:
+            pieces = int(min(np.rint((time[k] - time[k - 1]) / usual[k - 1]), _MOST_PIECES))
+        angle = half = w = -1.0
+        for j in range(joints):
+            y = filtered[k - 1, j] if k > 0 else 0.0
+            slope = rate[k - 1, j] if k > 0 else 0.0
+            before = last[j]
+            if not missing[k, j]:
+                step = time[k] - time[before] if before >= 0 else math.inf
+                if step > longest_gap[j]:
+                    y = values[k, j]
+                    slope = 0.0
+                else:
+                    parts = max(pieces, k - before)
+                    own_half = 0.5 * step / parts
+                    # Joints with the same cut-off and the same step share the tangent.
+                    if cutoff[j] * own_half != angle or own_half != half:
+                        angle, half = cutoff[j] * own_half, own_half
+                        # Above its Nyquist frequency a filter cannot be prewarped: it stays just below.
+                        w = math.tan(min(angle, 1.4)) / half
+                    square = w * w
+                    old = values[before, j]
+                    for part in range(parts):
+                        new = values[k, j] if part == parts - 1 else old + (values[k, j] - old) / (parts - part)
+                        drive = half * square * (new + old)
+                        right_slope = slope * (1.0 - half * root * w) - half * square * y + drive
+                        right_y = y + half * slope
+                        slope = (right_slope - half * square * right_y) / (1.0 + half * root * w + half * half * square)
+                        y = right_y + half * slope
+                        old = new
+                last[j] = k
+            filtered[k, j] = y
+            rate[k, j] = slope
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, int64, float64[:, ::1], float64[:], float64[:])")
-def _polynomial_rates(  # noqa: C901  a kernel is one loop
-    time: FloatArray, values: FloatArray, samples: int, matrix: FloatArray, first: FloatArray, second: FloatArray
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_MARKS}, float64, b1[:, ::1])")
+def _mark_unsettled(time: FloatArray, usual: FloatArray, lost: BoolArray, longest: float, result: BoolArray) -> None:
+    for j in range(lost.shape[1]):
+        newest, until = time[0], -math.inf
+        for k in range(len(time)):
+            period = usual[max(k - 1, 1)]
+            since = time[k] - newest
+            if since > GAP_PERIODS * period and not lost[k, j]:
+                until = max(until, time[k] + min(since - period, longest))
+            result[k, j] = time[k] < until - 0.5 * period
+            if not lost[k, j]:
+                newest = time[k]
+
+
+@kernel(f"void({READ_ONLY}, {READ_MARKS}, {READ_ONLY}, float64[:, ::1])")
+def _fill_starts(time: FloatArray, missing: BoolArray, longest_gap: FloatArray, starts: FloatArray) -> None:
+    for j in range(missing.shape[1]):
+        start, last = math.inf, -math.inf
+        for k in range(len(time)):
+            if not missing[k, j]:
+                if start == math.inf or time[k] - last > longest_gap[j]:
+                    start = time[k]
+                last = time[k]
+            starts[k, j] = start
+
+
+@kernel(f"void({READ_ONLY}, {READ_TABLE}, int64, {', '.join(5 * ['float64[:, ::1]'])})")
+def _polynomial_rates(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
+    time: FloatArray,
+    values: FloatArray,
+    samples: int,
+    powers: FloatArray,
+    matrix: FloatArray,
+    right: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
 ) -> None:
     """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting.
 
-    `matrix` (4, 5) is overwritten.
+    All joints have the same matrix (4, 4); `right` (4, J) are their right-hand sides. Both are overwritten.
     """
+    joints = values.shape[1]
     for k in range(len(time)):
         start = k - samples + 1 if k >= samples else 0
         span = time[k] - time[start]
         if k - start < 4 or not span > 0.0:
             continue
-        for row in range(4):
-            for column in range(5):
-                matrix[row, column] = 0.0
-        for i in range(start, k + 1):
-            x = (time[i] - time[k]) / span
-            change = values[i] - values[k]
-            of_row = 1.0
-            for row in range(4):
-                of_column = 1.0
-                for column in range(4):
-                    matrix[row, column] += of_row * of_column
-                    of_column *= x
-                matrix[row, 4] += of_row * change
-                of_row *= x
+        s1 = s2 = s3 = s4 = s5 = s22 = s33 = 0.0
+        right[:] = 0.0
+        count = k + 1 - start
+        for i in range(count):
+            x = (time[start + i] - time[k]) / span
+            powers[0, i] = x
+            powers[1, i] = x * x
+            powers[2, i] = x * x * x
+            powers[3, i] = x * (x * x * x)
+            powers[4, i] = (x * x) * (x * x * x)
+        for i in range(count):
+            x, square, cube = powers[0, i], powers[1, i], powers[2, i]
+            s1 += x
+            s2 += square
+            s3 += cube
+            s4 += powers[3, i]
+            s5 += powers[4, i]
+            s22 += square * square
+            s33 += cube * cube
+            for j in range(joints):
+                change = values[start + i, j] - values[k, j]
+                right[0, j] += change
+                right[1, j] += x * change
+                right[2, j] += square * change
+                right[3, j] += cube * change
+        matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3] = float(count), s1, s2, s3
+        matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3] = s1, s2, s3, s4
+        matrix[2, 0], matrix[2, 1], matrix[2, 2], matrix[2, 3] = s2, s3, s22, s5
+        matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[3, 3] = s3, s4, s5, s33
         for pivot in range(4):
             for row in range(pivot + 1, 4):
                 factor = matrix[row, pivot] / matrix[pivot, pivot]
-                for column in range(pivot, 5):
+                for column in range(pivot, 4):
                     matrix[row, column] -= factor * matrix[pivot, column]
-        cubic = matrix[3, 4] / matrix[3, 3]
-        square = (matrix[2, 4] - matrix[2, 3] * cubic) / matrix[2, 2]
-        linear = (matrix[1, 4] - matrix[1, 2] * square - matrix[1, 3] * cubic) / matrix[1, 1]
-        first[k] = linear / span
-        second[k] = 2.0 * square / (span * span)
+                for j in range(joints):
+                    right[row, j] -= factor * right[pivot, j]
+        for j in range(joints):
+            cubic = right[3, j] / matrix[3, 3]
+            quadratic = (right[2, j] - matrix[2, 3] * cubic) / matrix[2, 2]
+            linear = (right[1, j] - matrix[1, 2] * quadratic - matrix[1, 3] * cubic) / matrix[1, 1]
+            first[k, j] = linear / span
+            second[k, j] = 2.0 * quadratic / (span * span)

@@ -8,14 +8,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.clock import previous_value
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
     drive_of,
     for_every_joint,
     gain,
-    hold_last,
+    held_on,
     of_joint,
     require_positive,
     single,
@@ -156,9 +155,8 @@ class FrictionEkf:
         """Return the virtual friction (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
         acceleration = recording["acceleration"]
-        others = previous_value(acceleration, drive.time)
-        lost = ~np.isfinite(others)
-        equations = machine.joint_equations(drive.torque, drive.position, drive.speed, hold_last(others, lost))
+        others, lost = held_on(drive.time, acceleration)
+        equations = machine.joint_equations(drive.torque, drive.position, drive.speed, others)
         measured = np.where(drive.speed_missing, np.nan, drive.speed)
         missing = drive.missing | for_every_joint(lost) if machine.coupled else drive.missing
         friction = np.zeros(measured.shape)

@@ -8,14 +8,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from cdtool.clock import HOLD_PERIODS, previous_value
-from cdtool.clock.coarse_clock import recent_medians
+from cdtool.clock import HOLD_PERIODS
+from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Signal, Status
 from cdtool.detectors.base import (
     drive_of,
     for_every_joint,
     gain,
-    hold_last,
+    held_on,
+    missing_after_first,
     observe_momentum,
     of_joint,
     require_positive,
@@ -104,17 +105,16 @@ class InertialMomentum:
     def signal(self, recording: Recording, machine: Machine) -> Signal:
         """Return the residual (n, J) on the speed's clock; see `Detector.signal`."""
         drive = drive_of(self, recording, machine)
-        acceleration = previous_value(recording["acceleration"], drive.time)
-        lost = ~np.isfinite(acceleration)
+        acceleration, lost = held_on(drive.time, recording["acceleration"])
         # Before the first accelerometer sample no sample is lost.
-        unknown = lost & (np.cumsum(~lost, axis=0) > 0)
+        unknown = missing_after_first(lost)
         fused = np.empty_like(drive.speed)
         ready = np.empty(fused.shape[1])
         for j, stick_speed in enumerate(machine.stick_speed):
             fused[:, j], ready[j] = of_joint(self, j, len(ready)).fuse(
                 drive.time,
                 drive.speed[:, j],
-                hold_last(acceleration, lost)[:, j],
+                acceleration[:, j],
                 drive.speed_missing[:, j],
                 stick_speed,
                 unknown[:, j],
@@ -163,18 +163,11 @@ class InertialMomentum:
         k1, k2 = 2.0 * single(self.damping) * crossover, crossover**2
         fused = np.empty(len(time))
         lost = np.zeros(len(time), dtype=bool) if lost is None else lost
-        inputs = (speed, acceleration, missing, lost, _longest_line(time))
+        inputs = (speed, acceleration, missing, lost, usual_steps(time))
         arrays = (np.ascontiguousarray(item) for item in inputs)
         settle = 3.0 / float(np.min(np.abs(np.roots([1.0, k1, k2]).real)))
         rest = (standstill_speed, _STANDSTILL_WINDOW, _STANDSTILL_AT_LEAST)
         return fused, float(_fuse(time, *arrays, k1, k2, settle, *rest, fused))
-
-
-def _longest_line(time: FloatArray) -> FloatArray:
-    """Return for each sample (n,) the longest gap in the acceleration that a straight line bridges [s]."""
-    steps = np.diff(time)
-    usual = recent_medians(steps, float(steps[0])) if len(steps) else steps
-    return np.maximum(_LONGEST_LINE, HOLD_PERIODS * np.concatenate((usual[:1], usual[:1], usual[:-1])))[: len(time)]
 
 
 @kernel(
@@ -188,7 +181,7 @@ def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by
     acceleration: FloatArray,
     missing: BoolArray,
     lost: BoolArray,
-    longest_line: FloatArray,
+    usual: FloatArray,
     k1: float,
     k2: float,
     settle: float,
@@ -197,7 +190,10 @@ def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by
     at_least: float,
     fused: FloatArray,
 ) -> float:
-    """Bilinear form of w' = a + k1 (v - w) + z, z' = k2 (v - w); returns the time from which w can be used [s]."""
+    """Bilinear form of w' = a + k1 (v - w) + z, z' = k2 (v - w); returns the time from which w can be used [s].
+
+    `usual` (n,): the usual step up to each sample.
+    """
     w = 0.0
     z = 0.0
     started = False
@@ -243,7 +239,7 @@ def _fuse(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by
         half = 0.5 * span
         straight = bridged or last == k - 1
         change, gained, bridged = gained, 0.0, False
-        if straight and span > longest_line[k]:
+        if straight and span > max(_LONGEST_LINE, HOLD_PERIODS * usual[max(k - 1, 1)]):
             w += speed[k] - speed[last]
             fused[k] = w
             last = k

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.detectors.base import (
     BRIDGED,
@@ -17,7 +18,6 @@ from cdtool.detectors.base import (
     require_positive,
     single,
 )
-from cdtool.detectors.filters import usual_steps
 from cdtool.detectors.look import NAVY, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.kernels import READ_ONLY, kernel
@@ -106,7 +106,7 @@ class KalmanMomentum:
             per_joint(value, len(machine.joints)) ** 2
             for value in (self.contact_drift, self.sigma_torque, self.sigma_speed)
         )
-        usual = usual_steps(drive.time)
+        usual, interrupted = usual_steps(drive.time), drive.interrupted
         for j, inertia in enumerate(machine.nominal_inertia):
             _filter(
                 drive.time,
@@ -115,7 +115,7 @@ class KalmanMomentum:
                 np.ascontiguousarray(momentum[:, j]),
                 np.ascontiguousarray(drive.missing[:, j]),
                 np.ascontiguousarray(drive.speed_missing[:, j]),
-                np.ascontiguousarray(drive.interrupted[:, j]),
+                np.ascontiguousarray(interrupted[:, j]),
                 machine.coupled,
                 drift[j],
                 torque[j],
@@ -172,7 +172,7 @@ def _process_noise(drift: float, torque: float, step: float) -> FloatArray:
 
 
 @kernel(
-    f"void({READ_ONLY}, float64[::1], float64[::1], float64[::1], b1[::1], b1[::1], b1[::1], b1, float64, float64, "
+    f"void({READ_ONLY}, {READ_ONLY}, float64[::1], float64[::1], b1[::1], b1[::1], b1[::1], b1, float64, float64, "
     "float64, float64[:], uint8[:])"
 )
 def _filter(  # noqa: PLR0913  a kernel takes arrays and scalars one by one
