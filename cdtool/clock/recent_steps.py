@@ -65,7 +65,7 @@ def recent_medians(steps: FloatArray, before: float) -> FloatArray:
     """
     padded = np.concatenate((np.full(RECENT_STEPS - 1, before), steps))
     medians = np.empty(len(steps))
-    if _fill_medians(padded, *np.empty((3, _BLOCK + _TRIPLES_BACK)), medians):
+    if _fill_medians(padded, *np.empty((3, _BLOCK + _TRIPLES_BACK)), medians) and len(steps):
         unknown = np.lib.stride_tricks.sliding_window_view(np.isnan(padded), RECENT_STEPS)
         medians[unknown.any(axis=1)] = np.nan
     return medians
