@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdtool.evaluation.truth.missing_samples import batch_length, longest_step, time_to_shoulder
+from cdtool.evaluation.truth.missing_samples import CellSamples, cell_samples, time_to_shoulder
 from cdtool.evaluation.truth.onset_rule import OnsetRule
-from cdtool.evaluation.truth.rest_level import INTERVAL, IntArray, RestLine, RunningRest
+from cdtool.evaluation.truth.rest_level import RestLine, RunningRest
+from cdtool.evaluation.truth.rest_level_kernels import INTERVAL, IntArray
 from cdtool.recording import Contact, FloatArray, Series
 
 # Standard deviation of the error of rounding to steps of 1: uniform between -1/2 and 1/2.
@@ -60,11 +61,10 @@ def load_cell_contacts(series: Series, rule: OnsetRule, steps: float = 0.0) -> l
 
     Where the level comes from the noise it is at least `steps` of the cell's steps.
     """
-    present = np.isfinite(series.values[:, 0])
-    if np.count_nonzero(present) < 3:
+    samples = cell_samples(series)
+    if len(samples.time) < 3:
         return []
-    since = float(series.time[0])
-    return _Search(series.time[present], series.values[present, 0], rule, steps, since).contacts()
+    return _Search(samples, rule, steps, float(series.time[0])).contacts()
 
 
 def _joined(contact: Contact, rebound: Contact) -> Contact:
@@ -85,12 +85,12 @@ class _Rise:
 class _Search:
     """One load cell's readings (n,) and what has been found in them so far."""
 
-    def __init__(self, time: FloatArray, force: FloatArray, rule: OnsetRule, steps: float, since: float) -> None:
-        self.time, self.force, self.rule, self.since = time, force, rule, since
-        self.period = float(np.median(np.diff(time)))
-        self.longest_step, self.batch = longest_step(time), batch_length(time)
-        self.rest = RunningRest(time, force)
-        step = reading_step(force)
+    def __init__(self, samples: CellSamples, rule: OnsetRule, steps: float, since: float) -> None:
+        self.time, self.force, self.clock = samples.time, samples.force, samples.clock
+        self.rule, self.since = rule, since
+        self.period = samples.clock.period
+        self.rest = RunningRest(samples.time, samples.force)
+        step = reading_step(samples.force)
         self.noise = max(self.rest.noise, _ROUNDING * step)
         self.above, self.back_to = rule.levels(self.noise, steps * step)
 
@@ -198,9 +198,9 @@ class _Search:
         way = float(self.time[high]) - start
         drifted = line.error_at(start)
         finely = self._time_for(rise, self.noise) + self._time_for(rise, drifted)
-        level = float(line.value(self.time[onset : onset + 1])[0])
+        level = line.value(float(self.time[onset]))
         hole, since_hole = self._hole(rise, over[: last - onset + 1])
-        interval = max(interval, since_hole, self.batch)
+        interval = max(interval, since_hole, self.clock.batch_length)
         contact = Contact(
             start=start,
             end=float(self.time[last]),
@@ -228,7 +228,7 @@ class _Search:
         steps = np.diff(marks)
         touch = time_to_shoulder(self.time[rise.onset : rise.onset + len(over)], rise.sign * over, self.period)
         least = np.where(marks[1:] < self.time[rise.onset], touch, 0.0)
-        wide = np.flatnonzero((steps > self.longest_step) & (steps >= least))
+        wide = np.flatnonzero((steps > self.clock.longest_step) & (steps >= least))
         if not len(wide):
             return 0.0, 0.0
         return float(steps[wide].max()), max(float(self.time[rise.onset] - marks[wide[0]]), 0.0)
@@ -261,7 +261,7 @@ class _Search:
         back, or nearly so, and where the force went further to the other side of zero than a release does.
         """
         line, onset = rise.rest, rise.onset
-        level = float(line.value(self.time[onset : onset + 1])[0])
+        level = line.value(float(self.time[onset]))
         first = max(begin, min(onset, rise.high))
         over = self.force[onset:] - line.value(self.time[onset:])
         last = onset + self._end(rise, over)

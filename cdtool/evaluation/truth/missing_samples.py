@@ -8,15 +8,90 @@ hide nothing from it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
-from cdtool.recording import FloatArray
+from cdtool.recording import FloatArray, Series
 
 CLOSE_ENOUGH = 5e-3
 # A step longer than so many periods is no jitter of a regular clock: the force in it is not simply what is beside it.
 PERIODS = 1.5
 _ONE_LOST, _USUAL, _MORE = 2.5, 0.95, 1.1
 _BATCH = 5.0
+
+
+@dataclass(frozen=True)
+class CellClock:
+    """The times of the samples of a load cell, `time` (n,) [s], and what its steps are like."""
+
+    time: FloatArray
+
+    @property
+    def period(self) -> float:
+        """Return the median step [s]; 0 below two samples."""
+        return self._steps[0]
+
+    @cached_property
+    def longest_step(self) -> float:
+        """Return the longest step between samples that is not a hole [s]."""
+        if len(self.time) < 2:
+            return CLOSE_ENOUGH
+        period, usual = self._steps
+        return max(CLOSE_ENOUGH, _ONE_LOST * period, period + _MORE * usual)
+
+    @property
+    def batch_length(self) -> float:
+        """Return how far a stamp may be behind its sample if samples are stamped in batches [s]; else 0.
+
+        In batches the step that one in 20 exceeds is many times the usual one.
+        """
+        period, usual = self._steps
+        return usual if usual > _BATCH * period else 0.0
+
+    @cached_property
+    def _steps(self) -> tuple[float, float]:
+        """Return the median step and the one that one in 20 exceeds [s], by one selection; 0 below two samples."""
+        if len(self.time) < 2:
+            return 0.0, 0.0
+        steps = np.diff(self.time)
+        last = len(steps) - 1
+        place = last * _USUAL
+        before, middle = int(place), len(steps) // 2
+        steps.partition(sorted({middle - 1 + len(steps) % 2, middle, before, min(before + 1, last)}))
+        period = 0.5 * float(steps[middle - 1 + len(steps) % 2] + steps[middle])
+        low, high = float(steps[before]), float(steps[min(before + 1, last)])
+        # As numpy interpolates: from the nearer of the two.
+        weight = place - before
+        usual = high - (high - low) * (1.0 - weight) if weight >= 0.5 else low + (high - low) * weight
+        return period, usual
+
+
+@dataclass(frozen=True)
+class CellSamples:
+    """The samples of a load cell that are not missing: `force` (n,) [N] at the times of `clock`."""
+
+    clock: CellClock
+    force: FloatArray
+
+    @property
+    def time(self) -> FloatArray:
+        """Return the times (n,) [s]."""
+        return self.clock.time
+
+
+def cell_samples(force: Series) -> CellSamples:
+    """Return the samples of a load cell that are not missing, each time the same object."""
+    return force.derived("samples of the load cell", lambda: _existing(force))
+
+
+def _existing(force: Series) -> CellSamples:
+    reading = np.ascontiguousarray(force.values[:, 0])
+    present = np.isfinite(reading)
+    if present.all():
+        return CellSamples(CellClock(force.time), reading)
+    return CellSamples(CellClock(force.time[present]), reading[present])
 
 
 def longest_step(time: FloatArray) -> float:
@@ -37,23 +112,7 @@ def longest_step(time: FloatArray) -> float:
     >>> longest_step(np.arange(1000) * 1e-3), round(longest_step(np.arange(100) * 1e-2), 6)
     (0.005, 0.025)
     """
-    if len(time) < 2:
-        return CLOSE_ENOUGH
-    steps = np.diff(time)
-    period = float(np.median(steps))
-    return max(CLOSE_ENOUGH, _ONE_LOST * period, period + _MORE * float(np.quantile(steps, _USUAL)))
-
-
-def batch_length(time: FloatArray) -> float:
-    """Return how far a stamp may be behind its sample if samples are stamped in batches [s]; else 0.
-
-    In batches the step that one in 20 exceeds is many times the usual one.
-    """
-    if len(time) < 2:
-        return 0.0
-    steps = np.diff(time)
-    long = float(np.quantile(steps, _USUAL))
-    return long if long > _BATCH * float(np.median(steps)) else 0.0
+    return CellClock(time).longest_step
 
 
 def time_to_shoulder(time: FloatArray, force: FloatArray, period: float) -> float:

@@ -1,0 +1,101 @@
+"""Medians and quantiles of short parts of a log as kernels, with the bits of numpy's.
+
+A call of `np.median` costs more than the selection itself if the part is short; a log has hundreds of such parts.
+"""
+
+from __future__ import annotations
+
+import math
+
+from cdtool.kernels import kernel
+from cdtool.recording import FloatArray
+
+# Fewer values than this are sorted by insertion.
+_FEW = 16
+
+
+@kernel("float64(float64[::1], int64, int64)", exact=True)
+def kth_smallest(values: FloatArray, count: int, k: int) -> float:
+    """Return the k-th smallest, from 0, of the first `count` values; reorder them so that no larger one is before it.
+
+    None of them is NaN (Hoare 1961, Algorithm 65: FIND).
+    """
+    low = 0
+    high = count - 1
+    while high - low >= _FEW:
+        middle = (low + high) // 2
+        pivot = max(min(values[low], values[middle]), min(max(values[low], values[middle]), values[high]))
+        i = low
+        j = high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while pivot < values[j]:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if k <= j:
+            high = j
+        elif k >= i:
+            low = i
+        else:
+            return float(values[k])
+    for i in range(low + 1, high + 1):
+        value = values[i]
+        j = i - 1
+        while j >= low and values[j] > value:
+            values[j + 1] = values[j]
+            j -= 1
+        values[j + 1] = value
+    return float(values[k])
+
+
+@kernel("boolean(float64[::1], int64)", exact=True)
+def has_nan(values: FloatArray, count: int) -> bool:
+    """Return whether one of the first `count` values is NaN."""
+    for i in range(count):  # noqa: SIM110  a kernel: no generator
+        if math.isnan(values[i]):
+            return True
+    return False
+
+
+@kernel("float64(float64[::1], int64)", exact=True)
+def largest_of(values: FloatArray, count: int) -> float:
+    """Return the largest of the first `count` values, at least one; none of them is NaN."""
+    largest = values[0]
+    for i in range(1, count):
+        largest = max(largest, values[i])
+    return float(largest)
+
+
+@kernel("float64(float64[::1], int64)", exact=True)
+def median_of(values: FloatArray, count: int) -> float:
+    """Return the median of the first `count` values, which it reorders; NaN if one is NaN or the count is 0."""
+    if count == 0 or has_nan(values, count):
+        return math.nan
+    middle = count // 2
+    upper = kth_smallest(values, count, middle)
+    if count % 2:
+        return float(0.0 + upper)  # as in numpy, the median of negative zeros is 0
+    return float((0.0 + largest_of(values, middle) + upper) / 2.0)
+
+
+@kernel("float64(float64[::1], int64, float64)", exact=True)
+def quantile_of(values: FloatArray, count: int, share: float) -> float:
+    """Return the quantile of the first `count` values, which it reorders, linear between two; NaN as `median_of`.
+
+    A zero may have another sign than numpy's.
+    """
+    if count == 0 or has_nan(values, count):
+        return math.nan
+    place = (count - 1) * share
+    before = min(math.floor(place), count - 1)
+    upper = kth_smallest(values, count, min(before + 1, count - 1))
+    lower = largest_of(values, before + 1)
+    weight = place - before
+    difference = upper - lower
+    if weight >= 0.5:
+        return float(upper - difference * (1.0 - weight))
+    return float(lower + difference * weight)

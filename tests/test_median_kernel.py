@@ -1,0 +1,45 @@
+"""Medians and quantiles by kernels against numpy's, bit by bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from cdtool.median_kernel import median_of, quantile_of
+from tests.bits import VALUES, assert_same_bits
+
+_FINITE = st.sampled_from([0.0, -0.0, 1.0, -1.0, 2.5, 1e300, -1e-300])
+
+
+@settings(max_examples=300, deadline=None)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of numpy, for empty input and infinite values
+@given(st.integers(0, 90).flatmap(lambda n: arrays(np.float64, n, elements=st.one_of(VALUES, _FINITE))))
+def test_a_median_has_the_bits_of_numpys(values):
+    scratch = np.concatenate((values, [np.nan, -5.0]))
+    assert_same_bits(np.array(median_of(scratch, len(values))), np.array(np.median(values)))
+    np.testing.assert_array_equal(np.sort(scratch[: len(values)]), np.sort(values))  # reordered, none lost
+
+
+@settings(max_examples=300, deadline=None)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@given(
+    st.integers(1, 90).flatmap(lambda n: arrays(np.float64, n, elements=st.one_of(VALUES, _FINITE))),
+    st.sampled_from([0.0, 1.0 / 3.0, 0.5, 0.95, 1.0]),
+)
+def test_a_quantile_has_the_bits_of_numpys_the_sign_of_a_zero_apart(values, share):
+    ours, theirs = quantile_of(values.copy(), len(values), share), np.quantile(values, share)
+    assert_same_bits(np.array(0.0 + ours), np.array(0.0 + theirs))
+
+
+@pytest.mark.parametrize("count", [1, 2, 40, 5001])
+@pytest.mark.parametrize("order", ["ascending", "descending", "equal", "organ pipe", "random"])
+def test_no_order_of_the_values_is_slow_or_wrong(count, order):
+    ascending = np.arange(count, dtype=float)
+    pipe = np.minimum(ascending, ascending[::-1])
+    random = np.random.default_rng(1).normal(size=count)
+    made = {"ascending": ascending, "descending": ascending[::-1], "equal": 0.0 * ascending, "organ pipe": pipe}
+    values = np.array(made.get(order, random))
+    assert median_of(values.copy(), count) == np.median(values)
