@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
 from cdtool.detection import Signal, Status
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
@@ -69,6 +71,21 @@ class Comparison:
     level_spread: FloatArray
     reach: FloatArray
     level_reach: FloatArray
+
+    @cached_property
+    def distance(self) -> FloatArray:
+        """Return the distance of the values from the mean (n, J) [spreads]; NaN if unknown."""
+        return _in_spreads(self.value - self.mean, self.spread)
+
+    @cached_property
+    def level_off(self) -> FloatArray:
+        """Return the distance of the level from its mean (n, J), in `unit`."""
+        return self.level - self.level_mean
+
+    @cached_property
+    def level_distance(self) -> FloatArray:
+        """Return the same [spreads]; NaN if unknown."""
+        return _in_spreads(self.level_off, self.level_spread)
 
 
 @dataclass(frozen=True)
@@ -214,18 +231,40 @@ def levels(time: FloatArray, values: FloatArray) -> FloatArray:
     if len(time) < 2:
         return values.copy()
     usual = min(LEVEL_SECONDS / float(np.median(np.diff(time))), float(len(time)))
-    first = np.searchsorted(time, time - LEVEL_SECONDS, side="right")
-    here = np.arange(len(time)) + 1
     present = np.isfinite(values)
-    counts = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(present, axis=0)))
     median = np.median if present.all() else np.nanmedian  # the faster one where nothing is missing
     about = median(values, axis=0) if present.any(axis=0).all() else np.zeros(values.shape[1])
-    sums = np.vstack((np.zeros((1, values.shape[1])), np.cumsum(np.where(present, values - about, 0.0), axis=0)))
-    count = counts[here] - counts[first]
-    total = sums[here] - sums[first]
-    enough = count >= max(_FILLED * usual, 1.0)
-    mean: FloatArray = np.divide(total, count, out=np.full(values.shape, np.nan), where=enough) + about
+    mean = np.empty(values.shape)
+    enough, sums = max(_FILLED * usual, 1.0), (np.empty(len(time) + 1), np.empty(len(time) + 1))
+    for j in range(values.shape[1]):
+        _fill_levels(time, np.ascontiguousarray(values[:, j]), about[j], enough, *sums, mean[:, j])
     return mean
+
+
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64, float64[::1], float64[::1], float64[:])", exact=True)
+def _fill_levels(
+    time: FloatArray,
+    values: FloatArray,
+    about: float,
+    enough: float,
+    sums: FloatArray,
+    counts: FloatArray,
+    mean: FloatArray,
+) -> None:
+    """Fill `mean` (n,) with the mean of the values over the last 50 ms, NaN with fewer than `enough`.
+
+    Sums of the distance from `about` up to each sample keep their digits at any offset.
+    """
+    sums[0] = counts[0] = 0.0
+    first = 0
+    for k in range(len(time)):
+        is_known = np.isfinite(values[k])
+        sums[k + 1] = sums[k] + (values[k] - about if is_known else 0.0)
+        counts[k + 1] = counts[k] + (1.0 if is_known else 0.0)
+        while time[first] <= time[k] - LEVEL_SECONDS:
+            first += 1
+        count = counts[k + 1] - counts[first]
+        mean[k] = (sums[k + 1] - sums[first]) / count + about if count >= enough else np.nan
 
 
 def _learn_channel(name: str, recordings: Sequence[Recording], motion: MotionClass) -> NormalChannel:
@@ -384,6 +423,12 @@ class NormalCurves:
         if any(item.shape != by_time.mean.shape[1:] or not np.isfinite(item).all() for item in farthest):
             raise ValueError("distances of other joints than the curves'")
         return cls(by_time, by_travel, *farthest)
+
+
+def _in_spreads(off: FloatArray, spread: FloatArray) -> FloatArray:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = off / spread
+    return np.where(np.isfinite(shares), shares, np.nan)
 
 
 def _looked_up(curve: Curve, axis: FloatArray) -> tuple[FloatArray, FloatArray]:

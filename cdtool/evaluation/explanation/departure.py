@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.evaluation.explanation.departure_kernels import first_beyond, steepest_bend
+from cdtool.evaluation.explanation.departure_kernels import first_beyond, median_of_known, steepest_bend
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.transient import Transient
 from cdtool.recording import FloatArray, Recording
@@ -156,11 +156,7 @@ def tracks_of(
 
 
 def _track(channel: str, joint: str, j: int, compared: Comparison, cut: slice, quiet: int) -> Track:
-    off = compared.value[cut, j] - compared.mean[cut, j]
-    level_off = compared.level[cut, j] - compared.level_mean[cut, j]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        raw, raw_level = off / compared.spread[cut, j], level_off / compared.level_spread[cut, j]
-    raw, raw_level = (np.where(np.isfinite(item), item, np.nan) for item in (raw, raw_level))
+    raw, raw_level = compared.distance[cut, j], compared.level_distance[cut, j]
     # The assumed start of the motion shifts a whole position: only a change of its distance counts.
     reach = math.inf if channel in POSITIONS else _OFFSET
     own, own_level = (_own_offset(item[:quiet], reach) for item in (raw, raw_level))
@@ -177,7 +173,7 @@ def _track(channel: str, joint: str, j: int, compared: Comparison, cut: slice, q
         raw,
         raw - own,
         raw_level - own_level,
-        level_off,
+        compared.level_off[cut, j],
         compared.level_mean[cut, j],
         *(np.maximum(_BEYOND * item[cut, j], _LEAST_OUT) for item in (compared.reach, compared.level_reach)),
     )
@@ -206,10 +202,10 @@ def _own_offset(past: FloatArray, reach: float) -> float:
 
     With too little data it is 0, or unknown (NaN) if it is unlimited.
     """
-    known = past[np.isfinite(past)]
-    if len(known) < _ENOUGH:
+    middle = median_of_known(np.ascontiguousarray(past), np.empty(len(past)), _ENOUGH)
+    if math.isnan(middle):
         return 0.0 if math.isfinite(reach) else math.nan
-    return float(np.clip(np.median(known), -reach, reach))
+    return min(max(middle, -reach), reach)
 
 
 def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool] | None:

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.kernels import READ_ONLY, kernel
+from cdtool.median_kernel import median_of
 from cdtool.recording import FloatArray
 
 # Two columns of a fit are the same straight line if the determinant is at most this share of its largest value.
@@ -21,6 +22,17 @@ def first_beyond(values: FloatArray, sign: float, succession: int) -> int:
         if run == succession:
             return k - succession + 1
     return -1
+
+
+@kernel(f"float64({READ_ONLY}, float64[::1], int64)", exact=True)
+def median_of_known(values: FloatArray, scratch: FloatArray, least: int) -> float:
+    """Return the median of the finite values, NaN with fewer than `least`; `scratch` (n,) is overwritten."""
+    count = 0
+    for value in values:
+        if np.isfinite(value):
+            scratch[count] = value
+            count += 1
+    return float(median_of(scratch, count)) if count >= least else np.nan
 
 
 @kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64, {READ_ONLY}, int64[::1])")

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.evaluation.explanation.departure_kernels import first_beyond, steepest_bend
+from cdtool.evaluation.explanation.departure_kernels import first_beyond, median_of_known, steepest_bend
 
 VALUES = st.sampled_from([0.0, 0.5, 1.0, 1.0 + 1e-15, 1.5, -1.0, -2.0, np.inf, -np.inf, np.nan])
 
@@ -51,3 +51,11 @@ def test_the_bend_is_that_of_the_smallest_error_by_lstsq(seed, count, bends, noi
         return
     error = dict(zip(candidates.tolist(), fits, strict=True))[found][1]
     assert error <= min(upward, default=(np.inf, 0))[0] + 1e-11 * size
+
+
+@given(st.lists(VALUES, max_size=40), st.integers(1, 12))
+def test_the_median_of_known_values_is_numpys(values, least):
+    samples = np.array(values, dtype=np.float64)
+    known = samples[np.isfinite(samples)]
+    expected = np.median(known) if len(known) >= least else np.nan
+    np.testing.assert_array_equal(median_of_known(samples, np.empty(len(samples)), least), expected)
