@@ -45,12 +45,16 @@ class Kernel:
     A kernel may call another kernel by a name of its module, imported or not: it is linked to the compiled one. Kernels
     called only by kernels are compiled without an entry from Python, which takes as long to compile as a small kernel.
     If such a kernel is also called from Python, it is compiled again, unless `entry` is set.
+
+    A call with arrays takes longer than the reading of a number, as each array is passed as seven words and counted as
+    in use: with `inline`, the machine code of a short kernel becomes a part of its callers.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: str, entry: bool = False) -> None:
+    def __init__(self, function: Callable[..., Any], signature: str, entry: bool = False, inline: bool = False) -> None:
         self.function = function
         self.signature = signature
         self.entry = entry
+        self.inline = inline
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Callable[..., Any] | None = None
@@ -73,7 +77,7 @@ class Kernel:
             return self.compiled
         with _lock:
             if self._linked is None:
-                self._linked = _compile(self, "_linked", {"no_cpython_wrapper": True})
+                self._linked = _compile(self, "_linked", {"no_cpython_wrapper": True, "forceinline": self.inline})
         return self._linked
 
     @property
@@ -98,9 +102,12 @@ class Kernel:
         return (self._compiled or self.compiled)(*arguments)
 
 
-def kernel(signature: str, *, entry: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
-    """Mark a function as a kernel with the given numba signature; `entry`: both Python and kernels call it."""
-    return lambda function: Kernel(function, signature, entry)
+def kernel(signature: str, *, entry: bool = False, inline: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
+    """Mark a function as a kernel with the given numba signature.
+
+    `entry`: both Python and kernels call it. `inline`: its machine code is a part of its callers.
+    """
+    return lambda function: Kernel(function, signature, entry, inline)
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
