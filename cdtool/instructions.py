@@ -1,7 +1,8 @@
-"""Processor instructions for kernels that numba does not provide: `prefetch` and `store`."""
+"""Processor instructions for kernels that numba does not provide: `prefetch`, `store`, `load`, and two on bits."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -77,5 +78,83 @@ def _emit_store() -> Callable[..., Any]:
     return made
 
 
+def _load(data: Any, at: Any) -> Any:
+    """Return the eight bytes from byte `at` of the array `data` as a uint64, the first one in the lowest bits.
+
+    All eight must be in the array. A kernel that reads eight bytes of text at once needs few unpredictable jumps.
+    """
+
+
+def _emit_load() -> Callable[..., Any]:
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic
+
+    def emit(_: Any, data: Any, at: Any) -> Any:
+        def lines(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = context.make_array(signature.args[0])(context, builder, arguments[0])
+            place = builder.gep(builder.bitcast(array.data, ir.IntType(8).as_pointer()), [arguments[1]])
+            word = builder.load(builder.bitcast(place, ir.IntType(64).as_pointer()), align=1)
+            return word if sys.byteorder == "little" else builder.bswap(word)
+
+        return types.uint64(data, at), lines
+
+    made: Callable[..., Any] = intrinsic(emit)
+    return made
+
+
+def _equal_bytes(data: Any, at: Any, letter: Any) -> Any:
+    """Return a uint64 with a bit for each of the 64 bytes from byte `at` of the array `data` that is equal to `letter`.
+
+    All 64 must be in the array; the lowest bit is that of the first one.
+    """
+
+
+def _emit_equal_bytes() -> Callable[..., Any]:
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic
+
+    def emit(_: Any, data: Any, at: Any, letter: Any) -> Any:
+        def lines(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = context.make_array(signature.args[0])(context, builder, arguments[0])
+            byte, bits = ir.IntType(8), ir.IntType(64)
+            vector = ir.VectorType(byte, 64)
+            place = builder.gep(builder.bitcast(array.data, byte.as_pointer()), [arguments[1]])
+            letters = builder.load(builder.bitcast(place, vector.as_pointer()), align=1)
+            first = ir.Constant(ir.IntType(32), 0)
+            one = builder.insert_element(ir.Constant(vector, ir.Undefined), builder.trunc(arguments[2], byte), first)
+            every = builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(ir.IntType(32), 64), [first] * 64))
+            equal = builder.bitcast(builder.icmp_unsigned("==", letters, every), bits)
+            return equal if sys.byteorder == "little" else builder.bitreverse(equal)
+
+        return types.uint64(data, at, letter), lines
+
+    made: Callable[..., Any] = intrinsic(emit)
+    return made
+
+
+def _trailing_zeros(word: Any) -> Any:
+    """Return how many of the lowest bits of a uint64 are 0; 64 if all are."""
+
+
+def _emit_trailing_zeros() -> Callable[..., Any]:
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic
+
+    def emit(_: Any, word: Any) -> Any:  # noqa: ARG001 - numba requires the instruction's own parameters
+        def lines(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
+            return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 0))
+
+        return types.uint64(types.uint64), lines
+
+    made: Callable[..., Any] = intrinsic(emit)
+    return made
+
+
 prefetch = _Instruction(_prefetch, _emit_prefetch)
 store = _Instruction(_store, _emit_store)
+load = _Instruction(_load, _emit_load)
+equal_bytes = _Instruction(_equal_bytes, _emit_equal_bytes)
+trailing_zeros = _Instruction(_trailing_zeros, _emit_trailing_zeros)

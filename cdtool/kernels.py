@@ -47,13 +47,25 @@ class Kernel:
     If such a kernel is also called from Python, it is compiled again, unless `entry` is set.
 
     In an `exact` kernel no product is fused with a sum: each operation is rounded, as in numpy.
+
+    A call with arrays takes longer than the reading of a number, as each array is passed as seven words and counted as
+    in use: with `inline`, the machine code of a short kernel becomes a part of its callers.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: str, entry: bool = False, exact: bool = False) -> None:
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        signature: str,
+        *,
+        entry: bool = False,
+        exact: bool = False,
+        inline: bool = False,
+    ) -> None:
         self.function = function
         self.signature = signature
         self.entry = entry
         self.exact = exact
+        self.inline = inline
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Callable[..., Any] | None = None
@@ -76,7 +88,7 @@ class Kernel:
             return self.compiled
         with _lock:
             if self._linked is None:
-                self._linked = _compile(self, "_linked", {"no_cpython_wrapper": True})
+                self._linked = _compile(self, "_linked", {"no_cpython_wrapper": True, "forceinline": self.inline})
         return self._linked
 
     @property
@@ -101,13 +113,15 @@ class Kernel:
         return (self._compiled or self.compiled)(*arguments)
 
 
-def kernel(signature: str, *, entry: bool = False, exact: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
+def kernel(
+    signature: str, *, entry: bool = False, exact: bool = False, inline: bool = False
+) -> Callable[[Callable[..., Any]], Kernel]:
     """Mark a function as a kernel with the given numba signature.
 
     `entry`: both Python and kernels call it. `exact`: its numbers have the bits of the same formula in numpy; the
-    kernels that it calls must be exact too.
+    kernels that it calls must be exact too. `inline`: its machine code is a part of its callers.
     """
-    return lambda function: Kernel(function, signature, entry, exact)
+    return lambda function: Kernel(function, signature, entry=entry, exact=exact, inline=inline)
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -1,10 +1,15 @@
-"""Instructions in kernels: prefetch changes nothing at any address; store writes a value only at its address."""
+"""Instructions in kernels: prefetch changes nothing at any address; store writes a value only at its address.
+
+load reads eight bytes at any address; equal_bytes and trailing_zeros agree with the same operation in Python.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
 
-from cdtool.instructions import prefetch, store
+from cdtool.instructions import equal_bytes, load, prefetch, store, trailing_zeros
 from cdtool.kernels import kernel
 
 
@@ -56,3 +61,36 @@ def test_whole_numbers_are_stored_as_they_are():
     table = np.zeros(2, np.uint64)
     put_bits(table.ctypes.data, 2**64 - 3)
     assert table.tolist() == [2**64 - 3, 0]
+
+
+@kernel("uint64(Array(uint8, 1, 'C', readonly=True), uint64)")
+def word_at(data, at):
+    return load(data, at)
+
+
+@kernel("uint64(Array(uint8, 1, 'C', readonly=True), uint64, int64)")
+def places_of(data, at, letter):
+    return equal_bytes(data, at, letter)
+
+
+@kernel("uint64(uint64)")
+def zeros_below(word):
+    return trailing_zeros(word)
+
+
+def test_eight_bytes_are_loaded_from_any_address():
+    data = np.arange(1, 21, dtype=np.uint8)
+    for at in range(13):
+        assert word_at(data, at) == int.from_bytes(bytes(data[at : at + 8]), "little")
+
+
+@given(st.binary(min_size=64, max_size=80), st.integers(0, 255))
+def test_a_bit_is_set_for_each_equal_byte(content, letter):
+    at = len(content) - 64
+    content = content[:-3] + bytes((letter,)) + content[-2:]
+    expected = sum(1 << i for i, byte in enumerate(content[at:]) if byte == letter)
+    assert places_of(np.frombuffer(content, dtype=np.uint8), at, letter) == expected
+
+
+def test_the_zeros_below_the_lowest_bit_are_counted():
+    assert [zeros_below(word) for word in (1, 2, 3, 96, 2**63, 0)] == [0, 1, 0, 5, 63, 64]

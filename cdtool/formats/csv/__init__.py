@@ -44,11 +44,11 @@ class Csv:
 
     def sniff(self, path: Path) -> bool:
         """Return whether the file starts with text other than markup."""
-        from cdtool.formats.csv.encoding import looks_like_text
+        from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
         from cdtool.formats.csv.text import read_sample
 
-        sample = read_sample(path)
-        return bool(sample.strip()) and looks_like_text(sample)
+        head = read_sample(path, HEAD_BYTES)
+        return bool(head.strip() or read_sample(path).strip()) and looks_like_text(head)
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line."""
@@ -68,12 +68,13 @@ class Csv:
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
     from cdtool.formats.csv.find_dialect import find_dialect
-    from cdtool.formats.csv.text import read_sample
+    from cdtool.formats.csv.text import SAMPLE_BYTES, read_sample, read_small
 
-    sample = read_sample(path)
+    content = read_small(path)
+    sample = read_sample(path) if content is None else content[:SAMPLE_BYTES]
     if not sample.strip():
         raise RecordingError(f"{path}: is empty", "was the recording stopped immediately, or the copy cut off?")
-    return find_dialect(path, sample, pins)
+    return find_dialect(path, sample, pins, content)
 
 
 def _read_all(path: Path, dialect: Dialect) -> Source:

@@ -29,7 +29,7 @@ from cdtool.formats.csv.alike_rows_kernel import (
 )
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.row_kernel import Integers
-from cdtool.formats.csv.text import SAMPLE_BYTES, Text
+from cdtool.formats.csv.text import AFTER, SAMPLE_BYTES, Text
 
 # Samples with fewer rows, or with more lines above the rows, are not shortened.
 _FEWEST_ROWS, _MOST_ABOVE = 100, 40
@@ -84,7 +84,7 @@ def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample 
     found, marks = np.zeros(4, dtype=np.int64), np.full((4, 2), -1, dtype=np.int64)
     columns = np.zeros((_MOST_COLUMNS, 5), dtype=np.int64)
     starts = np.zeros(2 * _MOST_ABOVE + _FIRST_ROWS + 1, dtype=np.int64)
-    data = np.frombuffer(stream[:end] + b"\n\n\n\n", dtype=np.uint8)
+    data = np.frombuffer(b"".join((memoryview(stream)[:end], b"\n" * AFTER)), dtype=np.uint8)
     stop = end if stream[end - 1 : end] == b"\n" else end + 1
     alike = find_alike_rows(data, stop, separator[0], _MOST_ABOVE, len(starts), found, marks, columns, starts)
     rows, width, first, begin = found[[ROWS, WIDTH, FIRST_LINE, FIRST_BYTE]].tolist()

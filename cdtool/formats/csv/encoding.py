@@ -20,6 +20,9 @@ _MARKS = (
 _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x19\x1b-\x1f]")
 # A text may contain this many control characters by mistake, or this share of its bytes: the error names their line.
 _FEW, _SHARE = 3, 0.02
+# The first bytes of a file, by which text is distinguished from other contents.
+HEAD_BYTES = 4096
+_ALLOWED = bytes(byte for byte in range(256) if not _CONTROL.match(bytes((byte,))))
 _OTHER_KINDS = (b"%PDF", b"\x89", b"GIF8", b"\xff\xd8", b"PK\x03\x04", b"\x1f\x8b", b"SQLite format", b"#ROSBAG")
 
 
@@ -28,7 +31,7 @@ def looks_like_text(sample: bytes) -> bool:
 
     They are not if they are markup or a known binary format, or have NUL bytes that are not parts of wide characters.
     """
-    head = sample[:4096]
+    head = sample[:HEAD_BYTES]
     if head.startswith(_OTHER_KINDS):
         return False
     encoding, mark = _by_mark(head)
@@ -46,7 +49,7 @@ def looks_like_text(sample: bytes) -> bool:
     first_line = text.lstrip(b"\r\n").partition(b"\n")[0].partition(b"\r")[0]
     if not text or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"[")):
         return False
-    return _CONTROL.search(text) is None or _has_few_controls(text)
+    return not text.translate(None, _ALLOWED) or _has_few_controls(text)
 
 
 def _has_few_controls(text: bytes) -> bool:
@@ -58,8 +61,11 @@ def _has_few_controls(text: bytes) -> bool:
     return b"\0" not in text and count <= max(_FEW, _SHARE * len(text))
 
 
-def detect_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, bytes]:
-    """Return encoding and line ends, and the sample as part of the stream; raises RecordingError."""
+def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | None = None) -> tuple[Text, bytes]:
+    """Return encoding and line ends, and the sample as part of the stream; raises RecordingError.
+
+    `content` are all bytes of the file if they have been read.
+    """
     if not looks_like_text(sample):
         raise RecordingError(f"{path}: is not a table of numbers: binary or markup", "name a CSV, MCAP or MAT file")
     marked, mark = _by_mark(sample)
@@ -69,7 +75,7 @@ def detect_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, byte
             f"{path}: line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
         )
-    size, padding = _without_padding(path, UNIT_BYTES.get(encoding, 1))
+    size, padding = _without_padding(path, content, UNIT_BYTES.get(encoding, 1))
     stream = sample[mark : max(size, mark)]
     if encoding in UNIT_BYTES:
         try:
@@ -78,7 +84,8 @@ def detect_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, byte
             raise RecordingError(f"{path}: damaged: not valid {encoding.upper()}", "save it again as UTF-8") from fault
     elif pinned:
         _check_pinned(path, stream, encoding)
-    control = _CONTROL.search(stream[:4096])
+    head = stream[:HEAD_BYTES]
+    control = _CONTROL.search(head) if head.translate(None, _ALLOWED) else None
     if control is not None:
         line = stream.count(b"\n", 0, control.start()) + 1
         raise RecordingError(
@@ -90,7 +97,7 @@ def detect_text(path: Path, sample: bytes, pinned: str = "") -> tuple[Text, byte
     line_end = b"\n" if b"\n" in inner or b"\r" not in inner else b"\r"
     if b"\r" not in inner and b"\n" not in stream and b"\r" in stream:
         line_end = b"\r"
-    return Text(path, encoding, mark, size, padding, line_end), stream
+    return Text(path, encoding, mark, size, padding, line_end, content), stream
 
 
 def _by_mark(sample: bytes) -> tuple[str | None, int]:
@@ -99,7 +106,9 @@ def _by_mark(sample: bytes) -> tuple[str | None, int]:
 
 def _wide_without_mark(sample: bytes) -> str | None:
     """Return UTF-16 without a byte order mark: nearly every second byte of a table is NUL, and few of the others."""
-    head = sample[:4096].rstrip(b"\0")
+    head = sample[:HEAD_BYTES].rstrip(b"\0")
+    if b"\0" not in head:  # the usual case
+        return None
     head += b"\0" * (len(head) % 2)
     if len(head) < 4:
         return None
@@ -110,6 +119,8 @@ def _wide_without_mark(sample: bytes) -> str | None:
 
 
 def _narrow(sample: bytes) -> str:
+    if sample.isascii():
+        return "utf-8"
     try:
         codecs.getincrementaldecoder("utf-8")().decode(sample)
     except UnicodeDecodeError:
@@ -129,9 +140,11 @@ def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
         ) from fault
 
 
-def _without_padding(path: Path, unit: int) -> tuple[int, int]:
-    """Return the byte where the text ends, and the number of NUL bytes after it."""
-    total = path.stat().st_size
+def _without_padding(path: Path, known: bytes | None, unit: int) -> tuple[int, int]:
+    """Return the byte where the text ends, and the number of NUL bytes after it; `known` are the bytes of the file."""
+    total = path.stat().st_size if known is None else len(known)
+    if known is not None and not known.endswith(b"\0"):
+        return total, 0
     end = total
     with path.open("rb") as file:
         while end > 0:

@@ -203,13 +203,13 @@ def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
     return rows[:: max(1, len(rows) // (2 * _LOOKED))]
 
 
-def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
-    """Return the dialect of a text file from its first bytes.
+def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | None = None) -> Dialect:
+    """Return the dialect of a text file from its first bytes; `content` are all its bytes if they have been read.
 
     The text of the dialect ends with the last row: a footer is excluded and reported as a warning. Raises
     RecordingError if the file is not a table, or is ambiguous.
     """
-    text, stream = detect_text(path, sample, pins.encoding)
+    text, stream = detect_text(path, sample, pins.encoding, content)
     dialect = _dialect(path, text, stream, pins)
     footer = find_footer(dialect)
     findings: list[Finding] = []
@@ -219,6 +219,8 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins) -> Dialect:
     marks = dialect.marks if dialect.marks.sure else resolve_marks(dialect)
     if marks.doubt:
         findings.append(Finding(DoubtfulPoint(marks.doubt.text, marks.doubt.line)))
+    if not findings and marks is dialect.marks and not dialect.blank_is_missing:
+        return dialect
     text = strip_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
     return replace(dialect, text=text, marks=marks, findings=(*dialect.findings, *findings))
 
@@ -240,7 +242,8 @@ def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
             return _by_lines(path, text, stream, pins)
         if len(_KNOWN) >= _MOST_KNOWN:
             _KNOWN.clear()
-        _KNOWN[known] = dialect = replace(dialect, sampled=dialect.sampled - shorter.rows)
+        kept = replace(text, content=None)
+        _KNOWN[known] = dialect = replace(dialect, text=kept, sampled=dialect.sampled - shorter.rows)
     return replace(dialect, text=text, sampled=dialect.sampled + shorter.rows)
 
 
@@ -400,7 +403,10 @@ def find_footer(dialect: Dialect) -> Footer | None:
     """
     if dialect.kinds[0] not in "NT" or dialect.text.padding:  # a file that ends with a power failure has no footer
         return None
-    raw = _last_lines(dialect)
+    whole, end = _end_of_rows(dialect)
+    if _ends_with_row(dialect, end):
+        return None
+    raw = end.split(dialect.text.line_end)[not whole :]
     words: list[tuple[int, list[str]]] = []
     for i in range(len(raw) - 1, -1, -1):  # usually the last line is a row, which ends the loop
         cells = _cells(dialect, raw[i])
@@ -438,16 +444,21 @@ def _missing_words(dialect: Dialect) -> set[str]:
     return {*_MISSING_WORDS, *(text.lower() for text in dialect.missing)}
 
 
-def _last_lines(dialect: Dialect) -> list[bytes]:
-    """Return the last complete lines of the rows, as bytes of the stream."""
+def _ends_with_row(dialect: Dialect, end: bytes) -> bool:
+    """Return whether the last line that is not blank is a row: the usual case, in which no other line is read."""
+    stop = len(end.rstrip(b" \t\r\n"))
+    cells = _cells(dialect, end[end.rfind(dialect.text.line_end, 0, stop) + 1 : stop])
+    return bool(cells) and not _is_words(dialect, cells)
+
+
+def _end_of_rows(dialect: Dialect) -> tuple[bool, bytes]:
+    """Return the last bytes of the stream's rows, and whether these are all rows."""
     text = dialect.text
     most = SAMPLE_BYTES if text.recoded else TAIL_BYTES
     start = text.mark if text.recoded else text.mark + dialect.offset
     whole = text.size - start <= most
-    with text.path.open("rb") as file:
-        file.seek(start if whole else text.size - most)
-        end = file.read(text.size - start if whole else most)
+    end = text.between(start if whole else text.size - most, text.size)
     if text.recoded:
         end = end.decode(text.encoding, errors="replace").encode()
         end = end[dialect.offset :] if whole else end
-    return end.split(text.line_end)[not whole :]
+    return whole, end

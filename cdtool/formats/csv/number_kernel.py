@@ -16,18 +16,17 @@ import numpy.typing as npt
 
 from cdtool.decimal_kernel import POWERS, as_float, float_bits, powers_of_five
 from cdtool.decimal_kernel import UNDECIDED as TOO_CLOSE
+from cdtool.formats.csv.digits_kernel import BYTES, Bytes
 from cdtool.kernels import kernel
 from cdtool.recording import FloatArray
 
-Bytes = npt.NDArray[np.uint8]
 Words = npt.NDArray[np.uint64]
 
 # Results in place of the byte where a number ends:
 NOT_A_NUMBER, UNDECIDED = -1, -2
-BYTES = "Array(uint8, 1, 'C', readonly=True)"
 FLOATS = "Array(float64, 1, 'C', readonly=True)"
 
-_U0, _U1, _U9, _U10, _U48, _TWICE_HIDDEN = map(np.uint64, (0, 1, 9, 10, 48, 2**53))
+_U0, _U1, _U10, _TWICE_HIDDEN = map(np.uint64, (0, 1, 10, 2**53))
 _NAN, _INF, _INITY, _TRUE, _FALSE = (int.from_bytes(word) for word in (b"nan", b"inf", b"inity", b"true", b"false"))
 
 
@@ -59,41 +58,6 @@ def _word(data: Bytes, at: int) -> tuple[float, int]:
     if letters(data, at, 4) == _TRUE:
         return 1.0, at + 4
     return 0.0, at + 5 if letters(data, at, 5) == _FALSE else NOT_A_NUMBER
-
-
-@kernel(f"Tuple((float64, int64))({BYTES}, int64, int64, {FLOATS})")
-def quick_number(data: Bytes, at: int, decimal: int, tens: FloatArray) -> tuple[float, int]:
-    """Return a plain number that one division can compute, and where it ends; UNDECIDED for any other number."""
-    p = np.uint64(at)  # unsigned, so that the compiled code does not test for negative indices
-    negative = data[p] == 45
-    if negative:
-        p += _U1
-    first = p
-    mantissa = _U0
-    while True:
-        digit = np.uint64(data[p]) - _U48
-        if digit > _U9:
-            break
-        mantissa = mantissa * _U10 + digit
-        p += _U1
-    digits: Any = np.int64(p - first)
-    decimals: Any = 0
-    if data[p] == decimal:
-        p += _U1
-        point = p
-        while True:
-            digit = np.uint64(data[p]) - _U48
-            if digit > _U9:
-                break
-            mantissa = mantissa * _U10 + digit
-            p += _U1
-        decimals = np.int64(p - point)
-        digits += decimals
-    if digits == 0 or digits > 19 or mantissa > _TWICE_HIDDEN:
-        return 0.0, UNDECIDED
-    value = np.float64(np.int64(mantissa)) / tens[decimals]
-    end: Any = np.int64(p)
-    return -value if negative else value, end
 
 
 @kernel(f"Tuple((float64, int64))({BYTES}, int64, int64, int64, {FLOATS}, {POWERS})")

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.csv.number_kernel import BYTES, NOT_A_NUMBER, Bytes, letters
+from cdtool.formats.csv.digits_kernel import BYTES, Bytes
+from cdtool.formats.csv.number_kernel import NOT_A_NUMBER, letters
 from cdtool.kernels import kernel
 
 Programs = npt.NDArray[np.int64]

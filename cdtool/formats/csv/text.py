@@ -7,10 +7,14 @@ is recoded. The result is called the stream: bytes without a byte order mark.
 from __future__ import annotations
 
 import codecs
+import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from io import BytesIO
 from itertools import count
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +26,7 @@ Bytes = npt.NDArray[np.uint8]
 SAMPLE_BYTES = 1 << 17
 BLOCK_BYTES = 1 << 20
 # Number of line ends after a block, which end any number, word or time stamp.
-AFTER = 32
+AFTER = 64
 RING = 8
 TAIL_BYTES = 1 << 16
 UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
@@ -30,7 +34,10 @@ UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 
 @dataclass(frozen=True)
 class Text:
-    """The encoding of a text file. The byte order mark has `mark` bytes; `padding` NUL bytes start at byte `size`."""
+    """The encoding of a text file. The byte order mark has `mark` bytes; `padding` NUL bytes start at byte `size`.
+
+    `content` are the bytes of a file of at most one block, which is read once.
+    """
 
     path: Path
     encoding: str
@@ -38,6 +45,7 @@ class Text:
     size: int
     padding: int
     line_end: bytes
+    content: bytes | None = field(default=None, repr=False, compare=False)
 
     @property
     def recoded(self) -> bool:
@@ -48,10 +56,18 @@ class Text:
         """Return a line of the stream as text."""
         return line.decode("utf-8" if self.recoded else self.encoding, errors="replace")
 
+    def between(self, start: int, end: int) -> bytes:
+        """Return bytes of the file."""
+        if self.content is not None:
+            return self.content[start:end]
+        with self.path.open("rb") as file:
+            file.seek(start)
+            return file.read(end - start)
+
     def chunks(self) -> Iterator[bytes]:
         """Yield the stream in pieces that may end within a line; raises RecordingError if it cannot be decoded."""
         decoder = codecs.getincrementaldecoder(self.encoding)() if self.recoded else None
-        with self.path.open("rb") as file:
+        with self._open() as file:
             file.seek(self.mark)
             left = self.size - self.mark
             while left > 0 and (piece := file.read(min(BLOCK_BYTES, left))):
@@ -75,9 +91,7 @@ class Text:
                 last = [last[1], piece]
             end = b"".join(last)
         else:
-            with self.path.open("rb") as file:
-                file.seek(max(self.mark, self.size - TAIL_BYTES))
-                end = file.read(min(TAIL_BYTES, self.size - self.mark))
+            end = self.between(max(self.mark, self.size - TAIL_BYTES), self.size)
         return end.split(self.line_end)
 
     def count_lines(self, offset: int, counted: Callable[[Bytes, int], int]) -> int:
@@ -86,6 +100,9 @@ class Text:
         `counted` counts the occurrences of one byte.
         """
         end = self.line_end[0]
+        if self.content is not None and not self.recoded:
+            data = np.frombuffer(self.content, dtype=np.uint8)[self.mark + offset : self.size]
+            return counted(data, end) + (len(data) > 0 and bool(data[-1] != end))
         total, last = 0, end
         for buffer, size in self._filled(offset, BLOCK_BYTES):
             total += counted(np.frombuffer(buffer, dtype=np.uint8, count=size), end)
@@ -110,6 +127,9 @@ class Text:
         if left[0]:
             yield bytearray(left[0] + self.line_end * AFTER), len(left[0])
 
+    def _open(self) -> BinaryIO:
+        return self.path.open("rb") if self.content is None else BytesIO(self.content)
+
     def _filled(self, offset: int, most: int, before: Callable[[], bytes] = bytes) -> Iterator[tuple[bytearray, int]]:
         """Yield the stream from `offset` in buffers, with the size of their content; each starts with `before()`."""
         if self.recoded:
@@ -121,6 +141,10 @@ class Text:
                     yield bytearray(content), len(content)
             return
         left = self.size - self.mark - offset
+        if self.content is not None:
+            if left > 0:
+                yield bytearray(memoryview(self.content)[self.mark + offset : self.size]), left
+            return
         ring = [bytearray(2 * most + AFTER) for _ in range(RING if left > most else 1)]
         with self.path.open("rb", buffering=0) as file:
             file.seek(self.mark + offset)
@@ -138,11 +162,25 @@ class Text:
                 yield buffer, len(first) + size
 
 
-def read_sample(path: Path) -> bytes:
-    """Return the first bytes of a file; raises RecordingError."""
+def read_sample(path: Path, most: int = SAMPLE_BYTES) -> bytes:
+    """Return the first bytes of a file, in which its dialect is detected; raises RecordingError."""
+    with _readable(path), path.open("rb") as file:
+        return file.read(most)
+
+
+def read_small(path: Path) -> bytes | None:
+    """Return the bytes of a file of at most one block; None for a larger file. Raises RecordingError."""
+    with _readable(path), path.open("rb", buffering=0) as file:
+        size = os.fstat(file.fileno()).st_size
+        content = file.readall() if size <= BLOCK_BYTES else None
+    return content if content is None or len(content) <= BLOCK_BYTES else None
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Raise RecordingError if the file cannot be read."""
     try:
-        with path.open("rb") as file:
-            return file.read(SAMPLE_BYTES)
+        yield
     except OSError as fault:
         raise RecordingError(
             f"{path}: cannot be read: {fault.strerror}", "check the path and its permissions"

@@ -1,0 +1,77 @@
+"""Rows of plain numbers, read eight digits at a time, have the bits of Python's float; so do rows of other cells."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.formats.csv import Csv
+from cdtool.formats.csv.digits_kernel import digit_count, first_digits
+from cdtool.kernels import kernel
+
+DIGITS = st.text("0123456789", max_size=10)
+PLAIN = st.builds(
+    "{}{}{}{}".format, st.sampled_from(["", "-", "+", "--"]), DIGITS, st.sampled_from(["", "."]), DIGITS
+).filter(lambda cell: any(letter.isdigit() for letter in cell) and "--" not in cell)
+CELL = (
+    PLAIN
+    | st.sampled_from(
+        ["", "-0", "-0.0", "9007199254740992", "9007199254740993", "90071992.54740993", "99999999.99999999", "12345678"]
+    )
+    | st.sampled_from(["1e5", "-1.5E-300", "nan", "inf", "-inf", " 1.5", "1.5 ", "123456789.123456789", ".5", "5."])
+    | st.floats(allow_nan=False).map(repr)
+)
+
+
+@kernel("Tuple((uint64, int64))(uint64)")
+def begin_of(word):
+    count = digit_count(word)
+    return count, first_digits(word, count)
+
+
+@given(st.text("0123456789", max_size=8), st.binary(max_size=8))
+def test_the_digits_at_the_start_of_a_word_are_counted_and_read(digits, rest):
+    letters = (digits.encode() + rest.lstrip(b"0123456789") + b"\n" * 8)[:8]
+    word = int.from_bytes(letters, "little") ^ 0x3030303030303030
+    assert begin_of(word) == (len(digits), int(digits or "0"))
+
+
+@settings(max_examples=300)
+@given(st.lists(st.tuples(CELL, CELL, CELL), min_size=1, max_size=40), st.sampled_from(["\n", "\r\n"]), st.booleans())
+def test_every_cell_has_the_bits_of_float(tmp_path_factory, rows, end, ended):
+    path = tmp_path_factory.getbasetemp() / "quick.csv"
+    first = ["0.25,1.5,-2.75,7.5"] * 30  # from which the dialect is clear
+    lines = ["t,a,b,c", *first, *(f"0.25,{','.join(row)}" for row in rows), *first]
+    path.write_bytes((end.join(lines) + end * ended).encode())
+    columns = Csv().columns(path).columns
+    for column, name in enumerate("abc"):
+        values = columns[name].values[30 : 30 + len(rows)]
+        expected = np.array([float(row[column]) if row[column].strip() else math.nan for row in rows])
+        known = ~np.isnan(expected)
+        assert values[known].tobytes() == expected[known].tobytes()
+        assert np.isnan(values[~known]).all()
+
+
+def test_columns_that_are_not_read_may_contain_words_and_quoted_separators(tmp_path):
+    path = tmp_path / "words.csv"
+    lines = [f'{i}.5,"a,{i}",word {i},{-i}' if i % 3 == 0 else f"{i}.5,b,word,{-i}" for i in range(200)]
+    path.write_text("\n".join(["t,x,y,a", *lines, ""]))
+    columns = Csv().columns(path).columns
+    assert columns["t"].values.tolist() == [i + 0.5 for i in range(200)]
+    assert columns["a"].values.tolist() == [-i for i in range(200)]
+
+
+def test_a_file_of_one_block_has_the_columns_of_a_larger_file(tmp_path):
+    text = "".join(f"{i}.25,{i * 7 % 1000}.125\n" for i in range(60_000))
+    small, large = tmp_path / "small.csv", tmp_path / "large.csv"
+    small.write_text("t,a\n" + text[: 1 << 19].rpartition("\n")[0] + "\n")
+    large.write_text("t,a\n" + text * 2)
+    assert small.stat().st_size < 1 << 20 < large.stat().st_size
+    of_small, of_large = (Csv().columns(path).columns for path in (small, large))
+    for name in "ta":
+        count = len(of_small[name].values)
+        assert count > 10_000
+        assert of_small[name].values.tobytes() == of_large[name].values[:count].tobytes()
