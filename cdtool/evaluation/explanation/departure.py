@@ -205,7 +205,7 @@ def _own_offset(past: FloatArray, reach: float) -> float:
     middle = median_of_known(np.ascontiguousarray(past), np.empty(len(past)), _ENOUGH)
     if math.isnan(middle):
         return 0.0 if math.isfinite(reach) else math.nan
-    return min(max(middle, -reach), reach)
+    return float(min(max(middle, -reach), reach))
 
 
 def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool] | None:
@@ -241,7 +241,7 @@ def _bend(time: FloatArray, shares: FloatArray, first: int) -> int:
     known = begin + np.flatnonzero(np.isfinite(shares[begin:]))
     candidates = np.unique(np.linspace(first, len(shares) - _SUCCESSION, _BENDS).astype(np.int64))
     since = time - time[begin]
-    return steepest_bend(since[known], shares[known], first, since[candidates], candidates)
+    return int(steepest_bend(since[known], shares[known], first, since[candidates], candidates))
 
 
 def _side(value: float) -> str:
