@@ -91,7 +91,8 @@ def _moved(values: FloatArray) -> float:
     known = values[np.isfinite(values)]
     if len(known) < 3:
         return 0.0
-    span, encoder, largest = travel_of(known, min(_PARTS, len(known)))
+    travel: tuple[float, float, float] = travel_of(known, min(_PARTS, len(known)))
+    span, encoder, largest = travel
     if span <= _ABOVE_NOISE * encoder:
         return 0.0
     # The noise is less than the largest step: where the span is far above that one, it need not be known.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -76,7 +78,7 @@ def _windows(speed, acceleration, joint):
         return np.empty(0), np.empty(0)
     gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / 0.2
     means = np.full(len(edges) - 1, np.nan)
-    for i, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for i, (start, end) in enumerate(pairwise(edges)):
         inside = (acceleration.time >= start) & (acceleration.time < end)
         part = acceleration.values[inside, joint]
         part = part[np.isfinite(part)]
