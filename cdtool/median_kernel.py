@@ -25,23 +25,27 @@ def kth_smallest(values: FloatArray, count: int, k: int) -> float:
     while high - low >= _FEW:
         middle = (low + high) // 2
         pivot = max(min(values[low], values[middle]), min(max(values[low], values[middle]), values[high]))
-        i = low
-        j = high
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while pivot < values[j]:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i += 1
-                j -= 1
-        if k <= j:
-            high = j
-        elif k >= i:
-            low = i
+        # Without a branch per value: which values are smaller is not predictable.
+        smaller = low
+        for i in range(low, high + 1):
+            value = values[i]
+            values[i] = values[smaller]
+            values[smaller] = value
+            smaller += value < pivot
+        if k < smaller:
+            high = smaller - 1
+        elif smaller > low:
+            low = smaller
         else:
-            return float(values[k])
+            # The pivot is the smallest of them: all that equal it are in their places next.
+            for i in range(low, high + 1):
+                value = values[i]
+                values[i] = values[smaller]
+                values[smaller] = value
+                smaller += value <= pivot
+            if k < smaller:
+                return float(values[k])
+            low = smaller
     for i in range(low + 1, high + 1):
         value = values[i]
         j = i - 1

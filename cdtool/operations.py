@@ -7,6 +7,7 @@ from earlier samples only (`motion.strokes`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,7 +60,7 @@ def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
         raise UsageError(f"unknown operations '{how}'", nearest(how, HOW_TO_CUT))
     if how == "whole":
         return [Operation(recording, motion_class(recording))]
-    spans = _motion_spans(recording) if how == "motion" else _trigger_spans(recording)
+    spans: Sequence[tuple[float, float]] = motion_spans(recording) if how == "motion" else _trigger_spans(recording)
     if not spans:
         raise RecordingError(
             f"{recording.name}: no operation found by {how}", "see cdtool info, or use --operations whole"
@@ -69,6 +70,11 @@ def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
         part = replace(recording.between(start, end), name=f"{recording.name}#{number}")
         operations.append(Operation(part, motion_class(part), number, recording, how))
     return operations
+
+
+def motion_spans(recording: Recording) -> tuple[tuple[float, float], ...]:
+    """Return start and end [s] of each motion of a recording; raises RecordingError without a speed."""
+    return recording.derived("motion spans", lambda: tuple(_motion_spans(recording)))
 
 
 def _motion_spans(recording: Recording) -> list[tuple[float, float]]:

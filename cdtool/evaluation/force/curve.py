@@ -7,14 +7,15 @@ the load cell's sign. Samples are missing if two are further apart than `missing
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from cdtool.errors import RecordingError, UsageError
-from cdtool.evaluation.truth.missing_samples import PERIODS, longest_step
+from cdtool.evaluation.truth.missing_samples import PERIODS, CellClock, cell_samples, longest_step
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
-from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
+from cdtool.recording import BoolArray, Contact, FloatArray, Recording
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
@@ -31,7 +32,7 @@ class ForceTimeCurve:
     """Contact force (n,) [N] at the times (n,) [s after the onset] of the existing samples.
 
     `clipped` (n,): the load cell was at its stop, the true force was larger. `end`: how long the record continues after
-    the onset [s]. `clock` (m,): the times of the cell's samples in the whole record [s], if different. `before`: time
+    the onset [s]. `clock`: that of the cell's samples in the whole record, if they are more. `before`: time
     from the preceding sample, at which the force was at rest, to the first sample [s]; NaN if unknown. `hole`: for how
     long samples are missing where the contact may have begun, up to `uncertainty` earlier [s].
     """
@@ -40,7 +41,7 @@ class ForceTimeCurve:
     force: FloatArray
     clipped: BoolArray
     end: float
-    clock: FloatArray | None = None
+    clock: CellClock | None = None
     before: float = float("nan")
     hole: float = 0.0
     uncertainty: float = 0.0
@@ -58,14 +59,18 @@ class ForceTimeCurve:
     @property
     def longest_step(self) -> float:
         """Return the largest distance of two samples without a missing one between them [s]."""
-        return longest_step(self._clock)
+        return self._clock.longest_step
 
-    @property
-    def _clock(self) -> FloatArray:
-        return self.time if self.clock is None else self.clock
+    @cached_property
+    def _clock(self) -> CellClock:
+        return CellClock(self.time) if self.clock is None else self.clock
 
     def holes(self) -> tuple[FloatArray, FloatArray]:
         """Return where samples are missing: beginnings and ends [s after the onset]."""
+        return self._holes
+
+    @cached_property
+    def _holes(self) -> tuple[FloatArray, FloatArray]:
         marks = np.concatenate(([0.0], self.time, [max(self.end, float(self.time[-1]))]))
         wide = np.flatnonzero(np.diff(marks) > self.longest_step)
         return marks[wide], marks[wide + 1]
@@ -88,7 +93,7 @@ class ForceTimeCurve:
         2 if it changes by at most s per second: the steepest change in as much time next to the step. Both are 0
         without such a step.
         """
-        time, force, period, longest = self.time, self.force, _period(self._clock), self.longest_step
+        time, force, period, longest = self.time, self.force, self._clock.period, self.longest_step
         if np.isfinite(self.before):
             time, force = np.concatenate(([time[0] - self.before], time)), np.concatenate(([0.0], force))
         steps, changes = np.diff(time), np.diff(force)
@@ -147,6 +152,7 @@ def force_time_curve(
     --------
     A load cell that reads 3 N at rest shows half a sine of 150 N from 1.0 s to 1.5 s.
 
+    >>> from cdtool.recording import Series
     >>> time = np.arange(3000) * 1e-3
     >>> pulse = np.where((time >= 1.0) & (time <= 1.5), 150.0 * np.sin(2.0 * np.pi * (time - 1.0)), 0.0)
     >>> run = Recording("run", "", ("axis",), {"force": Series(time, 3.0 + pulse, "N")})
@@ -156,16 +162,16 @@ def force_time_curve(
     """
     if mass_before_cell < 0.0 or not np.isfinite(mass_before_cell):
         raise UsageError(f"mass_before_cell is {mass_before_cell:g} kg", "give 0 or more")
-    time, reading = _present(recording["force"])
-    whole = time
-    if not np.any((time >= contact.start) & (time < until)):
+    samples = cell_samples(recording["force"])
+    whole = samples.time
+    first, last = (int(at) for at in np.searchsorted(whole, (contact.start, until)))
+    if first >= last:
         raise RecordingError(
             f"{recording.name}: no load-cell sample after the onset at {contact.start:.3f} s",
             "check the force limits of contacts on the load cell",
         )
-    over = reading - (contact.rest if np.isfinite(contact.rest) else rest_before(time, reading, contact.start))
-    part = (time >= contact.start) & (time < until)
-    time, over = time[part], over[part]
+    rest = contact.rest if np.isfinite(contact.rest) else rest_before(whole, samples.force, contact.start)
+    time, over = whole[first:last], samples.force[first:last] - rest
     pressing = (time <= contact.end) | (contact.end <= contact.start)
     largest = int(np.argmax(np.where(pressing, np.abs(over), -1.0)))
     force = over if over[largest] >= 0.0 else -over
@@ -175,15 +181,14 @@ def force_time_curve(
     known = np.isfinite(force)
     if not known.any():
         raise RecordingError(f"{recording.name}: no acceleration after the onset", "set mass_before_cell to 0")
-    end = min(_end(recording, contact, whole), until) - contact.start
-    earlier = whole[whole < contact.start]
+    end = min(_end(recording, contact, samples.clock), until) - contact.start
     return ForceTimeCurve(
         time[known] - contact.start,
         force[known],
         clipped[known],
         end,
-        clock=whole,
-        before=float(time[0] - earlier[-1]) if len(earlier) and known[0] else float("nan"),
+        clock=samples.clock,
+        before=float(time[0] - whole[first - 1]) if first and known[0] else float("nan"),
         hole=contact.hole,
         uncertainty=contact.uncertainty if contact.hole else 0.0,
     )
@@ -217,24 +222,17 @@ def force_at(curve: ForceTimeCurve, time: float) -> float:
     return float(curve.force[at])
 
 
-def _present(series: Series) -> tuple[FloatArray, FloatArray]:
-    present = np.isfinite(series.values[:, 0])
-    return series.time[present], series.values[present, 0]
-
-
-def _end(recording: Recording, contact: Contact, whole: FloatArray) -> float:
+def _end(recording: Recording, contact: Contact, clock: CellClock) -> float:
     """Return until when samples are expected [s]: the cell's last one, or the log's if the cell ends in the contact."""
     last = float(recording["force"].time[-1])
-    pressing = contact.end >= float(whole[-1]) - longest_step(whole)
+    pressing = contact.end >= float(clock.time[-1]) - clock.longest_step
     return recording.end if pressing and recording.end - last > _TAIL else last
-
-
-def _period(time: FloatArray) -> float:
-    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
 
 
 def _clipped(force: FloatArray) -> BoolArray:
     """Return the samples at the largest reading, if it repeats more often than the cell usually repeats a reading."""
+    if np.count_nonzero(force == force.max()) < _STUCK:
+        return np.zeros(len(force), dtype=bool)
     edges = np.flatnonzero(np.diff(force)) + 1
     lengths = np.diff(np.concatenate(([0], edges, [len(force)])))
     first = np.concatenate(([0], edges))

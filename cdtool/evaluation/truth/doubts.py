@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdtool.evaluation.truth.missing_samples import longest_step
+from cdtool.evaluation.truth.missing_samples import cell_samples, longest_step
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.findings import Finding
 from cdtool.findings.truth import FollowsTorque, ForceBeginsLate, ForceLeft, NotTared, RestLevelShifted
@@ -84,8 +84,8 @@ def _begins_late(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
 
 def _not_back(force: Series, contacts: Sequence[Contact], rule: OnsetRule) -> Finding | None:
     """A warning where the last contact lasts to the end of the log at a force next to nothing."""
-    present = np.isfinite(force.values[:, 0])
-    time, reading = force.time[present], force.values[present, 0]
+    samples = cell_samples(force)
+    time, reading = samples.time, samples.force
     if not contacts or not len(time) or contacts[-1].found_by != "load cell" or contacts[-1].end < time[-1]:
         return None
     contact = contacts[-1]
@@ -108,8 +108,8 @@ def follows_torque(recording: Recording, contacts: Sequence[Contact]) -> tuple[s
     if "torque" not in recording or "force" not in recording:
         return none
     torque, force = recording["torque"], recording["force"]
-    present = np.isfinite(force.values[:, 0])
-    time, reading = force.time[present], force.values[present, 0]
+    samples = cell_samples(force)
+    time, reading = samples.time, samples.force
     near = _near(time, contacts)
     time, reading = time[near], reading[near]
     periods = [item.period for item in (force, torque) if np.isfinite(item.period)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from cdtool.evaluation.truth.matching import match
 from cdtool.findings import Finding
 from cdtool.findings.scoring import LogNotCut, NoForce, OnsetUnseen, PeakUnseen
 from cdtool.findings.truth import InProgress
-from cdtool.operations import Operation, operations_of
+from cdtool.operations import Operation, motion_spans
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.judged_operation import Judged, contact_rows, false_alarm_rows
@@ -187,22 +188,30 @@ def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_b
     unassessable = [
         number
         for number, stroke in enumerate(strokes[1:], 2)
-        if any(_mostly_judged(item, strokes[0]) and not _mostly_judged(item, stroke) for item in detections)
+        if any(_mostly_judged(item, *strokes[0]) and not _mostly_judged(item, *stroke) for item in detections)
     ]
     return [Finding(LogNotCut(len(strokes), tuple(unassessable)))] if unassessable else []
 
 
-def _strokes(recording: Recording) -> list[Operation]:
+def _strokes(recording: Recording) -> list[tuple[float, float]]:
+    """Return the times [s] of the first and the last sample of each motion; empty if no speed is logged."""
     if "speed" not in recording and "reference_speed" not in recording:
         return []
-    try:
-        return operations_of(recording, "motion")
-    except CdtoolError:
-        return []
+    return [_bounds(recording, start, end) for start, end in motion_spans(recording)]
 
 
-def _mostly_judged(detection: Detection, stroke: Operation) -> bool:
+def _bounds(recording: Recording, start: float, end: float) -> tuple[float, float]:
+    """Return the times [s] of the first and the last sample of any channel from `start` to `end` [s]."""
+    first, last = math.inf, -math.inf
+    for time in (series.time for series in recording.channels.values()):
+        begin, after = int(np.searchsorted(time, start)), int(np.searchsorted(time, end, side="right"))
+        if begin < after:
+            first, last = min(first, float(time[begin])), max(last, float(time[after - 1]))
+    return first, last
+
+
+def _mostly_judged(detection: Detection, start: float, end: float) -> bool:
     statistic = detection.statistic
-    inside = (statistic.time >= stroke.recording.start) & (statistic.time <= stroke.recording.end)
-    valid = np.any(statistic.valid[inside], axis=1)
+    first, last = int(np.searchsorted(statistic.time, start)), int(np.searchsorted(statistic.time, end, side="right"))
+    valid = np.any(statistic.valid[first:last], axis=1)
     return bool(len(valid)) and float(np.mean(valid)) >= _JUDGED

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
-from cdtool.evaluation.truth.missing_samples import longest_step
+from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.evaluation.truth.onset import find_contacts
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown
@@ -73,13 +73,13 @@ def _missing(recording: Recording) -> str:
         return f"part of the log is lost: {damage[0].reason}"
     if "force" not in recording:
         return ""
-    cell = recording["force"]
-    present = cell.time[np.isfinite(cell.values[:, 0])]
+    clock = cell_samples(recording["force"]).clock
+    present = clock.time
     if len(present) and present[-1] > recording.end - _TAIL:
         marks = np.concatenate(([recording.start], present))
         steps = np.diff(marks)
         k = int(np.argmax(steps))
-        if steps[k] <= longest_step(present):
+        if steps[k] <= clock.longest_step:
             return ""
         return f"load-cell samples are missing from {marks[k]:.3f} to {marks[k + 1]:.3f} s"
     last = f"ends at {present[-1]:.3f} s" if len(present) else "has no samples"

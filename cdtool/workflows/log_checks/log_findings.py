@@ -21,7 +21,7 @@ from cdtool.findings.motion import (
     AccelerometerTurned,
     AccelerometerUncheckable,
 )
-from cdtool.recording import Contact, FloatArray, Recording
+from cdtool.recording import Contact, FloatArray, Recording, Series
 from cdtool.workflows.log_checks.motion_check import motion_findings
 
 # Length of the windows over which the change of speed and the mean acceleration are compared [s].
@@ -50,17 +50,20 @@ def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
 
 def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) -> list[Finding]:
     """Return one finding per joint: the measured acceleration against the derivative of the speed before contact."""
-    recording = _before_contact(recording, contacts)
     if "acceleration" not in recording or "speed" not in recording:
         return []
+    speed, acceleration = (_before_contact(recording[name], contacts) for name in ("speed", "acceleration"))
+    if not len(speed) or not len(acceleration):
+        return []
     found = []
-    ranges = [_range(recording["speed"].values[:, j]) for j in range(len(recording.joints))]
+    # A single joint is not compared with others.
+    ranges = [_range(speed.values[:, j]) for j in range(len(recording.joints))] if len(recording.joints) > 1 else [0.0]
     for j, joint in enumerate(recording.joints):
         name = joint if len(recording.joints) > 1 else ""
         if ranges[j] < _HARDLY * max(ranges):
             found.append(Finding(AccelerometerUncheckable(name, "joint hardly moves"), "acceleration", "note"))
             continue
-        fact = _compare(*_pairs(recording, j), name)
+        fact = _compare(*_pairs(speed, acceleration, j), name)
         is_wrong = isinstance(fact, AccelerometerTurned | AccelerometerScaleWrong)
         found.append(Finding(fact, "acceleration", "warning" if is_wrong else "note"))
     return found
@@ -71,11 +74,11 @@ def _range(values: FloatArray) -> float:
     return float(np.ptp(known)) if len(known) else 0.0
 
 
-def _before_contact(recording: Recording, contacts: Sequence[Contact]) -> Recording:
+def _before_contact(series: Series, contacts: Sequence[Contact]) -> Series:
     """Return the part before the first contact: during contact the elastic drive separates motor and load."""
     since = contacts[0].end if contacts and contacts[0].in_progress else -np.inf
     first = next((contact.start for contact in contacts if not contact.in_progress), np.inf)
-    return recording.between(since, first) if contacts else recording
+    return series.between(since, first) if contacts else series
 
 
 def _compare(expected: FloatArray, measured: FloatArray, joint: str) -> Fact:
@@ -103,9 +106,8 @@ def _fits(slope: float) -> bool:
     return 0.7 < slope < 1.4
 
 
-def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:
+def _pairs(speed: Series, acceleration: Series, joint: int) -> tuple[FloatArray, FloatArray]:
     """Return the change of speed per time and the mean acceleration in consecutive windows, (w,) each."""
-    speed, acceleration = recording["speed"], recording["acceleration"]
     edges = np.arange(max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1]), _WINDOW)
     if len(edges) < 3:
         return np.empty(0), np.empty(0)
@@ -113,12 +115,16 @@ def _pairs(recording: Recording, joint: int) -> tuple[FloatArray, FloatArray]:
     if np.count_nonzero(known) < 2:
         return np.empty(0), np.empty(0)
     gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / _WINDOW
-    bounds = np.searchsorted(acceleration.time, edges).tolist()
+    measured = acceleration.values[:, joint]
+    present = np.isfinite(measured)
+    before = np.searchsorted(acceleration.time, edges)
+    if not present.all():
+        # Where a window begins among the samples that are not missing.
+        before = np.concatenate(([0], np.cumsum(present)))[before]
+        measured = measured[present]
     means = np.full(len(edges) - 1, np.nan)
-    for i, (start, end) in enumerate(pairwise(bounds)):
-        part = acceleration.values[start:end, joint]
-        part = part[np.isfinite(part)]
-        if len(part):
-            means[i] = part.mean()
+    for i, (start, end) in enumerate(pairwise(before.tolist())):
+        if end > start:
+            means[i] = np.add.reduce(measured[start:end]) / (end - start)
     good = np.isfinite(means) & np.isfinite(gained)
     return gained[good], means[good]

@@ -6,7 +6,6 @@ import numpy as np
 
 from cdtool.clock import GAP_PERIODS, integrate, previous_value
 from cdtool.detectors.base import of_joint
-from cdtool.errors import CdtoolError
 from cdtool.findings import Finding
 from cdtool.findings.channels import DerivedSpeed, IntegratedPosition
 from cdtool.findings.motion import (
@@ -21,8 +20,9 @@ from cdtool.findings.motion import (
 )
 from cdtool.machine_file import MachineFile
 from cdtool.motion import motion_class
-from cdtool.operations import operations_of
+from cdtool.operations import motion_spans
 from cdtool.recording import FloatArray, Recording, Series
+from cdtool.workflows.log_checks.travel_kernel import travel_of
 
 # The columns of two joints are exchanged if both positions correlate with the integral of their own speed by less than
 # the first value, and one with that of the other joint by more than the second.
@@ -30,6 +30,8 @@ _OWN_FIT, _OTHER_FIT = 0.9, 0.99
 # Below this share of the largest movement a joint hardly moves: its integrated speed is noise and offset.
 _HARDLY = 0.01
 _PARTS, _ABOVE_NOISE = 50, 10.0
+# The noise, 1.05 times a median distance from the median step, is at most 2.1 times the largest step.
+_CERTAIN = 2.5
 _FACTORS = (
     (180.0 / np.pi, "deg and rad"),
     (1000.0, "mm and m, or ms and s"),
@@ -48,10 +50,7 @@ def motion_findings(recording: Recording) -> list[Finding]:
     if motion.direction == 0:
         return [Finding(NoMotion(), "speed", "note")]
     unit = recording["speed"].unit
-    try:
-        strokes = len(operations_of(recording, "motion"))
-    except CdtoolError:
-        strokes = 0
+    strokes = len(motion_spans(recording))
     fact = Motion(strokes, motion.nominal_speed, unit, "forward" if motion.direction > 0 else "backward")
     return [Finding(fact, "speed", "note"), *_consistency(recording)]
 
@@ -92,15 +91,16 @@ def _moved(values: FloatArray) -> float:
     known = values[np.isfinite(values)]
     if len(known) < 3:
         return 0.0
+    travel: tuple[float, float, float] = travel_of(known, min(_PARTS, len(known)))
+    span, encoder, largest = travel
+    if span <= _ABOVE_NOISE * encoder:
+        return 0.0
+    # The noise is less than the largest step: where the span is far above that one, it need not be known.
+    if span > _CERTAIN * _ABOVE_NOISE * largest:
+        return span
     steps = np.diff(known)
     noise = 1.48 * float(np.median(np.abs(steps - np.median(steps)))) / np.sqrt(2.0)
-    changed = np.abs(steps[steps != 0.0])
-    # Rounding errors are far smaller than a step of any encoder.
-    changed = changed[changed > 1e-9 * max(float(np.abs(known).max()), 1e-300)]
-    encoder = float(changed.min()) if len(changed) else 0.0
-    parts = [float(np.median(part)) for part in np.array_split(known, min(_PARTS, len(known)))]
-    span = max(parts) - min(parts)
-    return span if span > _ABOVE_NOISE * max(noise, encoder) else 0.0
+    return span if span > _ABOVE_NOISE * noise else 0.0
 
 
 def _as_between(ratio: float) -> str:
@@ -143,11 +143,13 @@ def _without_gaps(speed: Series, position: Series, joint: int) -> tuple[FloatArr
     integrated, travelled, time = integrated[known], travelled[known], time[known]
     if len(time) < 2:
         return np.empty(0), np.empty(0)
-    pauses = np.concatenate(([0], np.cumsum(np.diff(speed.time) > GAP_PERIODS * speed.period)))
-    at = np.searchsorted(speed.time, time, side="right") - 1
-    after = np.minimum(at + 1, len(speed.time) - 1)
     logged = np.diff(time) <= GAP_PERIODS * position.period
-    logged &= pauses[after[1:]] - pauses[at[:-1]] == 0
+    is_pause = np.diff(speed.time) > GAP_PERIODS * speed.period
+    if is_pause.any():
+        pauses = np.concatenate(([0], np.cumsum(is_pause)))
+        at = np.searchsorted(speed.time, time, side="right") - 1
+        after = np.minimum(at + 1, len(speed.time) - 1)
+        logged &= pauses[after[1:]] - pauses[at[:-1]] == 0
     steps = (np.where(logged, np.diff(values), 0.0) for values in (integrated, travelled))
     return tuple(np.concatenate(([0.0], np.cumsum(step))) for step in steps)  # type: ignore[return-value]
 
