@@ -39,9 +39,11 @@ def previous_value(series: Series, clock: FloatArray) -> FloatArray:
     if not len(series.time):
         return np.full((len(clock), series.joint_count), np.nan)
     at = np.searchsorted(series.time, clock, side="right") - 1
-    held = series.values[np.maximum(at, 0)]
-    age = clock - series.time[np.maximum(at, 0)]
-    oldest = HOLD_PERIODS * _recent_period(series.time)[np.maximum(at, 0)]
+    newest = np.maximum(at, 0)
+    held = series.values[newest]
+    age = clock - series.time[newest]
+    # Of the times after the last one that is needed, none has an influence.
+    oldest = HOLD_PERIODS * _recent_period(series.time[: newest.max(initial=0) + 1])[newest]
     return np.where(((at < 0) | (age > oldest))[:, np.newaxis], np.nan, held)
 
 
@@ -65,16 +67,18 @@ def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:
         # A copy, as a Series is read-only and the kernel's signature requires a writable array.
         column = series.values[:, joint].copy()
         _differentiate(series.time, column, 2.0 * np.pi * low_pass_hz, rates[:, joint])
-    return Series(series.time, rates, unit)
+    return series.with_values(rates, unit)
 
 
 def integrate(series: Series, unit: str) -> Series:
     """Return the causal integral of a speed from 0 (trapezoidal rule); a missing sample repeats the last speed."""
-    speed = np.where(np.isfinite(series.values), series.values, np.nan)
-    filled = _hold_last(speed)
+    filled = series.values
+    known = np.isfinite(filled)
+    if not known.all():
+        filled = _hold_last(np.where(known, filled, np.nan))
     steps = np.diff(series.time)[:, np.newaxis] * 0.5 * (filled[1:] + filled[:-1])
     travel = np.vstack((np.zeros((1, series.joint_count)), np.cumsum(steps, axis=0)))
-    return Series(series.time, travel, unit)
+    return series.with_values(travel, unit)
 
 
 def _hold_last(values: FloatArray) -> FloatArray:
