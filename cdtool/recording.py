@@ -40,15 +40,23 @@ class Series(StoresDerived):
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
-        values = np.asarray(self.values, dtype=np.float64)
-        if values.ndim == 1:
-            values = values[:, np.newaxis]
-        if time.ndim != 1 or values.ndim != 2 or len(values) != len(time):
-            raise RecordingError(f"time has shape {time.shape}, values {values.shape}; expected (n,) and (n, J)")
+        values = _table(self.values, time)
         if not np.all(np.isfinite(time)) or (len(time) > 1 and not np.all(time[1:] > time[:-1])):
             raise RecordingError("time does not strictly increase", "clean it with cdtool.clock.clean_time")
         object.__setattr__(self, "time", time)
-        object.__setattr__(self, "values", _frozen(values))
+        object.__setattr__(self, "values", values)
+
+    def with_values(self, values: npt.ArrayLike, unit: str) -> Series:
+        """Return a channel with the same times, which are neither checked nor copied; raises RecordingError."""
+        return self._with(self.time, _table(values, self.time), unit, with_period=True)
+
+    def _with(self, time: FloatArray, values: FloatArray, unit: str, *, with_period: bool = False) -> Series:
+        """Return a channel of read-only arrays that are known to be valid."""
+        made = object.__new__(type(self))
+        vars(made).update(time=time, values=values, unit=unit)
+        if with_period and "period" in vars(self):
+            vars(made)["period"] = self.period
+        return made
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore a series that was sent from another process: its arrays are read-only as before."""
@@ -73,7 +81,7 @@ class Series(StoresDerived):
         """Return the samples with start <= time <= end [s]."""
         first = int(np.searchsorted(self.time, start, side="left"))
         last = int(np.searchsorted(self.time, end, side="right"))
-        return replace(self, time=self.time[first:last], values=self.values[first:last])
+        return self._with(self.time[first:last], self.values[first:last], self.unit)
 
 
 @dataclass(frozen=True)
@@ -200,6 +208,16 @@ class Contact:
     resolution: float = math.nan
     in_progress: bool = False
     hole: float = 0.0
+
+
+def _table(values: npt.ArrayLike, time: FloatArray) -> FloatArray:
+    """Return read-only values (n, J) with a row for each time; raises RecordingError."""
+    table = np.asarray(values, dtype=np.float64)
+    if table.ndim == 1:
+        table = table[:, np.newaxis]
+    if time.ndim != 1 or table.ndim != 2 or len(table) != len(time):
+        raise RecordingError(f"time has shape {time.shape}, values {table.shape}; expected (n,) and (n, J)")
+    return _frozen(table)
 
 
 def _frozen(values: npt.ArrayLike) -> FloatArray:

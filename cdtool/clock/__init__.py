@@ -41,16 +41,18 @@ def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:
         # A copy, as a Series is read-only and the kernel's signature requires a writable array.
         column = series.values[:, joint].copy()
         _differentiate(series.time, column, 2.0 * np.pi * low_pass_hz, rates[:, joint])
-    return Series(series.time, rates, unit)
+    return series.with_values(rates, unit)
 
 
 def integrate(series: Series, unit: str) -> Series:
     """Return the causal integral of a speed from 0 (trapezoidal rule); a missing sample repeats the last speed."""
-    speed = np.where(np.isfinite(series.values), series.values, np.nan)
-    filled = _hold_last(speed)
+    filled = series.values
+    known = np.isfinite(filled)
+    if not known.all():
+        filled = _hold_last(np.where(known, filled, np.nan))
     steps = np.diff(series.time)[:, np.newaxis] * 0.5 * (filled[1:] + filled[:-1])
     travel = np.vstack((np.zeros((1, series.joint_count)), np.cumsum(steps, axis=0)))
-    return Series(series.time, travel, unit)
+    return series.with_values(travel, unit)
 
 
 def _hold_last(values: FloatArray) -> FloatArray:

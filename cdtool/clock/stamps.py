@@ -82,6 +82,8 @@ def clean_time(
     on a line. Raises RecordingError if no time stamp is above the first.
     """
     stamps = np.asarray(time, dtype=np.float64)
+    if _is_clean(stamps):  # the usual case
+        return CleanTime(stamps.copy(), np.ones(len(stamps), dtype=bool), ())
     known = np.isfinite(stamps)
     dropped = _DroppedStampCounts()
     index, repeated, backward = dropped.sort_out(stamps, StrayStampMarker().add(stamps[known], final=True))
@@ -115,6 +117,14 @@ def clean_time(
     keep = np.zeros(len(stamps), dtype=bool)
     keep[index] = True
     return CleanTime(np.ascontiguousarray(kept), keep, tuple(findings))
+
+
+def _is_clean(stamps: FloatArray) -> bool:
+    """Return whether all time stamps are finite and increase by steps too short to be stray: none is dropped."""
+    if len(stamps) < 2:
+        return False
+    steps = np.diff(stamps)
+    return bool(steps.min() > 0.0 and steps.max() <= EPOCH)  # False for a step that is NaN
 
 
 class ClockCleaner:
@@ -184,6 +194,8 @@ def epoch_start(stamps: FloatArray, factor: float) -> float:
     `factor` converts to seconds. Subtract the result before scaling, so that no digit is lost. Stray time stamps are
     skipped.
     """
+    if factor > 0.0 and np.fmax.reduce(stamps, initial=-np.inf) * factor <= EPOCH:  # the usual case
+        return 0.0
     finite = stamps[np.isfinite(stamps)]
     first = finite[count_leading_strays(finite, EPOCH / factor) :][:1]
     return float(first[0]) if len(first) and first[0] * factor > EPOCH else 0.0

@@ -7,6 +7,7 @@ masked. All warnings are reported together. Nothing is resampled.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,16 +17,20 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
+from cdtool.clock.stamps import gaps_in, missing_findings
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.findings import Fact, Finding, Severity
+from cdtool.findings import Finding, Severity
 from cdtool.findings.channels import ImpossibleValues, InfiniteValues, MaskedValues, SaturatedValues, StuckChannel
 from cdtool.findings.clocks import ClocksApart
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
+from cdtool.ingest.si_kernel import as_table, convert_and_mask, find_constant
 from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series
 
+# A file of at most this many bytes is read at once for its digest.
+_READ_AT_ONCE = 1 << 20
 Counts = npt.NDArray[np.int64]
 # The kinds of masked values, in the order of convert_to_si, with their severity.
 _MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
@@ -75,7 +80,9 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine) -
 
 def file_digest(path: Path) -> str:
     """Return the SHA-256 of a file's bytes, as hexadecimal digits."""
-    with path.open("rb") as file:
+    with path.open("rb", buffering=0) as file:
+        if os.fstat(file.fileno()).st_size <= _READ_AT_ONCE:
+            return hashlib.sha256(file.readall()).hexdigest()
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -88,8 +95,8 @@ class _Assembly:
         self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
         self.origin = source.origin
         self.findings: list[Finding] = []
-        self.gaps: set[Fact] = set()  # facts about the table's clock, which are not repeated for each channel
         self.table: CleanTime | None = None
+        self.clock: Series | None = None  # the table's times, which its channels share
         if not channels.topics:
             self.table = self._table_clock()
             self.findings += unit_findings(source, channels)
@@ -118,16 +125,22 @@ class _Assembly:
             )
         scaled, masked = convert_to_si(item, self._select(item, values, clock.keep))
         self.findings += masked_findings(masked, item, self.channels.joints)
-        series = Series(clock.time, scaled, item.unit)
-        findings = gap_findings(series, item.channel, int(masked.sum()))
-        self.findings += [finding for finding in findings if finding.fact not in self.gaps]
+        if self.clock is None:
+            series = Series(clock.time, scaled, item.unit)
+            self.findings += gap_findings(series, item.channel, int(masked.sum()))
+        else:  # the gaps of its times are reported once
+            series = self.clock.with_values(scaled, item.unit)
+            absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
+            self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
     def _table_clock(self) -> CleanTime:
         time = self.channels.time
         if time.column is None:
             rows = {len(column.values) for column in self.columns.values()}
-            return clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
+            clock = clean_time(np.arange(max(rows, default=0)) / (time.rate or 1.0))
+            self.clock = Series(clock.time, np.zeros(len(clock.time)), "s")
+            return clock
         column = self.columns[time.key]
         self.findings += check_clock_unit(self.source.path, time, column, self.origin)
         self.findings += time_unit_findings(time, column, self.origin)
@@ -139,9 +152,8 @@ class _Assembly:
             raise RecordingError(
                 f"{self.source.path}: column '{column.name}' contains no time stamp", "see [channels] time"
             )
-        gaps = gap_findings(Series(clock.time, np.zeros(len(clock.time)), "s"), "time")
-        self.gaps = {gap.fact for gap in gaps}
-        self.findings += gaps
+        self.clock = Series(clock.time, np.zeros(len(clock.time)), "s")
+        self.findings += gaps_in([self.clock.time], self.clock.period, "time")
         return clock
 
     def _clean(
@@ -202,19 +214,13 @@ def convert_to_si(item: ChannelSource, values: FloatArray) -> tuple[FloatArray, 
 
     The counts are (3, J): infinite, saturated, and physically impossible values.
     """
-    infinite = np.isinf(values)
-    saturated = np.zeros_like(infinite)
-    if item.valid_range is not None:
-        low, high = item.valid_range
-        saturated = ((values <= low) | (values >= high)) & ~infinite
-    with np.errstate(over="ignore"):
-        scaled: FloatArray = values * np.array(item.factor)
-    impossible = (values < item.least) | (values > item.most)
-    if item.channel not in UNITLESS:
-        impossible |= np.abs(scaled) >= IMPOSSIBLE
-    impossible &= ~(infinite | saturated)
-    scaled[infinite | saturated | impossible] = np.nan
-    return scaled, np.array([np.count_nonzero(mask, axis=0) for mask in (infinite, saturated, impossible)])
+    low, high = item.valid_range or (np.nan, np.nan)
+    impossible = np.nan if item.channel in UNITLESS else IMPOSSIBLE
+    limits = np.array([low, high, item.least, item.most, impossible])
+    table, masked = as_table(values), np.zeros((3, values.shape[1]), dtype=np.int64)
+    scaled = np.empty(table.shape)
+    convert_and_mask(table, np.array(item.factor, dtype=np.float64), limits, scaled, masked)
+    return scaled, masked
 
 
 def _torque_from_duty(path: Path, item: ChannelSource, series: dict[str, Series], low_pass: float) -> Series:
@@ -271,5 +277,7 @@ def disjoint_clock_findings(first_and_last: Mapping[str, tuple[float, float]]) -
 
 def _is_constant(series: Series) -> list[bool]:
     """Return, joint by joint, whether the value never changes."""
-    finite = (column[np.isfinite(column)] for column in series.values.T)
-    return [len(known) > 1 and bool(np.all(known == known[0])) for known in finite]
+    constant = np.zeros(series.joint_count, dtype=bool)
+    find_constant(series.values, constant)
+    found: list[bool] = constant.tolist()
+    return found

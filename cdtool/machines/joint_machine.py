@@ -137,7 +137,7 @@ class JointMachine:
         speed = channels["reference_speed"]
         travel = integrate(speed, self.load_units["position"])
         start = np.nan_to_num(previous_value(channels["position"], speed.time[:1])) if "position" in channels else 0.0
-        return Series(travel.time, travel.values + start, travel.unit)
+        return travel.with_values(travel.values + start, travel.unit)
 
     def minus_friction(self, force: FloatArray, speed: FloatArray, velocity: FloatArray) -> FloatArray:
         """Return `force` (n, J), changed in place, minus friction and constant force of each joint.
@@ -185,4 +185,4 @@ class JointMachine:
             values = values / ratio if quantity == "torque" else values * ratio
         if quantity == "position" and offset.any():
             values = values + offset
-        return series if values is series.values else Series(series.time, values, target)
+        return series if values is series.values else series.with_values(values, target)

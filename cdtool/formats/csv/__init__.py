@@ -147,7 +147,10 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
 def written_origin(path: Path) -> float:
     """Return the origin [s] that the head of a text table states; 0 if it does not state one."""
     with path.open("rb") as file:
-        head = file.read(_HEAD)
+        head = file.read(len(_MARK))
+        if head != _MARK:  # the usual case
+            return 0.0
+        head += file.read(_HEAD - len(_MARK))
     lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())
     written = next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0")
     try:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from cdtool.formats.csv.digits_kernel import BYTES, ZEROS, Bytes, digit_count
@@ -56,7 +58,7 @@ def find_alike_rows(
     rows = 0
     width = 0
     line = 0
-    at = 0
+    at: Any = 0
     seen = 0  # the kinds of marks of the rows so far, a bit for each
     full_rows = 0  # successive rows of plain numbers that are not yet counted in `columns`, and the last one's byte
     last_full = 0
@@ -71,7 +73,7 @@ def find_alike_rows(
                 base = p
                 ends = equal_bytes(data, base, separator) | equal_bytes(data, base, 10)
             ends = ends >> (p - base) << (p - base)
-            shown = 0
+            shown: Any = 0
             column = 0
             full = True
             final = False

@@ -33,7 +33,7 @@ def digit_count(word: np.uint64) -> np.uint64:
 
 
 @kernel("int64(uint64, uint64)", inline=True)
-def first_digits(word: np.uint64, count: np.uint64) -> int:
+def first_digits(word: np.uint64, count: np.uint64) -> np.int64:
     """Return the number of the first `count` digits of a word; 0 for none."""
     # Shifted up, so that zeros precede them; in two steps, as no word can be shifted by 64 bits.
     half = _32 - (count << _2)

@@ -44,7 +44,7 @@ def two_readings(stamps: FloatArray, factor: float) -> str:
     are in the range of the days from 2000 to 2100 cannot be distinguished from a clock in days.
     """
     known = stamps[np.isfinite(stamps)]
-    if len(known) < 2 or not _FIRST_DAY < np.median(known) < _LAST_DAY:
+    if len(known) < 2 or known.max() <= _FIRST_DAY or not _FIRST_DAY < np.median(known) < _LAST_DAY:
         return ""
     quarter = len(known) // 4
     step = float(known[-1 - quarter] - known[quarter]) / (len(known) - 1 - 2 * quarter)
@@ -71,9 +71,11 @@ def exact_differences(
     used as the first stamp. Stamps that are not plain digits (in quotes, with an exponent) are rounded to float64;
     missing stamps are NaN.
     """
-    known = np.isfinite(stamps)
     decimals = _DECIMALS.get(factor)
-    if decimals is None or not known.any():
+    if decimals is None or np.fmax.reduce(stamps, initial=-np.inf) * factor <= _FIRST:  # the usual case
+        return None
+    known = np.isfinite(stamps)
+    if not known.any():
         return None
     first_row = count_leading_strays(stamps[known], EPOCH / factor)
     if not _is_large(stamps[known] * factor, first_row):

@@ -7,6 +7,7 @@ a stray quote) also gets a row and is listed; the caller decides how to read it.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -84,7 +85,7 @@ def read_rows(
     quick = not by_blanks and thousands < 0
     base = _U0 - _U64  # the byte from which 64 bytes have been searched for ends of cells, and the ends left
     ends = _U0
-    p = 0
+    p: Any = 0
     line = 0
     blanks = 0
     irregulars = 0
@@ -116,7 +117,7 @@ def read_rows(
                     word = load(data, q) ^ ZEROS
                     digits = digit_count(word)
                     q += digits
-                    value = np.float64(first_digits(word, digits))
+                    value: Any = np.float64(first_digits(word, digits))
                     scale = 1.0
                     if data[q] == bare_decimal:
                         q += _U1

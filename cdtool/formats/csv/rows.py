@@ -66,6 +66,8 @@ class RowReader:
 
     def read(self, irregular: IrregularLines) -> Rows:
         """Return all rows in one pair of arrays, into which several threads write; raises RecordingError."""
+        if self.dialect.text.content is not None:
+            return _joined(list(self.pieces(irregular)), self.allocate(0))
         whole = self.allocate(self.dialect.text.count_lines(self.dialect.offset, count_lines))
         parts = list(self.pieces(irregular, whole))
         count = sum(part.count for part in parts)
@@ -179,6 +181,18 @@ class RowReader:
             ],
             dtype=np.int64,
         )
+
+
+def _joined(parts: Sequence[Rows], none: Rows) -> Rows:
+    """Return the rows of a short file in one pair of arrays; `none` are no rows."""
+    if len(parts) == 1:  # the usual case, without a copy
+        return parts[0]
+    parts = [none, *parts]
+    numbers, stamps = (
+        np.concatenate(tables, axis=1) for tables in zip(*((it.numbers, it.stamps) for it in parts), strict=True)
+    )
+    not_rows = np.concatenate([part.not_rows for part in parts])
+    return Rows(numbers, stamps, sum(part.count for part in parts), none.first_line, not_rows)
 
 
 def _compact(block: _Block, dropped: Sequence[int], to: int) -> int:
