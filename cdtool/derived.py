@@ -1,8 +1,9 @@
-"""Results derived from a value: computed once, stored with it, released with it."""
+"""Results derived from a value: computed once, stored with it, released with it, not sent with it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import fields
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -55,3 +56,28 @@ class StoresDerived:
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without what was derived: it would multiply the size of a pickle."""
         return {name: value for name, value in vars(self).items() if name != "_derived"}
+
+
+class SendsFields:
+    """A dataclass with cached properties, of which a pickle has the fields only: the rest is computed again.
+
+    Arrays lose their protection against writing in a pickle, and a kernel refuses those that it expects read-only.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Way(SendsFields):
+    ...     speed: float
+    ...
+    ...     @cached_property
+    ...     def double(self):
+    ...         return 2.0 * self.speed
+    >>> way = Way(0.5)
+    >>> way.double, way.__getstate__()
+    (1.0, {'speed': 0.5})
+    """
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]

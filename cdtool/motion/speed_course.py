@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from cdtool.clock import integrate
+from cdtool.derived import SendsFields
 from cdtool.kernels import read_only
 from cdtool.motion.course_kernel import Curves, Expected, fit_course
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
@@ -28,7 +29,7 @@ TOLERANCE = 0.05
 
 
 @dataclass(frozen=True)
-class SpeedCurve:
+class SpeedCurve(SendsFields):
     """Mean and spread (g,) of the forward speed [load unit/s] on the grid 0, step, 2 step ...
 
     Both are constant beyond the grid's ends.
@@ -50,7 +51,7 @@ class SpeedCurve:
 
 
 @dataclass(frozen=True)
-class SpeedCourse:
+class SpeedCourse(SendsFields):
     """Speed over the time since the motion began, used while accelerating, and over travel, used after that.
 
     `alignment` is the signature's: with "time" or "position" only that one is used.

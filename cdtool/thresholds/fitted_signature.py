@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.derived import SendsFields
 from cdtool.detection import Band, Signal
 from cdtool.errors import SignatureError, UsageError, nearest
 from cdtool.kernels import read_only
@@ -25,7 +26,7 @@ SIDES = ("one", "two")
 
 
 @dataclass(frozen=True)
-class FittedSignature:
+class FittedSignature(SendsFields):
     """Statistics of the runs along the stroke, for one class of motion, and the rule that derives limits from them.
 
     `evaluate` uses the time since the motion began while accelerating, and the travel afterwards (or only one of them).

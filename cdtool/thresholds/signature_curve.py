@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.derived import SendsFields
 from cdtool.detection import Signal
 from cdtool.motion.progress import Progress
 from cdtool.motion.smoothing import moving_mean
@@ -26,7 +27,7 @@ _MOST_STEPS = 1e6
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(SendsFields):
     """On the grid 0, step, 2 step, ...: `count`, `mean` and `squares` (sum of squared deviations), each (g, J).
 
     `window`: neighbours up to this distance on either side are pooled, in the unit of the grid.
