@@ -9,6 +9,7 @@ onset: it lasts from the first sample to its release.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -90,9 +91,19 @@ class _Search:
         self.rule, self.since = rule, since
         self.period = samples.clock.period
         self.rest = RunningRest(samples.time, samples.force)
-        step = reading_step(samples.force)
-        self.noise = max(self.rest.noise, _ROUNDING * step)
-        self.above, self.back_to = rule.levels(self.noise, steps * step)
+        # Levels that are given by hand do not depend on the noise.
+        by_noise = (self.noise, steps * self.step) if rule.above is None else (0.0, 0.0)
+        self.above, self.back_to = rule.levels(*by_noise)
+
+    @cached_property
+    def step(self) -> float:
+        """Return the step in which the cell reads [N]."""
+        return reading_step(self.force)
+
+    @cached_property
+    def noise(self) -> float:
+        """Return the standard deviation of a reading at rest [N]."""
+        return max(self.rest.noise, _ROUNDING * self.step)
 
     def contacts(self) -> list[Contact]:
         """Every contact; one that is in progress at the start comes first."""

@@ -9,6 +9,7 @@ mistaken as drift of the cell: a rise to the level within about 0.6 s is a conta
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -72,7 +73,11 @@ class RunningRest:
             median[:count],
         )
         self._rest = np.ones(count, dtype=bool)
-        self.noise = noise_about(force, self._first, self.levels)
+
+    @cached_property
+    def noise(self) -> float:
+        """Return the standard deviation of the readings about the level [N], before anything was excluded."""
+        return float(noise_about(self.force, self._first, self.levels))
 
     @property
     def start(self) -> float:
@@ -94,6 +99,7 @@ class RunningRest:
 
         `level` [N]: the rest level after them where no interval before them was at rest.
         """
+        _ = self.noise  # that about the levels before they change
         first = self._interval_of(min(int(np.searchsorted(self.time, start)), len(self.time) - 1))
         last = self._interval_of(int(np.searchsorted(self.time, end, side="right")) - 1)
         self._rest[first : last + 1] = False

@@ -42,7 +42,7 @@ def test_levels_lines_and_noise_are_those_of_the_rule_for_whole_arrays(cell, dat
     moments = st.floats(-0.5, 1.5).map(lambda share: float(time[0] + share * (time[-1] - time[0])))
     for _ in range(data.draw(st.integers(0, 3))):
         assert_same_bits(ours.levels, theirs.levels)
-        assert_same_bits(np.array([ours.start, ours.noise]), np.array([theirs.start, theirs.noise]))
+        assert_same_bits(np.array(ours.start), np.array(theirs.start))
         for gap in (0.3, 0.05):
             at = data.draw(moments)
             line = ours.line(at, gap)
@@ -55,6 +55,7 @@ def test_levels_lines_and_noise_are_those_of_the_rule_for_whole_arrays(cell, dat
         ours.exclude(start, end, level)
         theirs.exclude(start, end, level)
     assert_same_bits(ours.levels, theirs.levels)
+    assert_same_bits(np.array(ours.noise), np.array(theirs.noise))  # not that about the changed levels
     onset = data.draw(moments)
     line = _Rest(time, force).line(onset, 0.3)
     assert_same_bits(np.array(rest_before(time, force, onset)), _Rest.value(np.array(line), np.array(onset)))
