@@ -123,7 +123,8 @@ def _is_clean(stamps: FloatArray) -> bool:
     """Return whether all time stamps are finite and increase by steps too short to be stray: none is dropped."""
     if len(stamps) < 2:
         return False
-    steps = np.diff(stamps)
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(stamps)
     return bool(steps.min() > 0.0 and steps.max() <= EPOCH)  # False for a step that is NaN
 
 
