@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cdtool.clock import GAP_PERIODS, integrate, previous_value
@@ -18,12 +20,15 @@ from cdtool.findings.motion import (
     SpeedSignOpposite,
     SpeedUnitDoubtful,
 )
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.machine_file import MachineFile
+from cdtool.median_kernel import median_of
 from cdtool.motion import motion_class
 from cdtool.operations import motion_spans
 from cdtool.recording import FloatArray, Recording, Series
-from cdtool.workflows.log_checks.travel_kernel import travel_of
 
+# Rounding errors are far smaller than a step of any encoder: this share of the largest position, or this value.
+_ROUNDING, _LEAST_POSITION = 1e-9, 1e-300
 # The columns of two joints are exchanged if both positions correlate with the integral of their own speed by less than
 # the first value, and one with that of the other joint by more than the second.
 _OWN_FIT, _OTHER_FIT = 0.9, 0.99
@@ -173,3 +178,37 @@ def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[
     poles, _ = detector.steady_state(inertia, motion.nominal_speed, friction, recording["speed"].period)
     fact = Poles(motion.nominal_speed, recording["speed"].unit, float(poles[0]), float(poles[1]))
     return [Finding(fact, "friction_ekf", "note")]
+
+
+@kernel(f"UniTuple(float64, 3)({READ_ONLY}, int64)", exact=True)
+def travel_of(position: FloatArray, parts: int) -> tuple[float, float, float]:
+    """Return the range of the medians of so many parts of a position (n,), its smallest step and its largest one.
+
+    The smallest step is that of an encoder, without rounding errors; 0 if all are equal. No sample is missing, and
+    no part is empty: the first n modulo `parts` of them have a sample more.
+    """
+    count = len(position)
+    scratch = np.empty(count // parts + 1)
+    lowest = math.inf
+    highest = -math.inf
+    begin = 0
+    for i in range(parts):
+        size = count // parts + (1 if i < count % parts else 0)
+        for k in range(size):
+            scratch[k] = position[begin + k]
+        begin += size
+        median = median_of(scratch, size)
+        lowest, highest = min(lowest, median), max(highest, median)
+    farthest = _LEAST_POSITION
+    for k in range(count):
+        farthest = max(farthest, abs(position[k]))
+    smallest = 0.0
+    largest = 0.0
+    is_any = False
+    for k in range(1, count):
+        step = abs(position[k] - position[k - 1])
+        largest = max(largest, step)
+        if step > _ROUNDING * farthest and (step < smallest or not is_any):
+            smallest = step
+            is_any = True
+    return float(highest - lowest), float(smallest), float(largest)

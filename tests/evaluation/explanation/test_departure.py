@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.evaluation.explanation.departure_kernels import first_beyond, median_of_known, steepest_bend
+from cdtool.evaluation.explanation.departure import first_beyond, median_of_known, steepest_bend
 
 VALUES = st.sampled_from([0.0, 0.5, 1.0, 1.0 + 1e-15, 1.5, -1.0, -2.0, np.inf, -np.inf, np.nan])
 
