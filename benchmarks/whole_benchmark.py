@@ -5,7 +5,7 @@ The peer is `bare_script.py`. 200 and 2,000 recordings, with one job and with tw
 new process.
 
 python benchmarks/whole_benchmark.py            # some minutes; 1 GB in the temporary folder
-python benchmarks/whole_benchmark.py --guard    # 50 recordings in one process, some seconds: for a CI pipeline
+python benchmarks/whole_benchmark.py --guard    # 50 recordings in one process, half a minute
 """
 
 from __future__ import annotations
