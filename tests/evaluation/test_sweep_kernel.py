@@ -75,9 +75,9 @@ STATES = st.sampled_from([Status.VALID] * 6 + [Status.GAP, Status.NOT_APPLICABLE
 CONTACTS = st.lists(
     st.builds(
         Contact,
-        start=st.sampled_from([0.0, 0.1, 0.15, 0.3, 0.305, 0.5]),
-        end=st.sampled_from([0.2, 0.3, 0.45, 0.6]),
-        uncertainty=st.sampled_from([0.0, 0.004, 0.05]),
+        start=st.sampled_from([0.0, 0.125, 0.25, 0.3, 0.3125, 0.5]),
+        end=st.sampled_from([0.25, 0.3, 0.4375, 0.625]),
+        uncertainty=st.sampled_from([0.0, 0.004, 0.0625]),
         in_progress=st.booleans(),
     ),
     max_size=4,
@@ -85,7 +85,7 @@ CONTACTS = st.lists(
 ACTIVATIONS = st.builds(
     Activation,
     debounce=st.sampled_from([None, 1, 2, 3]),
-    rearm=st.sampled_from([0.0, 0.02, 0.05, 10.0]),
+    rearm=st.sampled_from([0.0, 0.015625, 0.046875, 10.0]),
     hysteresis=st.sampled_from([0.0, 0.3, 0.9]),
     latch=st.booleans(),
 )
@@ -94,7 +94,8 @@ ACTIVATIONS = st.builds(
 @st.composite
 def _detections(draw: st.DrawFn) -> _Given:
     count, joints = draw(st.integers(0, 60)), draw(st.integers(1, 3))
-    steps = draw(st.lists(st.sampled_from([0.005, 0.01, 0.05]), min_size=count, max_size=count))
+    # Times are exact, so that samples lie exactly at the ends of windows and waits.
+    steps = draw(st.lists(st.sampled_from([0.0078125, 0.015625, 0.0625]), min_size=count, max_size=count))
     time = np.cumsum(np.array(steps, dtype=np.float64))
     # Runs of equal samples, as a signal has them: single ones never fill a debounce.
     lengths = draw(st.lists(st.integers(1, 6), min_size=count, max_size=count))
@@ -109,12 +110,12 @@ def _detections(draw: st.DrawFn) -> _Given:
         met = met.copy()
         met[draw(st.integers(0, count - 1)), 0] = np.nan
     signal = Signal(time, met, status, "N", joints=tuple("abc"[:joints]))
-    starts = tuple(draw(st.lists(st.sampled_from([0.1, 0.2, 0.31, 0.9]), max_size=2, unique=True)))
+    starts = tuple(draw(st.lists(st.sampled_from([0.0625, 0.125, 0.25, 0.3, 0.9]), max_size=2, unique=True)))
     return _Given(OPERATION, "d", signal, Band(met, met), Verdict("no alarm"), met_at=met, starts=starts)
 
 
 @settings(max_examples=300, deadline=None)
-@given(_detections(), CONTACTS, ACTIVATIONS, st.sampled_from([0.01, 0.1, 1.0]))
+@given(_detections(), CONTACTS, ACTIVATIONS, st.sampled_from([0.015625, 0.125, 1.0]))
 def test_all_factors_at_once_are_the_bits_of_each_alone(detection, contacts, activation, window):
     expected = _factor_by_factor(detection, contacts, activation, window, FACTORS)
     _same(sweep(detection, contacts, activation, window, FACTORS), expected)
@@ -130,6 +131,30 @@ def test_a_long_noisy_log_of_two_joints_gives_the_same_bits(seed, hysteresis):
     expected = _factor_by_factor(made, contacts, activation, 0.5, factors)
     _same(sweep(made, contacts, activation, 0.5, factors), expected)
     assert expected.false_alarms.max() > 3 and np.isfinite(expected.latency).any()
+
+
+@pytest.mark.parametrize(
+    ("met", "starts", "contacts", "count"),
+    [
+        # Inside from the 2nd to the 3rd sample: exactly the wait.
+        ([5.0, 0.0, 0.0, 5.0], (), [], 2),
+        ([5.0, 0.0, 5.0, 5.0], (), [], 1),
+        # An operation begins exactly at the second alarm, or right after it.
+        ([5.0, 0.0, 5.0, 5.0], (0.03125,), [], 2),
+        ([5.0, 0.0, 5.0, 5.0], (0.046875,), [], 1),
+        # The contact is released exactly at the alarm, or right before it.
+        ([0.0, 0.0, 0.0, 5.0], (), [Contact(0.0, 0.046875, 0.0)], 0),
+        ([0.0, 0.0, 0.0, 5.0], (), [Contact(0.0, 0.03125, 0.0)], 1),
+    ],
+)
+def test_the_ends_of_waits_and_contacts_count_as_in_the_activation(met, starts, contacts, count):
+    values = np.array(met)[:, np.newaxis]
+    signal = Signal(np.arange(4) / 64.0, values, np.zeros((4, 1), dtype=np.uint8), "N", joints=("a",))
+    made = _Given(OPERATION, "d", signal, Band(values, values), Verdict("no alarm"), met_at=values, starts=starts)
+    activation = Activation(debounce=1, rearm=0.015625)
+    swept = sweep(made, contacts, activation, 0.015625, np.ones(1))
+    _same(swept, _factor_by_factor(made, contacts, activation, 0.015625, np.ones(1)))
+    assert swept.false_alarms.tolist() == [count]
 
 
 def test_no_factors_are_no_rows():
