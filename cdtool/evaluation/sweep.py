@@ -73,7 +73,30 @@ def sweep_operation(
     window: float,
     factors: Mapping[str, FloatArray],
 ) -> tuple[Swept | None, ...]:
-    """Return the `sweep` of each detection of one operation; None for a detector without `factors`."""
+    """Return the `sweep` of each detection of one operation.
+
+    Parameters
+    ----------
+    detections : sequence of Detection
+        The operation with every detector's statistic and threshold.
+    contacts : sequence of Contact
+        The contacts of the operation.
+    activation : Activation
+        What raises an alarm.
+    window : float
+        How long after its onset a contact may be detected [s].
+    factors : mapping of str to ndarray of float, shape (f,)
+        Safety factors, by detector.
+
+    Returns
+    -------
+    tuple of Swept or None
+        In the order of `detections`; None for a detector without `factors`.
+
+    Examples
+    --------
+    `cdtool.benchmark` stores the results in `results.sweep`.
+    """
     spans = windows(contacts, window)
     order = np.argsort([contact.start for contact in contacts], kind="stable")
     ends = [max(closes, contact.end) for contact, _, closes in spans]

@@ -125,8 +125,9 @@ def test_a_recording_from_another_process_is_the_same_and_read_only():
 
 
 ENDLESS = r"""
-import os, sys, time
+import os, signal, sys, time
 sys.path.insert(0, sys.argv[1])
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored by programs that a shell starts in the background
 from cdtool.workflows.workers import in_order
 
 def work(number):
