@@ -82,7 +82,24 @@ class CellSamples:
 
 
 def cell_samples(force: Series) -> CellSamples:
-    """Return the samples of a load cell that are not missing, each time the same object."""
+    """Return the samples of a load cell that are not missing, each time the same object.
+
+    Parameters
+    ----------
+    force : Series
+        The load cell [N]; NaN: a missing sample.
+
+    Returns
+    -------
+    CellSamples
+        The samples with their clock.
+
+    Examples
+    --------
+    >>> samples = cell_samples(Series(np.arange(4) * 1e-3, np.array([0.0, np.nan, 2.0, 3.0]), "N"))
+    >>> samples.time.tolist(), samples.force.tolist()
+    ([0.0, 0.002, 0.003], [0.0, 2.0, 3.0])
+    """
     return force.derived("samples of the load cell", lambda: _existing(force))
 
 
