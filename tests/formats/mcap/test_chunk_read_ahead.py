@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import multiprocessing
+import sys
 
 import numpy as np
 import pytest
@@ -127,3 +129,19 @@ def test_memory_is_reused_only_if_nothing_refers_to_it():
 def test_memory_larger_than_a_buffer_is_allocated_in_the_requested_size():
     large = Buffers(1 << 22).take(5 << 20)
     assert large.shape == (5 << 20,) and large.dtype == np.uint8
+
+
+def fill(buffers):
+    buffers.take(100)[:] = 7
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux only")
+def test_a_forked_worker_writes_into_memory_of_its_own():
+    buffers = Buffers(1 << 22)
+    buffers.take(100)[:] = 0
+    gc.collect()  # the memory is free when the process is forked, as after the first log of a benchmark
+    worker = multiprocessing.get_context("fork").Process(target=fill, args=(buffers,))
+    worker.start()
+    worker.join()
+    assert worker.exitcode == 0
+    assert not buffers.take(100).any()

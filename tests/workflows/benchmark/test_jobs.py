@@ -12,6 +12,7 @@ from cdtool.evaluation.traces.file import encode_traces
 from cdtool.thresholds import THRESHOLDS
 from cdtool.workflows import runs
 from cdtool.workflows.benchmark import benchmark as benchmark_module
+from cdtool.workflows.workers import in_order
 
 FILE = """machine = "machine.toml"
 threshold = "{threshold}"
@@ -77,3 +78,22 @@ def test_results_and_traces_are_the_same_bytes_for_any_number_of_jobs(gate, othe
         assert len({run(gate, "signature", jobs) for jobs in (1, 3)}) == 1
     finally:
         stop.set()
+
+
+def bits(log: Path) -> bytes:
+    recording = cdtool.read(log, log.parents[1] / "machine.toml")
+    series = [recording[channel] for channel in sorted(recording.channels)]
+    return b"".join(array.tobytes() for each in series for array in (each.time, each.values))
+
+
+@pytest.mark.parametrize("file_format", ["csv", "mcap"])
+def test_workers_that_read_at_the_same_time_read_the_same_bits(tmp_path, file_format):
+    cdtool.simulate_gate(tmp_path, {"holdout": 2, "stiff": 2}, seed=17, file_format=file_format)
+    logs = 18 * sorted(tmp_path.glob(f"*/*.{file_format}"))
+    alone = [bits(log) for log in logs]
+    assert len(set(alone)) == 4
+    for _ in range(3):
+        differing = [
+            log for log, one, many in zip(logs, alone, in_order(bits, logs, 72, 4), strict=True) if one != many
+        ]
+        assert not differing

@@ -8,6 +8,7 @@ again one by one, and damage is reported then.
 from __future__ import annotations
 
 import mmap
+import sys
 import weakref
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -73,7 +74,10 @@ class Buffers:
 
 
 def _large_pages(size: int) -> mmap.mmap:
-    memory = mmap.mmap(-1, size + _LARGE_PAGE)
+    if sys.platform == "win32":
+        return mmap.mmap(-1, size + _LARGE_PAGE)
+    # Private: without it, forked workers would write into the same memory as this process and each other.
+    memory = mmap.mmap(-1, size + _LARGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     if hasattr(mmap, "MADV_HUGEPAGE"):  # Linux
         memory.madvise(mmap.MADV_HUGEPAGE)
     return memory
