@@ -17,6 +17,7 @@ import numpy as np
 
 from cdtool.findings import Finding
 from cdtool.findings.channels import ImplausibleValues, Leap, LeapingValues, LearnedInOtherUnit
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
 
 # No channel of a machine reaches this value in SI: 1e9 N m, rad/s or rad.
@@ -45,6 +46,8 @@ _EDGE = 3
 # After a leap to a new zero, a position counts again once it has stayed within this multiple of the usual reach for
 # this long [s], and has moved by this share of the reach.
 _AMONG, _SETTLED, _MOVED = 1.5, 0.1, 0.02
+
+_VALUES = "Array(float64, 2, 'C', readonly=True)"
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,8 @@ class PlausibleRanges:
                 findings.append(Finding(LearnedInOtherUnit(series.unit, known.unit), name))
                 continue
             of_channel = factors.get(name, ())
+            if not to_learn and not _has_suspects(series, known, FAR.get(name, _FAR_ELSE), of_channel):
+                continue
             wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
             if to_learn and not name.endswith("position"):
                 wrong |= _spikes(np.where(wrong, np.nan, series.values), known, _SPIKE.get(name, _SPIKE_ELSE))
@@ -194,6 +199,62 @@ def _implausible(series: Series, known: ChannelRange, far: float, factors: Seque
             ends = np.isin(series.values[:, j], _ENDS * factor)
             wrong[:, j] |= ends & (distance[:, j] > _FAR_ENDS * known.reach)
     return wrong
+
+
+def _has_suspects(series: Series, known: ChannelRange, far: float, factors: Sequence[float]) -> bool:
+    """Return whether a value of a channel is implausible, or a step of it a leap; most channels have neither."""
+    joints = series.joint_count
+    ends = np.multiply.outer(np.array(factors, dtype=np.float64), _ENDS)
+    near = 0.5 * _WRAP * np.abs(np.array(factors or [0.0] * joints, dtype=np.float64))
+    if known.rate > 0.0:
+        step, rate = np.full(joints, known.reach), _FASTER * known.rate
+    else:
+        step, rate = np.where(near > _FAR_ENDS * known.reach, 2.0 * near, np.inf), 0.0
+    beyond = max(far * known.reach, _BEYOND_EXTREME * known.extreme)
+    centre = np.array(known.centre)
+    return has_implausible(series.values, centre, beyond, ends, _FAR_ENDS * known.reach) or has_leap(
+        series.time, series.values, step, rate
+    )
+
+
+@kernel(f"b1({_VALUES}, float64[::1], float64, float64[:,::1], float64)", exact=True)
+def has_implausible(values: FloatArray, centre: FloatArray, beyond: float, ends: FloatArray, far: float) -> bool:
+    """Return whether a value (n, J) is `beyond` this distance from `centre` (J,), or an end of the integer range.
+
+    `ends` (J, e) are these ends by joint; they count if they are `far` from the centre. Without rows there are none.
+    """
+    for j in range(values.shape[1]):
+        for k in range(values.shape[0]):
+            distance = abs(values[k, j] - centre[j])
+            if distance > beyond:
+                return True
+            if distance > far:
+                for i in range(ends.shape[1] if len(ends) else 0):
+                    if values[k, j] == ends[j, i]:
+                        return True
+    return False
+
+
+@kernel(f"b1({READ_ONLY}, {_VALUES}, float64[::1], float64)", exact=True)
+def has_leap(time: FloatArray, values: FloatArray, largest: FloatArray, rate: float) -> bool:
+    """Return whether a step between known values (n, J) of a joint is a leap.
+
+    It is one if it is larger than `largest` (J,) and than `rate` times the time [s] between the two values; with `rate`
+    0 also if it is as large as `largest`.
+    """
+    for j in range(values.shape[1]):
+        before = -1
+        for k in range(values.shape[0]):
+            if math.isnan(values[k, j]):
+                continue
+            step = abs(values[k, j] - values[before, j]) if before >= 0 else 0.0
+            if rate > 0.0:
+                if step > largest[j] and step > rate * (time[k] - time[before]):
+                    return True
+            elif step >= largest[j]:
+                return True
+            before = k
+    return False
 
 
 def _spikes(values: FloatArray, known: ChannelRange, far: float) -> BoolArray:

@@ -9,11 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
+from cdtool import plausible
 from cdtool.ingest.reading import read_as_logged
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import read_machine_file
-from cdtool.plausible import PlausibleRanges
+from cdtool.plausible import ChannelRange, PlausibleRanges
 from cdtool.recording import MEASURED, Series
 from cdtool.signature_store import read_signature
 from cdtool.workflows.information import info
@@ -316,3 +319,31 @@ def test_an_empty_range_is_refused(gate, keys, told):
     )
     done = cdtool("info", gate / "free" / "03.csv", "-m", machine)
     assert done.status == 2 and told in done.err
+
+
+PLACES = (0.0, -0.0, 1.0, 2.0, 10.0, 10.1, 20.0, 20.1, 1e3, 1.1e3, 32767.0, 65535.0, -327.68, np.nan, np.inf, -np.inf)
+FACTORS = ((), (1.0, 0.01), (-1.0, 0.0), (1e4, 1e-3), (1e-9, 1e-9))
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(PLACES), st.sampled_from(PLACES)), max_size=8),
+    st.sampled_from([0.5, 1.0, 1e4]),
+    st.sampled_from([0.0, 1.0, 10.0]),
+    st.sampled_from([0.0, 200.0]),
+    st.sampled_from(FACTORS),
+)
+@example([(0.0, 0.0), (np.nan, 0.0), (10.0, 0.0)], 0.5, 1.0, 0.0, ())
+@example([(32767.0, 0.0)], 1e4, 0.0, 0.0, (1.0, 0.01))
+def test_no_implausible_value_and_no_leap_is_overlooked_by_the_first_look(rows, reach, rate, extreme, factors):
+    series = Series(np.arange(len(rows)) * 0.5, np.array(rows, dtype=np.float64).reshape(-1, 2), "m")
+    known = ChannelRange("m", (0.0, 1.0), reach, rate, extreme)
+    wrong = plausible._implausible(series, known, 10.0, factors)
+    values = np.where(wrong, np.nan, series.values)
+    masked_later = [
+        plausible._leapt(series.time, values[:, j], known, known.centre[j], factors[j] if factors else 0.0)[0].any()
+        for j in range(2)
+    ]
+    suspects = plausible._has_suspects(series, known, 10.0, factors)
+    assert suspects or not (wrong.any() or any(masked_later))
+    if len(set(rows)) <= 1:  # without steps there is no leap: a second look only at a value that is not plausible
+        assert suspects == wrong.any()
