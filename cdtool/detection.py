@@ -116,9 +116,10 @@ class Signal:
 
     def shares(self, start: float = -np.inf, end: float = np.inf) -> dict[str, float]:
         """Return the share of samples not assessable for each reason, over all joints, from `start` to `end` [s]."""
-        status = self.status[(self.time >= start) & (self.time <= end)]
-        counts = {text: int(np.count_nonzero(status == code)) for code, text in REASONS.items()}
-        return {text: count / status.size for text, count in counts.items() if count}
+        is_whole = start == -np.inf and end == np.inf
+        status = self.status if is_whole else self.status[(self.time >= start) & (self.time <= end)]
+        counts = np.bincount(status.ravel(), minlength=len(Status)).tolist()
+        return {text: counts[code] / status.size for code, text in REASONS.items() if counts[code]}
 
     def why_not(self, start: float = -np.inf, end: float = np.inf) -> str:
         """Return these reasons in words, the most frequent first, with their shares, from `start` to `end` [s]."""

@@ -206,9 +206,19 @@ def _signal_of_log(operation: Operation, machine: Machine, detector: Detector, w
     own = recording.own_clock(signal.time)
     if len(signal.time) > 1 and own is not None:
         signal.know_period(next(series.period for series in recording.channels.values() if series.time is own))
-    if lost is not signal.lost or not signal.joints:
-        signal = signal.changed(joints=signal.joints or recording.joints, lost=lost)
+    if lost is not signal.lost or not signal.joints or own is not None:
+        # Equal clocks are one object, which is quickly recognised.
+        time = signal.time if own is None else own
+        signal = signal.changed(time=time, joints=signal.joints or recording.joints, lost=lost)
     return signal.watching(watched)
+
+
+def _part(signal: Signal, rows: slice, recording: Recording) -> Signal:
+    """Return these rows of a signal; their period is computed once for all signals on this clock of the recording."""
+    part, own = signal.part(rows), recording.own_clock(signal.time)
+    if part is not signal and own is not None:
+        part.know_period(recording.derived(("period", rows.start, rows.stop), lambda: part.period, own))
+    return part
 
 
 def _rows(signal: Signal, operation: Operation) -> slice:
@@ -236,7 +246,7 @@ def _judge_log(
     found = []
     for item in operations:
         rows = _rows(signal, item)
-        part = statistic.part(rows)
+        part = _part(statistic, rows, judgement.recording)
         own = [tuple(alarm for alarm in of_log if _within(alarm, part)) for of_log in (alarms, crossings)]
         verdict = _verdict(part, own[0], own[1], tuple(rearmed[alarm] for alarm in own[0]))
         detection = Detection(
