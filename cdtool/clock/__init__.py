@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from cdtool.clock.held_samples import HOLD_PERIODS, previous_value
-from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start, gap_findings
+from cdtool.clock.stamps import EPOCH, GAP_PERIODS, CleanTime, clean_time, epoch_start
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray, Series
 
@@ -24,7 +24,6 @@ __all__ = [
     "clean_time",
     "differentiate",
     "epoch_start",
-    "gap_findings",
     "integrate",
     "previous_value",
 ]

@@ -31,7 +31,7 @@ from cdtool.findings.clocks import (
     StuckStamps,
     UnknownStamps,
 )
-from cdtool.recording import BoolArray, FloatArray, Series
+from cdtool.recording import BoolArray, FloatArray
 
 # A step longer than this many periods is a gap.
 GAP_PERIODS = 2.5
@@ -200,13 +200,6 @@ def epoch_start(stamps: FloatArray, factor: float) -> float:
     finite = stamps[np.isfinite(stamps)]
     first = finite[count_leading_strays(finite, EPOCH / factor) :][:1]
     return float(first[0]) if len(first) and first[0] * factor > EPOCH else 0.0
-
-
-def gap_findings(series: Series, channel: str, masked: int = 0) -> list[Finding]:
-    """Return the findings on gaps, jitter and missing values of a channel; `masked` values are reported elsewhere."""
-    absent = int(np.count_nonzero(~np.isfinite(series.values)))
-    gaps = gaps_in([series.time], series.period, channel)
-    return gaps + missing_findings(absent, series.values.size, channel, masked)
 
 
 def missing_findings(absent: int, values: int, channel: str, masked: int = 0) -> list[Finding]:

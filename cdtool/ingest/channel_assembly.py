@@ -10,14 +10,14 @@ import hashlib
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
-from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, gap_findings, previous_value
+from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, previous_value
 from cdtool.clock.stamps import gaps_in, missing_findings
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
@@ -88,6 +88,16 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+@dataclass(frozen=True)
+class _TopicClock:
+    """The clock that the channels of a topic share: its `stamps`, cleaned times, and findings on gaps between these."""
+
+    stamps: FloatArray
+    clean: CleanTime
+    times: Series
+    gaps: tuple[Finding, ...]
+
+
 class _Assembly:
     """Assembles the series of one file, and collects the findings."""
 
@@ -99,6 +109,7 @@ class _Assembly:
         self.findings: list[Finding] = []
         self.table: CleanTime | None = None
         self.clock: Series | None = None  # the table's times, which its channels share
+        self._topic_clocks: dict[tuple[int, bool], _TopicClock] = {}  # by the identity of the stamps
         if not channels.topics:
             self.table = self._table_clock()
             self.findings += unit_findings(source, channels)
@@ -109,32 +120,49 @@ class _Assembly:
         for key in item.keys:
             if key not in needed:
                 self.columns.pop(key, None)
+        present = {id(column.time) for column in self.columns.values()}
+        self._topic_clocks = {key: clock for key, clock in self._topic_clocks.items() if key[0] in present}
 
     def series(self, item: ChannelSource) -> Series:
         """Return one channel: its values in SI at its own times."""
         if self.table is None:
             column = self.columns[item.keys[0]]
             stamps = column.time if column.time is not None else np.empty(0)
-            clock = self._clean(stamps, f"{item.channel} time", sampled=item.channel != "event")
-            values = column.values
+            topic = self._topic_clock(stamps, item)
+            clean, clock, gaps, values = topic.clean, topic.times, topic.gaps, column.values
         else:
-            clock = self.table
+            assert self.clock is not None
+            clean, clock, gaps = self.table, self.clock, ()  # the gaps of its times are reported once
             parts = [self.columns[key].values for key in item.keys]
             values = parts[0] if len(parts) == 1 else np.column_stack(parts)
-        if not len(clock.time):
+            self._require_samples(clean, item)
+        scaled, masked = convert_to_si(item, self._select(item, values, clean.keep))
+        self.findings += masked_findings(masked, item, self.channels.joints)
+        self.findings += [replace(finding, channel=item.channel) for finding in gaps]
+        series = clock.with_values(scaled, item.unit)
+        absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
+        self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
+        return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
+
+    def _topic_clock(self, stamps: FloatArray, item: ChannelSource) -> _TopicClock:
+        """Return a channel's clock, cleaned once for all channels of its topic, and add the findings on its stamps."""
+        name, sampled = f"{item.channel} time", item.channel != "event"
+        known = self._topic_clocks.get((id(stamps), sampled))
+        if known is not None:
+            self._add_clock_findings(known.clean, name)
+            return known
+        clean = self._clean(stamps, name, sampled=sampled)
+        self._require_samples(clean, item)
+        times = Series(clean.time, np.zeros(len(clean.time)), "s")
+        known = _TopicClock(stamps, clean, times, tuple(gaps_in([times.time], times.period, "time")))
+        self._topic_clocks[id(stamps), sampled] = known
+        return known
+
+    def _require_samples(self, clean: CleanTime, item: ChannelSource) -> None:
+        if not len(clean.time):
             raise RecordingError(
                 f"{self.source.path}: channel '{item.channel}' has no sample with a time", channel=item.channel
             )
-        scaled, masked = convert_to_si(item, self._select(item, values, clock.keep))
-        self.findings += masked_findings(masked, item, self.channels.joints)
-        if self.clock is None:
-            series = Series(clock.time, scaled, item.unit)
-            self.findings += gap_findings(series, item.channel, int(masked.sum()))
-        else:  # the gaps of its times are reported once
-            series = self.clock.with_values(scaled, item.unit)
-            absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
-            self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
-        return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
     def _table_clock(self) -> CleanTime:
         time = self.channels.time
@@ -168,8 +196,11 @@ class _Assembly:
             clean = clean_time(stamps, first, row_name, counted=counted, sampled=sampled)
         except RecordingError as fault:
             raise RecordingError(f"{self.source.path}: {clock}: {fault.message}", fault.hint) from fault
-        self.findings += [replace(finding, channel=clock) for finding in clean.findings]
+        self._add_clock_findings(clean, clock)
         return clean
+
+    def _add_clock_findings(self, clean: CleanTime, clock: str) -> None:
+        self.findings += [replace(finding, channel=clock) for finding in clean.findings]
 
     def _select(self, item: ChannelSource, values: FloatArray, keep: BoolArray) -> FloatArray:
         """Return the kept rows (n, J) of a channel's values; raises RecordingError if their shape does not fit."""

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.clock import clean_time, differentiate, epoch_start, gap_findings, integrate, previous_value
+from cdtool.clock import clean_time, differentiate, epoch_start, integrate, previous_value
+from cdtool.clock.stamps import gaps_in, missing_findings
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.channels import MissingValues
@@ -163,9 +164,9 @@ def test_the_integral_of_a_constant_speed_is_the_distance():
 
 def test_gaps_and_missing_values_are_reported():
     time = np.concatenate((np.arange(100) * 1e-3, 0.2 + np.arange(100) * 1e-3))
-    values = np.zeros(200)
-    values[5] = np.nan
-    gap, missing = gap_findings(series(time, values), "speed")
+    (gap,) = gaps_in([time], 1e-3, "speed")
+    (missing,) = missing_findings(1, 200, "speed", masked=0)
+    assert not missing_findings(1, 200, "speed", masked=1)
     assert gap.fact == SampleGaps(1, (Gap(pytest.approx(0.099), pytest.approx(0.101)),))
     assert missing == Finding(MissingValues(1, 200), "speed")
 

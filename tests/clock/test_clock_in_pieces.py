@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.clock import clean_time, gap_findings
+from cdtool.clock import clean_time
 from cdtool.clock.stamps import ClockCleaner, gaps_in
 from cdtool.findings import Finding
 from cdtool.recording import Series
@@ -46,4 +46,4 @@ def test_a_clock_in_pieces_is_cleaned_as_a_whole_clock(stamps, parts, first_row)
     assert np.array_equal(np.concatenate(times), whole.time)
     assert as_shown(cleaner.findings(first_row)) == as_shown(whole.findings)
     series = Series(whole.time, np.zeros(len(whole.time)), "s")
-    assert as_shown(gaps_in(times, series.period, "time")) == as_shown(gap_findings(series, "time"))
+    assert as_shown(gaps_in(times, series.period, "time")) == as_shown(gaps_in([whole.time], series.period, "time"))

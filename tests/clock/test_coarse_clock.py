@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.clock import clean_time, gap_findings
+from cdtool.clock import clean_time
+from cdtool.clock.stamps import gaps_in
 from cdtool.findings.clocks import CoarseClock, DroppedStamps, Gap, SampleGaps, StuckStamps
 from cdtool.recording import Series
 
@@ -17,7 +18,8 @@ def floor_to_step(true, step):
 
 
 def gap_facts(clean):
-    return [item.fact for item in gap_findings(Series(clean.time, np.zeros(len(clean.time)), "s"), "time")]
+    period = Series(clean.time, np.zeros(len(clean.time)), "s").period
+    return [item.fact for item in gaps_in([clean.time], period, "time")]
 
 
 def loss_facts(clean):
