@@ -37,12 +37,14 @@ def test_every_command_that_writes_is_tried(monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills and failing calls need fork")
-def test_fifty_kills_and_fifty_failing_calls_leave_old_or_new_files_and_nothing_else():
-    arguments = [sys.executable, str(BENCHMARKS / "kills_and_faults.py"), "--kills", "50", "--faults", "50"]
+@pytest.mark.parametrize("share", ["1/2", "2/2"])
+def test_fifty_kills_and_fifty_failing_calls_leave_old_or_new_files_and_nothing_else(share):
+    tries = ["--kills", "25", "--faults", "25", "--share", share]
+    arguments = [sys.executable, str(BENCHMARKS / "kills_and_faults.py"), *tries]
     package = {"PYTHONPATH": str(BENCHMARKS.parent)}
     done = subprocess.run(arguments, env=os.environ | package, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     if "skipped: " in done.stdout:
         pytest.skip(next(line for line in done.stdout.splitlines() if line.startswith("skipped: ")))
     rows = [line.split()[:7] for line in done.stdout.splitlines() if line.startswith(("kills ", "faults "))]
-    assert rows == [["kills", "50", "50", *"0000"], ["faults", "50", "50", *"0000"]]
+    assert rows == [["kills", "25", "25", *"0000"], ["faults", "25", "25", *"0000"]]
