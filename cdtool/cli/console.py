@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from textwrap import fill
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -37,6 +38,8 @@ _PIPE = 160
 _GAP = 2
 # Sentences wrap at words, but not to a narrower column than this [characters].
 _LEAST_SENTENCE = 30
+# Time between two drawings of a progress bar [s].
+_REDRAWN = 0.1
 
 
 def print_error(fault: CdtoolError) -> None:
@@ -196,8 +199,12 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Progress | None]:
-    """Show a progress bar on stderr; yield None and draw nothing if stderr is not a terminal."""
+def progress(what: str, *, pulses: bool = False) -> Iterator[Progress | None]:
+    """Show a progress bar on stderr; yield None and draw nothing if stderr is not a terminal.
+
+    `pulses`: it moves while the total is unknown, drawn by a thread. Otherwise it is drawn only as the work advances:
+    with another thread in this process, the processes of --jobs could not be forked (workflows/workers.py).
+    """
     if not sys.stderr.isatty():
         yield None
         return
@@ -206,9 +213,19 @@ def progress(what: str) -> Iterator[Progress | None]:
     from rich.progress import Progress as Bar
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Bar(*columns, console=Console(stderr=True), transient=True, auto_refresh=pulses) as bar:
         task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        drawn = -math.inf
+
+        def advance(done: int, total: int) -> None:
+            nonlocal drawn
+            now = perf_counter()
+            is_due = not pulses and (now - drawn > _REDRAWN or done == total)
+            drawn = now if is_due else drawn
+            bar.update(task, completed=done, total=total, refresh=is_due)
+
+        bar.refresh()
+        yield advance
 
 
 def _bare(item: Skipped | RecordingFinding) -> str:

@@ -32,7 +32,7 @@ def late_progress(what: str, after: float = _AFTER) -> Iterator[Progress | None]
 
         def draw() -> None:
             with lock:
-                bar = None if ended else drawn.enter_context(progress(what))
+                bar = None if ended else drawn.enter_context(progress(what, pulses=True))
                 if bar is not None:
                     bars.append(bar)
 
