@@ -62,7 +62,7 @@ def environment() -> str:
     if hasattr(os, "getloadavg"):
         machine.append(f"load {os.getloadavg()[0]:.1f}")
     software = [f"Python {platform.python_version()}"]
-    for name in ("numpy", "numba", "scipy", "filterpy", "typer"):
+    for name in ("numpy", "numba", "scipy", "pandas", "filterpy", "typer"):
         try:
             software.append(f"{name} {version(name)}")
         except PackageNotFoundError:

@@ -1,8 +1,8 @@
 """What one more recording costs `cdtool benchmark`: five detectors on 7 s of a gate at 1 kHz, read from CSV.
 
 CPU time from the first scored log to the last, per log: start-up, learning, final statistics and reports are not in it.
-The peer is `bare_script.py`. 200 and 2,000 recordings, with one job and with two, at least five rounds; every run is a
-new process.
+The peer is `bare_script.py`; the limit of 12 ms is for a machine on which it takes 3.3 ms, so the two are compared. 200
+and 2,000 recordings, with one job and with two, at least five rounds; every run is a new process.
 
 python benchmarks/whole_benchmark.py            # some minutes; 1 GB in the temporary folder
 python benchmarks/whole_benchmark.py --guard    # 50 recordings in one process, half a minute
@@ -20,7 +20,6 @@ import tempfile
 from pathlib import Path
 from time import perf_counter, process_time
 
-import bare_script
 from timing import Spread, main, ratio, table, verdict
 
 from cdtool.simulation.gate_recordings import write_gate_recordings
@@ -30,10 +29,11 @@ COUNTS = {"free": 14, "holdout": 66, "stiff": 67, "soft": 67}
 COPIES = 10
 SEED = 1
 ROUNDS = 5
-AT_MOST_MS = 12.0
+# 12 ms where the bare script takes 3.3 ms.
+AT_MOST_OF_BARE = 3.6
 AT_LEAST_FASTER = 1.8
-AT_MOST_MORE_MIB = 250.0
-# The guard: 12 ms against the bare script's 3.3 ms are 3.6 times its cost; it fails at twice that.
+AT_MOST_MIB, AT_MOST_MORE_MIB = 285.0, 250.0
+# The guard fails at twice the limit.
 GUARD_COUNTS = {"free": 11, "holdout": 17, "stiff": 17, "soft": 16}
 GUARD_ROUNDS = 3
 GUARD_AT_MOST = 7.3
@@ -68,6 +68,8 @@ def run(folder: str, jobs: int) -> dict[str, float]:
 
 def bare(folder: str) -> float:
     """Return the CPU time of the bare script per scored log [s]."""
+    import bare_script  # loads pandas, which cdtool does not: it would count as memory of the benchmark
+
     return bare_script.cost(*_logs(Path(folder)))
 
 
@@ -99,19 +101,30 @@ def measure() -> bool:
 
 
 def _judged(found: dict[str, list[dict[str, float]]], peers: list[float]) -> bool:
-    alone, together = found["2000, 1 job"], found["2000, 2 jobs"]
+    few, alone, together = found["200, 1 job"], found["2000, 1 job"], found["2000, 2 jobs"]
+    further = [
+        (more["cpu"] * more["logs"] - less["cpu"] * less["logs"]) / (more["logs"] - less["logs"])
+        for less, more in zip(few, alone, strict=True)
+    ]
     held = [
-        verdict(f"CPU time per recording, {key}, ms", _spread(found[key], "cpu", 1e3), AT_MOST_MS, at_most=True)
-        for key in ("200, 1 job", "2000, 1 job")
+        verdict(f"CPU time per recording / bare script, {key}", ratio(cost, peers), AT_MOST_OF_BARE, at_most=True)
+        for key, cost in (
+            ("200", [item["cpu"] for item in few]),
+            ("2000", [item["cpu"] for item in alone]),
+            ("from 200 to 2000", further),
+        )
     ]
     faster = ratio([item["clock"] for item in alone], [item["clock"] for item in together])
     held.append(verdict("1 job / 2 jobs, time on the clock", faster, AT_LEAST_FASTER))
-    more = Spread.of([item["worker"] for item in together])
+    for key, each in (("200", few), ("2000", alone)):
+        held.append(verdict(f"memory, {key}, MiB", _spread(each, "peak"), AT_MOST_MIB, at_most=True))
+    more = _spread(together, "worker")
     held.append(verdict("memory of a worker, MiB", more, AT_MOST_MORE_MIB, at_most=True))
     rows = [
         (key, _spread(each, "cpu", 1e3), _spread(each, "clock", 1e3), _spread(each, "peak"))
         for key, each in found.items()
     ]
+    rows.append(("each from 200 to 2000, 1 job", Spread.of([1e3 * item for item in further]), "", ""))
     rows.append(("bare script", Spread.of([1e3 * item for item in peers]), "", ""))
     print()
     table(("recordings", "CPU ms (low-high)", "clock ms (low-high)", "peak MiB (low-high)"), rows)
