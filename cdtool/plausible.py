@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -201,19 +202,36 @@ def _implausible(series: Series, known: ChannelRange, far: float, factors: Seque
     return wrong
 
 
+class _FirstLook(NamedTuple):
+    """What `has_implausible` and `has_leap` compare a channel with."""
+
+    centre: FloatArray
+    beyond: float
+    ends: FloatArray
+    far: float
+    largest_step: FloatArray
+    rate: float
+
+
+@lru_cache(maxsize=256)
+def _first_look(known: ChannelRange, far: float, factors: tuple[float, ...]) -> _FirstLook:
+    scales = np.array(factors or [0.0] * len(known.centre), dtype=np.float64)
+    near = 0.5 * _WRAP * np.abs(scales)
+    if known.rate > 0.0:
+        largest_step, rate = np.full(len(scales), known.reach), _FASTER * known.rate
+    else:
+        largest_step, rate = np.where(near > _FAR_ENDS * known.reach, 2.0 * near, np.inf), 0.0
+    ends = np.multiply.outer(scales[: len(factors)], _ENDS)
+    beyond = max(far * known.reach, _BEYOND_EXTREME * known.extreme)
+    return _FirstLook(np.array(known.centre), beyond, ends, _FAR_ENDS * known.reach, largest_step, rate)
+
+
 def _has_suspects(series: Series, known: ChannelRange, far: float, factors: Sequence[float]) -> bool:
     """Return whether a value of a channel is implausible, or a step of it a leap; most channels have neither."""
-    joints = series.joint_count
-    ends = np.multiply.outer(np.array(factors, dtype=np.float64), _ENDS)
-    near = 0.5 * _WRAP * np.abs(np.array(factors or [0.0] * joints, dtype=np.float64))
-    if known.rate > 0.0:
-        step, rate = np.full(joints, known.reach), _FASTER * known.rate
-    else:
-        step, rate = np.where(near > _FAR_ENDS * known.reach, 2.0 * near, np.inf), 0.0
-    beyond = max(far * known.reach, _BEYOND_EXTREME * known.extreme)
-    centre = np.array(known.centre)
-    return has_implausible(series.values, centre, beyond, ends, _FAR_ENDS * known.reach) or has_leap(
-        series.time, series.values, step, rate
+    look = _first_look(known, far, tuple(factors))
+    return bool(
+        has_implausible(series.values, look.centre, look.beyond, look.ends, look.far)
+        or has_leap(series.time, series.values, look.largest_step, look.rate)
     )
 
 
