@@ -45,20 +45,20 @@ def differentiate(series: Series, low_pass_hz: float, unit: str) -> Series:
 
 def integrate(series: Series, unit: str) -> Series:
     """Return the causal integral of a speed from 0 (trapezoidal rule); a missing sample repeats the last speed."""
-    filled = series.values
-    known = np.isfinite(filled)
-    if not known.all():
-        filled = _hold_last(np.where(known, filled, np.nan))
-    steps = np.diff(series.time)[:, np.newaxis] * 0.5 * (filled[1:] + filled[:-1])
-    travel = np.vstack((np.zeros((1, series.joint_count)), np.cumsum(steps, axis=0)))
+    travel = np.empty(series.values.shape)
+    _integrate(series.time, series.values, travel)
     return series.with_values(travel, unit)
 
 
-def _hold_last(values: FloatArray) -> FloatArray:
-    rows = np.where(np.isfinite(values), np.arange(len(values))[:, np.newaxis], 0)
-    last = np.maximum.accumulate(rows, axis=0)
-    held: FloatArray = np.take_along_axis(values, last, axis=0)
-    return np.nan_to_num(held, nan=0.0)
+@kernel(f"void({READ_ONLY}, Array(float64, 2, 'C', readonly=True), float64[:,::1])", exact=True)
+def _integrate(time: FloatArray, speed: FloatArray, travel: FloatArray) -> None:
+    for j in range(speed.shape[1]):
+        before = 0.0  # the speed before the first known one
+        for k in range(speed.shape[0]):
+            now = speed[k, j] if math.isfinite(speed[k, j]) else before
+            step = (time[k] - time[k - 1]) * 0.5 * (now + before) if k > 0 else 0.0
+            travel[k, j] = travel[k - 1, j] + step if k > 1 else step
+            before = now
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[:])")

@@ -56,16 +56,21 @@ def both_readings(stamp: float, factor: float, stated: str, meant: str) -> TwoRe
 def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float]:
     """Return the likely unit of time stamps (n,) if their median step is implausible in the stated one, and that step.
 
-    `factor` converts the stated unit to seconds; the step is in s. The likely unit is the one that yields a plausible
-    sample rate nearest to 1 kHz. It is empty if the stated unit may be right, or no unit yields a plausible rate.
+    `factor` converts the stated unit to seconds; the step is in s, 0 if it is plausible. The likely unit is the one
+    that yields a plausible sample rate nearest to 1 kHz. It is empty if the stated unit may be right, or no unit yields
+    a plausible rate.
     """
     some = stamps[:_ENOUGH]
+    steps = np.diff(some)
+    # With all steps plausible, so is their median. A step that is NaN is not plausible.
+    if len(steps) and steps.min() * factor >= _SHORTEST_STEP and steps.max() * factor <= _LONGEST_STEP:
+        return "", 0.0
     steps = np.diff(some[np.isfinite(some)])
     steps = steps[steps > 0.0]
     if len(steps) < 3:
         return "", 0.0
     step = float(np.median(steps))
     if _SHORTEST_STEP <= step * factor <= _LONGEST_STEP:
-        return "", step * factor
+        return "", 0.0
     fitting = [name for name, one in SECONDS.items() if _SLOWEST <= 1.0 / (step * one) <= _FASTEST]
     return min(fitting, key=lambda name: abs(np.log(step * SECONDS[name] / 1e-3)), default=""), step * factor

@@ -33,6 +33,8 @@ from cdtool.findings.clocks import (
 )
 from cdtool.recording import BoolArray, FloatArray
 
+# A standard deviation of the steps above this share of the period is jitter.
+_JITTER = 0.1
 # A step longer than this many periods is a gap.
 GAP_PERIODS = 2.5
 # Above this share of repeated time stamps, the clock is coarse and not faulty.
@@ -241,7 +243,7 @@ class GapStatistics:
         if self._count:
             findings.append(Finding(SampleGaps(self._count, tuple(self._first)), self._channel))
         jitter = float(np.sqrt(self._squares / self._regular)) / self._period if self._regular else 0.0
-        if jitter > 0.1:
+        if jitter > _JITTER:
             findings.append(Finding(Jitter(jitter, self._period), self._channel))
         return findings
 
@@ -252,6 +254,20 @@ def gaps_in(times: Iterable[FloatArray], period: float, channel: str) -> list[Fi
     for piece in times:
         gaps.add(piece)
     return gaps.findings()
+
+
+def gaps_of(time: FloatArray, period: float, channel: str) -> list[Finding]:
+    """Return `gaps_in` of a clock in memory, `time` (n,) [s]."""
+    return [] if _is_regular(time, period) else gaps_in([time], period, channel)
+
+
+def _is_regular(times: FloatArray, period: float) -> bool:
+    """Return whether no step can be a gap, and the steps are too similar for jitter: it is at most half their range."""
+    if len(times) < 2:
+        return False
+    steps = np.diff(times)
+    least, most = float(steps.min()), float(steps.max())
+    return most <= GAP_PERIODS * period and most - least <= _JITTER * period
 
 
 class _RowCount:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, previous_value
-from cdtool.clock.stamps import gaps_in, missing_findings
+from cdtool.clock.stamps import gaps_of, missing_findings
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings import Finding, Severity
@@ -154,7 +154,7 @@ class _Assembly:
         clean = self._clean(stamps, name, sampled=sampled)
         self._require_samples(clean, item)
         times = Series(clean.time, np.zeros(len(clean.time)), "s")
-        known = _TopicClock(stamps, clean, times, tuple(gaps_in([times.time], times.period, "time")))
+        known = _TopicClock(stamps, clean, times, tuple(gaps_of(times.time, times.period, "time")))
         self._topic_clocks[id(stamps), sampled] = known
         return known
 
@@ -183,7 +183,7 @@ class _Assembly:
                 f"{self.source.path}: column '{column.name}' contains no time stamp", "see [channels] time"
             )
         self.clock = Series(clock.time, np.zeros(len(clock.time)), "s")
-        self.findings += gaps_in([self.clock.time], self.clock.period, "time")
+        self.findings += gaps_of(self.clock.time, self.clock.period, "time")
         return clock
 
     def _clean(

@@ -98,8 +98,9 @@ def time_unit_findings(time: TimeSource, column: Column, origin: float = 0.0) ->
 
 def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:
     """Return the first time stamp as in the file, in the unit of the machine file; 0 if all are missing."""
-    known = np.flatnonzero(np.isfinite(column.values))
-    return float(column.values[known[0]]) + origin / time.factor if len(known) else 0.0
+    finite = np.isfinite(column.values)
+    first = int(np.argmax(finite)) if len(finite) else 0
+    return float(column.values[first]) + origin / time.factor if len(finite) and finite[first] else 0.0
 
 
 def _fits(header_unit: Unit, stated: Unit, channel_unit: str, factor: float) -> bool:
