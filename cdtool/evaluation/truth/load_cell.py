@@ -46,15 +46,17 @@ def reading_step(force: FloatArray) -> float:
     contacts, and of a short one they are as large as it: more than 20 N counts only where readings prove it, four or
     more of them, each on the grid of that step. `force` holds no missing samples.
     """
-    readings = np.unique(force)
-    distances = np.diff(readings)
-    distances = distances[distances > _SAME * float(np.max(np.abs(force), initial=0.0))]
-    if not len(distances):
+    ordered = np.sort(force)
+    distances = np.diff(ordered)
+    is_step = distances > _SAME * float(np.max(np.abs(force), initial=0.0))
+    if not is_step.any():
         return 0.0
-    step = float(distances.min())
-    on_grid = (readings - readings[0]) / step
-    proved = len(distances) >= _GRID - 1 and bool(np.all(np.abs(on_grid - np.round(on_grid)) < _OFF_GRID))
-    return step if proved else min(step, _COARSEST)
+    step = float(distances[is_step].min())
+    if step <= _COARSEST:
+        return step
+    on_grid = (ordered - ordered[0]) / step
+    proved = np.count_nonzero(is_step) >= _GRID - 1 and bool(np.all(np.abs(on_grid - np.round(on_grid)) < _OFF_GRID))
+    return step if proved else _COARSEST
 
 
 def load_cell_contacts(series: Series, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
