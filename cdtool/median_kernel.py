@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from cdtool.kernels import kernel
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
 
 # Fewer values than this are sorted by insertion.
@@ -84,6 +84,17 @@ def median_of(values: FloatArray, count: int) -> float:
     if count % 2:
         return float(0.0 + upper)  # as in numpy, the median of negative zeros is 0
     return float((0.0 + largest_of(values, middle) + upper) / 2.0)
+
+
+@kernel(f"float64({READ_ONLY}, float64[::1], int64)", exact=True)
+def median_of_known(values: FloatArray, scratch: FloatArray, least: int) -> float:
+    """Return the median of the finite values, NaN with fewer than `least`; `scratch` (n,) is overwritten."""
+    count = 0
+    for value in values:
+        if math.isfinite(value):
+            scratch[count] = value
+            count += 1
+    return float(median_of(scratch, count)) if count >= least else math.nan
 
 
 @kernel("float64(float64[::1], int64, float64)", exact=True)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cdtool.median_kernel import median_of, quantile_of
+from cdtool.median_kernel import median_of, median_of_known, quantile_of
 from tests.bits import VALUES, assert_same_bits
 
 _FINITE = st.sampled_from([0.0, -0.0, 1.0, -1.0, 2.5, 1e300, -1e-300])
@@ -43,3 +43,14 @@ def test_no_order_of_the_values_is_slow_or_wrong(count, order):
     made = {"ascending": ascending, "descending": ascending[::-1], "equal": 0.0 * ascending, "organ pipe": pipe}
     values = np.array(made.get(order, random))
     assert median_of(values.copy(), count) == np.median(values)
+
+
+KNOWN_OR_NOT = st.sampled_from([0.0, 0.5, 1.0, 1.0 + 1e-15, 1.5, -1.0, -2.0, np.inf, -np.inf, np.nan])
+
+
+@given(st.lists(KNOWN_OR_NOT, max_size=40), st.integers(1, 12))
+def test_the_median_of_known_values_is_numpys(values, least):
+    samples = np.array(values, dtype=np.float64)
+    known = samples[np.isfinite(samples)]
+    expected = np.median(known) if len(known) >= least else np.nan
+    np.testing.assert_array_equal(median_of_known(samples, np.empty(len(samples)), least), expected)

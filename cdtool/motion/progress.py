@@ -31,6 +31,10 @@ class Progress:
     travel: FloatArray
     running: BoolArray
 
+    def part(self, rows: slice) -> Progress:
+        """Return the progress at some of the samples."""
+        return Progress(self.elapsed[rows], self.travel[rows], self.running[rows])
+
 
 def progress(
     recording: Recording,

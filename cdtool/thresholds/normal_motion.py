@@ -13,11 +13,13 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdtool.derived import SendsFields, StoresDerived
 from cdtool.detection import Signal, Status
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
-from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
+from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
+from cdtool.thresholds.curve_lookup import look_up
 from cdtool.thresholds.signature_curve import Curve, resample
 
 CHANNELS = (*MEASURED, *REFERENCES)
@@ -53,12 +55,12 @@ class NormalChannel:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(StoresDerived):
     """A run's channel and its normal curve, on the channel's clock `time` (n,) [s]; the others are (n, J).
 
     `value` and `level` are the run's own, `mean` and `spread` those of the impact-free runs at the same location; NaN
-    before the motion starts and where there are too few runs. `reach` and `level_reach`: the distance of the
-    impact-free runs themselves from the mean, in spreads.
+    before the motion starts and where there are too few runs. `reach` and `level_reach` (2, J): the distance of the
+    impact-free runs themselves from the mean, in spreads, while accelerating and while `running` (n,).
     """
 
     unit: str
@@ -69,6 +71,7 @@ class Comparison:
     level: FloatArray
     level_mean: FloatArray
     level_spread: FloatArray
+    running: BoolArray
     reach: FloatArray
     level_reach: FloatArray
 
@@ -78,14 +81,9 @@ class Comparison:
         return _in_spreads(self.value - self.mean, self.spread)
 
     @cached_property
-    def level_off(self) -> FloatArray:
-        """Return the distance of the level from its mean (n, J), in `unit`."""
-        return self.level - self.level_mean
-
-    @cached_property
     def level_distance(self) -> FloatArray:
-        """Return the same [spreads]; NaN if unknown."""
-        return _in_spreads(self.level_off, self.level_spread)
+        """Return the distance of the level from its mean (n, J) [spreads]; NaN if unknown."""
+        return _in_spreads(self.level - self.level_mean, self.level_spread)
 
 
 @dataclass(frozen=True)
@@ -97,16 +95,25 @@ class NormalMotion:
     runs: int
     channels: Mapping[str, NormalChannel]
 
-    def compare(self, recording: Recording, channel: str) -> Comparison:
-        """Compare a recording's channel with its normal curve; raises RecordingError without speed and position."""
+    def compare(
+        self, recording: Recording, channel: str, start: float = -math.inf, end: float = math.inf
+    ) -> Comparison:
+        """Compare a recording's channel from `start` to `end` [s] with its normal curve.
+
+        Raises RecordingError without speed and position.
+        """
         series, normal = recording[channel], self.channels[channel]
         where = self.progress(recording, series.time)
         value = _from_start(channel, series.values, where)
-        level = levels(series.time, value)
+        level = levels_of(series) if value is series.values else levels(series.time, value)
         least = _SMALLEST_OF_COMMAND if channel in REFERENCES else _SMALLEST_SPREAD
+        rows = slice(int(series.time.searchsorted(start)), int(series.time.searchsorted(end, side="right")))
+        where = where.part(rows)
         samples, means = normal.samples.at(where, least), normal.level.at(where, least)
-        reaches = normal.samples.reach(where), normal.level.reach(where)
-        return Comparison(normal.unit, series.time, value, *samples, level, *means, *reaches)
+        reaches = normal.samples.reach, normal.level.reach
+        return Comparison(
+            normal.unit, series.time[rows], value[rows], *samples, level[rows], *means, where.running, *reaches
+        )
 
     def serves(self, recording: Recording) -> bool:
         """Whether a recording has these joints, and the channels that locate it in its stroke."""
@@ -228,17 +235,45 @@ def levels(time: FloatArray, values: FloatArray) -> FloatArray:
     >>> levels(time, step)[[49, 99], 0].round(6).tolist()
     [0.0, 10.0]
     """
+    period = float(np.median(np.diff(time))) if len(time) > 1 else math.nan
+    return _levels(time, values, period)
+
+
+def levels_of(series: Series) -> FloatArray:
+    """Return the levels of a channel (n, J), see `levels`; computed once and stored with it, read-only."""
+    return series.derived("levels", lambda: _frozen(_levels(series.time, series.values, series.period)))
+
+
+def _frozen(values: FloatArray) -> FloatArray:
+    values.flags.writeable = False
+    return values
+
+
+def _levels(time: FloatArray, values: FloatArray, period: float) -> FloatArray:
     if len(time) < 2:
         return values.copy()
-    usual = min(LEVEL_SECONDS / float(np.median(np.diff(time))), float(len(time)))
-    present = np.isfinite(values)
-    median = np.median if present.all() else np.nanmedian  # the faster one where nothing is missing
-    about = median(values, axis=0) if present.any(axis=0).all() else np.zeros(values.shape[1])
+    usual = min(LEVEL_SECONDS / period, float(len(time)))
+    about = _middles(values)
     mean = np.empty(values.shape)
     enough, sums = max(_FILLED * usual, 1.0), (np.empty(len(time) + 1), np.empty(len(time) + 1))
     for j in range(values.shape[1]):
         _fill_levels(time, np.ascontiguousarray(values[:, j]), about[j], enough, *sums, mean[:, j])
     return mean
+
+
+def _middles(values: FloatArray) -> FloatArray:
+    """Return the median of each joint's values that are not NaN (J,); 0 if one joint has no finite value."""
+    present = np.isfinite(values)
+    if not present.any(axis=0).all():
+        return np.zeros(values.shape[1])
+    if not present.all():
+        known: FloatArray = np.nanmedian(values, axis=0)
+        return known
+    # As numpy's median, without the time of its checks.
+    middle, odd = divmod(len(values), 2)
+    parts: FloatArray = np.partition(values, (max(middle - 1, 0), middle), axis=0)
+    found: FloatArray = parts[middle] if odd else (parts[middle - 1] + parts[middle]) / 2.0
+    return found
 
 
 @kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64, float64[::1], float64[::1], float64[:])", exact=True)
@@ -339,7 +374,7 @@ def _progress(recording: Recording, clock: FloatArray, motion: MotionClass) -> P
 
 
 @dataclass(frozen=True)
-class NormalCurves:
+class NormalCurves(SendsFields):
     """Statistics of one quantity (g, J): over time since motion start, and along the travel (None: over time alone).
 
     `farthest_by_time` and `farthest_by_travel` (J,): the largest distance from the mean that a run has for 3
@@ -356,20 +391,26 @@ class NormalCurves:
 
         No spread is below the share `least` of the joint's largest mean.
         """
-        mean, spread = self._looked_up(where)
-        largest = np.abs(self.by_time.mean).max(axis=0)
+        return self._looked_up(where, least * self._largest)
+
+    @cached_property
+    def _largest(self) -> FloatArray:
+        largest: FloatArray = np.abs(self.by_time.mean).max(axis=0)
         if self.by_travel is not None:
             largest = np.maximum(largest, np.abs(self.by_travel.mean).max(axis=0))
-        return mean, np.maximum(spread, least * largest)
+        return largest
 
-    def _looked_up(self, where: Progress) -> tuple[FloatArray, FloatArray]:
-        mean, spread = _looked_up(self.by_time, np.minimum(where.elapsed, self.by_time.end))
-        if self.by_travel is None:
-            beyond = (where.elapsed > self.by_time.end)[:, np.newaxis]
-            return np.where(beyond, np.nan, mean), np.where(beyond, np.nan, spread)
-        along = _looked_up(self.by_travel, where.travel)
-        running = where.running[:, np.newaxis]
-        return np.where(running, along[0], mean), np.where(running, along[1], spread)
+    def _looked_up(self, where: Progress, least: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return mean and spread (n, J); no spread is below the joint's entry of `least` (J,)."""
+        by_time, by_travel = self.by_time, self.by_travel
+        # Without a curve by travel, nothing is known after the end of that by time.
+        beyond = where.running if by_travel is not None else where.elapsed > by_time.end
+        mean, spread = np.full((2, by_time.mean.shape[1], len(where.elapsed)), np.nan)
+        for j, found in enumerate(zip(mean, spread, strict=True)):
+            look_up(where.elapsed, beyond, False, by_time.columns[j], by_time.end, least[j], *found)
+            if by_travel is not None:
+                look_up(where.travel, beyond, True, by_travel.columns[j], np.inf, least[j], *found)
+        return mean.T, spread.T
 
     def updated(self, values: FloatArray, clock: FloatArray, where: Progress, cap: float, forget: float | None) -> Self:
         """Return the curves with one more run (n, J), clipped to `cap` spreads from the mean; see `Curve.updated`.
@@ -386,7 +427,7 @@ class NormalCurves:
 
     def distances(self, values: FloatArray, where: Progress) -> tuple[FloatArray, FloatArray]:
         """Return how far a run is from the mean for 3 samples (J,) [spreads]: while accelerating, and after it."""
-        mean, spread = self._looked_up(where)
+        mean, spread = self._looked_up(where, np.full(values.shape[1], -np.inf))
         with np.errstate(invalid="ignore", divide="ignore"):
             off = np.abs(values - mean) / spread
         off = np.where(np.isfinite(off), off, 0.0)
@@ -398,11 +439,11 @@ class NormalCurves:
         by_time, along = (part.max(axis=0, initial=0.0) for part in parts)
         return by_time, along
 
-    def reach(self, where: Progress) -> FloatArray:
-        """Return the largest distance of impact-free runs from the mean (n, J) [spreads], at each location of a run."""
-        running = where.running if self.by_travel is not None else np.zeros(len(where.running), dtype=bool)
-        reach: FloatArray = np.where(running[:, np.newaxis], self.farthest_by_travel, self.farthest_by_time)
-        return reach
+    @cached_property
+    def reach(self) -> FloatArray:
+        """The largest distance of impact-free runs from the mean (2, J) [spreads]: while accelerating, and after it."""
+        after = self.farthest_by_time if self.by_travel is None else self.farthest_by_travel
+        return np.array((self.farthest_by_time, after))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the curves as JSON values."""
@@ -429,13 +470,6 @@ def _in_spreads(off: FloatArray, spread: FloatArray) -> FloatArray:
     with np.errstate(invalid="ignore", divide="ignore"):
         shares = off / spread
     return np.where(np.isfinite(shares), shares, np.nan)
-
-
-def _looked_up(curve: Curve, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    mean, spread = curve.band(pooled=True)
-    columns = range(mean.shape[1])
-    means, spreads = (np.column_stack([curve.at(part[:, j], axis) for j in columns]) for part in (mean, spread))
-    return means, spreads
 
 
 def _signal_of(clock: FloatArray, values: FloatArray) -> Signal:

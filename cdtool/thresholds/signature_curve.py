@@ -12,9 +12,11 @@ import numpy as np
 
 from cdtool.derived import SendsFields
 from cdtool.detection import Signal
+from cdtool.kernels import read_only
 from cdtool.motion.progress import Progress
 from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.thresholds.curve_lookup import LearnedColumn
 
 # A grid point has a limit once this share of the runs has been there.
 COVERAGE = 0.8
@@ -131,14 +133,25 @@ class Curve(SendsFields):
             part.flags.writeable = False
         return band
 
-    def at(self, values: FloatArray, axis: FloatArray) -> FloatArray:
-        """Return values given on the grid at any location, interpolated by straight lines; NaN outside the grid."""
-        result: FloatArray = np.interp(axis, self.grid, values, left=np.nan, right=np.nan)
-        if not np.isinf(values).any():
-            return result
-        # A limit of infinity is infinity between two grid points too, where interpolation would give NaN.
-        nearest = np.clip(np.rint(np.nan_to_num(axis) / self.step).astype(int), 0, len(values) - 1)
-        return np.where(np.isinf(values[nearest]), values[nearest], result)
+    @cached_property
+    def columns(self) -> tuple[LearnedColumn, ...]:
+        """The pooled band of each joint, to be looked up at any location."""
+        mean, spread = self.band(pooled=True)
+        return tuple(self._column(mean[:, j], spread[:, j]) for j in range(mean.shape[1]))
+
+    def _column(self, mean: FloatArray, spread: FloatArray) -> LearnedColumn:
+        widths = np.diff(self.grid)
+        with np.errstate(invalid="ignore", over="ignore"):
+            mean_slope, spread_slope = np.diff(mean) / widths, np.diff(spread) / widths
+        return LearnedColumn(
+            grid=self.grid,
+            mean=read_only(mean),
+            spread=read_only(spread),
+            mean_slope=read_only(mean_slope),
+            spread_slope=read_only(spread_slope),
+            step=self.step,
+            infinite=float(np.isinf(mean).any() or np.isinf(spread).any()),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the curve as JSON values."""

@@ -76,6 +76,14 @@ def test_positions_count_from_the_start_of_the_motion_whatever_the_encoder_says(
     assert one.mean == pytest.approx(other.mean, nan_ok=True)
 
 
+def test_a_section_is_compared_as_the_whole_channel_is(normal):
+    whole, part = normal.compare(run(99), "torque"), normal.compare(run(99), "torque", 1.5, 3.25)
+    rows = slice(1500, 3251)
+    for name in ("time", "value", "mean", "spread", "level", "level_mean", "level_spread", "running"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[rows])
+    np.testing.assert_array_equal(part.distance, whole.distance[rows])
+
+
 def test_it_survives_json(normal):
     text = json.dumps(normal.to_dict(), allow_nan=False)
     loaded = NormalMotion.from_dict(json.loads(text))

@@ -178,7 +178,7 @@ def _contact(
         torque, position = tracks.get(("torque", joint)), tracks.get(("position", joint))
         if joint == leading or torque is None or position is None:
             continue
-        pushed, displaced = torque.shift(*ended), position.shift(*ended)
+        pushed, displaced = torque.level_shift(*ended), position.level_shift(*ended)
         if abs(pushed) >= _HELD and abs(displaced) >= _HELD and pushed * displaced < 0.0:
             return _shift(torque, ended), _shift(position, ended)
     return ()
@@ -186,9 +186,9 @@ def _contact(
 
 def _commanded(tracks: dict[tuple[str, str], Track], leading: str, alarm: float) -> tuple[Shift, ...]:
     reference, speed = tracks.get(("reference_speed", leading)), tracks.get(("speed", leading))
-    if reference is None or speed is None or not len(reference.time):
+    if reference is None or speed is None or reference.first == reference.after:
         return ()
-    shortly, first = (alarm - _SHORTLY, alarm), float(reference.time[0])
+    shortly, first = (alarm - _SHORTLY, alarm), float(reference.compared.time[reference.first])
     least = _COMMANDED * abs(speed.normal(*shortly))
     # A reference that deviates throughout is another class of motion, not a change.
     if abs(reference.change(*shortly)) > least > abs(reference.change(first, first + _SHORTLY)):
@@ -202,7 +202,7 @@ def _friction(
     torque, speed = tracks.get(("torque", leading)), tracks.get(("speed", leading))
     if torque is None:
         return ()
-    at_end, at_alarm = torque.shift(*ended), torque.shift(alarm - 0.02, alarm + 0.1)
+    at_end, at_alarm = torque.level_shift(*ended), torque.level_shift(alarm - 0.02, alarm + 0.1)
     lasting = abs(at_end) >= _LASTING and at_end * at_alarm > 0.0 and abs(at_alarm) >= _AT_ALARM
     if not lasting:
         return ()
@@ -212,7 +212,8 @@ def _friction(
 def _transients(recording: Recording, track: Track, window: tuple[float, float]) -> list[Transient]:
     """Return transients of a channel: relative to its own running median, otherwise to its normal curve."""
     series, column = recording[track.channel], recording.joints.index(track.joint)
-    spread = float(np.nanmedian(track.spread)) if np.isfinite(track.spread).any() else 0.0
+    spreads = track.compared.spread[track.rows]
+    spread = float(np.nanmedian(spreads)) if np.isfinite(spreads).any() else 0.0
     found = transients(series, track.channel, track.joint, column, *window, _LEAST_NOISE * spread)
     if found:
         return found
@@ -249,9 +250,9 @@ def _lost(recording: Recording, read: tuple[str, ...], left: float, alarm: float
 
 def _shift(track: Track, when: tuple[float, float]) -> Shift:
     normal = track.normal(*when)
-    return Shift(track.channel, track.joint, track.unit, normal + track.change(*when), normal)
+    return Shift(track.channel, track.joint, track.compared.unit, normal + track.change(*when), normal)
 
 
 def _peak(track: Track, start: float, end: float, direction: int) -> float:
-    part = direction * track.level[track.between(start, end)]
+    part = direction * track.level_distances(track.between(start, end))
     return direction * float(np.nanmax(part)) if np.isfinite(part).any() else math.nan

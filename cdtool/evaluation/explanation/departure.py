@@ -9,8 +9,9 @@ a small lasting shift that single samples hide.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,9 +19,9 @@ import numpy.typing as npt
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.transient import Transient
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.median_kernel import median_of
-from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels
+from cdtool.median_kernel import median_of_known
+from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels_of
 
 # Two columns of a fit are the same straight line if the determinant is at most this share of its largest value.
 _SINGULAR = 1e-13
@@ -44,13 +45,33 @@ _ENOUGH = 10
 _BRIEF, _CALM, _BACK = 0.15, 0.03, 3.5
 
 
-@dataclass(frozen=True)
-class Track:
-    """One channel of one joint over the analysed time, compared with its normal band.
+class Departure(IntEnum):
+    """Whether a channel left its normal band: not known, no, or already before; otherwise of what and to which side."""
 
-    `samples` and `level` (n,) are distances from the normal mean in normal spreads, minus the run's own constant
-    distance; NaN if unknown. `value`, `mean`, `spread` are in `unit`. `raw`: `samples` including that distance. `out`
-    and `level_out`: number of spreads outside which it has left its normal band.
+    UNKNOWN = 0
+    NONE = 1
+    BEFORE = 2
+    SAMPLES_DOWN = 3
+    LEVEL_DOWN = 4
+    SAMPLES_UP = 5
+    LEVEL_UP = 6
+
+
+class Limits(NamedTuple):
+    """Number of spreads outside which samples and level are out of the normal band: at the start, and while running."""
+
+    samples: float
+    samples_running: float
+    level: float
+    level_running: float
+
+
+@dataclass(frozen=True)
+class ComparedChannel:
+    """One channel of one joint with its normal band, the same for every event: arrays (n,).
+
+    `value`, `mean`, `spread`, `level` and `level_mean` are in `unit`; `raw` and `raw_level` are distances from the
+    normal mean in normal spreads, NaN if unknown. It has left the band outside `limits`, others where it is `running`.
     """
 
     channel: str
@@ -60,71 +81,136 @@ class Track:
     value: FloatArray
     mean: FloatArray
     spread: FloatArray
-    raw: FloatArray
-    samples: FloatArray
     level: FloatArray
-    level_off: FloatArray
     level_mean: FloatArray
-    out: FloatArray
-    level_out: FloatArray
+    raw: FloatArray
+    raw_level: FloatArray
+    running: BoolArray
+    limits: Limits
+
+    @classmethod
+    def of(cls, channel: str, joint: str, compared: Comparison, j: int) -> Self:
+        """Return one column of a comparison."""
+        reach = (*compared.reach[:, j].tolist(), *compared.level_reach[:, j].tolist())
+        return cls(
+            channel=channel,
+            joint=joint,
+            unit=compared.unit,
+            time=compared.time,
+            value=compared.value[:, j],
+            mean=compared.mean[:, j],
+            spread=compared.spread[:, j],
+            level=compared.level[:, j],
+            level_mean=compared.level_mean[:, j],
+            raw=np.ascontiguousarray(compared.distance[:, j]),
+            raw_level=np.ascontiguousarray(compared.level_distance[:, j]),
+            running=compared.running,
+            limits=Limits(*(max(_BEYOND * item, _LEAST_OUT) for item in reach)),
+        )
+
+
+@dataclass(frozen=True)
+class Track:
+    """A compared channel in the time that is analysed for an event: its samples from `first` until `after`.
+
+    The run's own constant distances `own` and `own_level` do not count. `shift` is subtracted from the distances of the
+    samples before anything else.
+    """
+
+    compared: ComparedChannel
+    first: int
+    after: int
+    shift: float
+    own: float
+    own_level: float
+
+    @property
+    def channel(self) -> str:
+        """Return the name of the channel."""
+        return self.compared.channel
+
+    @property
+    def joint(self) -> str:
+        """Return the name of the joint."""
+        return self.compared.joint
+
+    @property
+    def rows(self) -> slice:
+        """Return the samples that are analysed."""
+        return slice(self.first, self.after)
 
     def between(self, start: float, end: float) -> slice:
         """Return the samples from `start` to `end` [s]."""
-        first, after = np.searchsorted(self.time, start), np.searchsorted(self.time, end, side="right")
-        return slice(int(first), int(after))
+        time, first = self.compared.time[self.first : self.after], self.first
+        return slice(first + int(time.searchsorted(start)), first + int(time.searchsorted(end, side="right")))
 
-    def shift(self, start: float, end: float) -> float:
+    def distances(self, part: slice) -> FloatArray:
+        """Return the distance of these samples from normal, in spreads."""
+        return self.compared.raw[part] - self.shift - self.own
+
+    def level_distances(self, part: slice) -> FloatArray:
+        """Return the distance of the level at these samples from normal, in spreads."""
+        return self.compared.raw_level[part] - self.own_level
+
+    def level_shift(self, start: float, end: float) -> float:
         """Return the mean distance of the level from normal, in spreads, from `start` to `end` [s]; NaN if unknown."""
-        return _mean(self.level[self.between(start, end)])
+        return _mean(self.level_distances(self.between(start, end)))
 
     def change(self, start: float, end: float) -> float:
-        """Return the same in the channel's unit."""
-        return _mean(self.level_off[self.between(start, end)])
+        """Return the same in the channel's unit, including the run's own constant distance."""
+        part = self.between(start, end)
+        return _mean(self.compared.level[part] - self.compared.level_mean[part])
 
     def normal(self, start: float, end: float) -> float:
         """Return the normal mean from `start` to `end` [s]."""
-        return _mean(self.level_mean[self.between(start, end)])
+        return _mean(self.compared.level_mean[self.between(start, end)])
 
     def movement(self, begin: float, end: float) -> Movement:
         """Return when and in which direction the channel left its normal band from `begin` to `end` [s], if it did."""
-        part = self.between(begin, end)
-        samples, level, raw = self.samples[part], self.level[part], self.raw[part]
-        if np.count_nonzero(np.isfinite(samples)) < _SUCCESSION:
-            return Movement(self.channel, self.joint, math.nan, reason="no normal band known here", unit=self.unit)
-        shares = samples / self.out[part], level / self.level_out[part]
-        at = _first_out(*shares)
-        if at is None:
-            first = first_beyond(np.where(np.abs(raw) > self.out[part], 2.0, 0.0), 1.0, _SUCCESSION)
-            if first < 0:
-                farthest = part.start + int(np.nanargmax(np.abs(raw)))
-                return self._movement_at(math.nan, "", "within its usual range", farthest)
-            return self._movement_at(math.nan, _side(raw[first]), "outside since before", part.start + first)
-        k, upward, of_level = at
-        sign = 1.0 if upward else -1.0
-        start = part.start + _began(self.time[part][: k + 1], sign * shares[of_level][: k + 1])
-        known = np.where(np.isfinite(samples), sign * samples, -np.inf)
-        farthest = part.start + k + int(np.argmax(known[k:]))
-        return self._movement_at(float(self.time[start]), "up" if upward else "down", "", farthest)
+        compared, part = self.compared, self.between(begin, end)
+        found, first, farthest = find_departure(
+            *(compared.raw, compared.raw_level, compared.running, compared.limits),
+            *(self.shift, self.own, self.own_level, part.start, part.stop, _SUCCESSION),
+        )
+        if found == Departure.UNKNOWN:
+            return Movement(self.channel, self.joint, math.nan, reason="no normal band known here", unit=compared.unit)
+        if found == Departure.NONE:
+            return self._movement_at(math.nan, "", "within its usual range", farthest)
+        if found == Departure.BEFORE:
+            side = _side(compared.raw[first] - self.shift)
+            return self._movement_at(math.nan, side, "outside since before", first)
+        is_upward = found in (Departure.SAMPLES_UP, Departure.LEVEL_UP)
+        part = slice(part.start, first + 1)
+        shares = self._shares(part, of_level=found in (Departure.LEVEL_DOWN, Departure.LEVEL_UP))
+        start = part.start + _began(compared.time[part], shares if is_upward else -shares)
+        return self._movement_at(float(compared.time[start]), "up" if is_upward else "down", "", farthest)
+
+    def _shares(self, part: slice, *, of_level: bool) -> FloatArray:
+        """Return the distances of the samples, or of the level, as shares of the limit."""
+        starting, running = self.compared.limits[2:] if of_level else self.compared.limits[:2]
+        distances = self.level_distances(part) if of_level else self.distances(part)
+        shares: FloatArray = distances / np.where(self.compared.running[part], running, starting)
+        return shares
 
     def brief(self, begin: float, end: float) -> Transient | None:
         """Return a departure that began from `begin` to `end` [s] and soon ended, or None."""
-        moved = self.movement(begin, end)
+        moved, compared = self.movement(begin, end), self.compared
         if math.isnan(moved.time):
             return None
         part = self.between(moved.time, moved.time + _BRIEF)
-        outside = np.flatnonzero(np.abs(self.samples[part]) > _BACK)
-        if not len(outside) or self.time[part][outside[-1]] > moved.time + _BRIEF - _CALM:
+        outside = np.flatnonzero(np.abs(self.distances(part)) > _BACK)
+        if not len(outside) or compared.time[part][outside[-1]] > moved.time + _BRIEF - _CALM:
             return None
         last = part.start + int(outside[-1])
-        samples = self.samples[part.start : last + 1]
-        off = (self.value - self.mean)[part.start : last + 1]
+        part = slice(part.start, last + 1)
+        samples, off = self.distances(part), compared.value[part] - compared.mean[part]
         k = int(np.nanargmax(np.abs(samples)))
         height = float(off[k])
-        area = float(np.nansum(off[:-1] * np.diff(self.time[part.start : last + 1])))
+        area = float(np.nansum(off[:-1] * np.diff(compared.time[part])))
         rings = bool((off < -0.3 * abs(height)).any() and (off > 0.3 * abs(height)).any())
         noises = float(abs(samples[k]))
-        end = float(self.time[last])
-        return Transient(self.channel, self.joint, self.unit, moved.time, end, height, noises, area, rings)
+        end = float(compared.time[last])
+        return Transient(self.channel, self.joint, compared.unit, moved.time, end, height, noises, area, rings)
 
     def _movement_at(self, time: float, direction: str, reason: str, k: int) -> Movement:
         return Movement(
@@ -133,94 +219,75 @@ class Track:
             time,
             direction,  # type: ignore[arg-type]
             reason,
-            self.unit,
-            float(self.value[k]),
-            float(self.mean[k]),
-            float(self.spread[k]),
+            self.compared.unit,
+            float(self.compared.value[k]),
+            float(self.compared.mean[k]),
+            float(self.compared.spread[k]),
         )
 
 
-def tracks_of(
-    recording: Recording, normal: NormalMotion | None, joints: Sequence[str], begin: float, end: float
-) -> list[Track]:
-    """Compare every channel of the joints from `begin` to `end` [s] with impact-free runs.
+def tracks_of(recording: Recording, normal: NormalMotion | None, leading: str, begin: float, end: float) -> list[Track]:
+    """Compare every channel of every joint from `begin` to `end` [s] with impact-free runs.
 
-    Without `normal`, mean and spread of the run's own half second before `begin` are used.
+    Without `normal`, mean and spread of the run's own half second before `begin` are used. The position of the leading
+    joint is the location in the stroke itself: the others are compared at that location.
     """
     tracks = []
     for channel in CHANNELS:
         if channel not in recording or (normal is not None and channel not in normal.channels):
             continue
-        compared = normal.compare(recording, channel) if normal is not None else _own_past(recording, channel, begin)
-        cut = slice(*np.searchsorted(compared.time, (begin - _BASELINE, end)))
-        quiet = np.searchsorted(compared.time[cut], begin)
-        for joint in joints:
-            tracks.append(_track(channel, joint, recording.joints.index(joint), compared, cut, int(quiet)))
+        joints = [joint for joint in recording.joints if channel not in POSITIONS or joint != leading]
+        if not joints:
+            continue
+        start = begin - _BASELINE
+        if normal is None:
+            compared = _own_past(recording[channel], start, begin, end)
+        else:
+            compared = normal.compare(recording, channel, start, end)
+        time = compared.time
+        cut = int(time.searchsorted(start)), int(time.searchsorted(begin)), int(time.searchsorted(end))
+        tracks += [_track(channel, joint, recording.joints.index(joint), compared, *cut) for joint in joints]
     return tracks
 
 
-def _track(channel: str, joint: str, j: int, compared: Comparison, cut: slice, quiet: int) -> Track:
-    raw, raw_level = compared.distance[cut, j], compared.level_distance[cut, j]
+def _track(channel: str, joint: str, j: int, compared: Comparison, first: int, begin: int, after: int) -> Track:
+    """Return the samples of a channel from `first` until `after`; those before `begin` show its own distance."""
+    column = compared.derived(("column", j), lambda: ComparedChannel.of(channel, joint, compared, j))
     # The assumed start of the motion shifts a whole position: only a change of its distance counts.
     reach = math.inf if channel in POSITIONS else _OFFSET
-    own, own_level = (_own_offset(item[:quiet], reach) for item in (raw, raw_level))
-    if channel in POSITIONS:
-        raw = raw - own
-    return Track(
-        channel,
-        joint,
-        compared.unit,
-        compared.time[cut],
-        compared.value[cut, j],
-        compared.mean[cut, j],
-        compared.spread[cut, j],
-        raw,
-        raw - own,
-        raw_level - own_level,
-        compared.level_off[cut, j],
-        compared.level_mean[cut, j],
-        *(np.maximum(_BEYOND * item[cut, j], _LEAST_OUT) for item in (compared.reach, compared.level_reach)),
-    )
+    past, scratch = slice(first, min(begin, after)), np.empty(begin - first)
+    own, own_level = (_own_offset(item[past], scratch, reach) for item in (column.raw, column.raw_level))
+    return Track(column, first, after, own if channel in POSITIONS else 0.0, own, own_level)
 
 
-def _own_past(recording: Recording, channel: str, begin: float) -> Comparison:
-    """Compare the channel with its own half second before `begin`: constant mean and spread."""
-    series = recording[channel]
-    quiet = slice(*np.searchsorted(series.time, (begin - _BASELINE, begin)))
-    level = levels(series.time, series.values)
-    reach = np.full(series.values.shape, _OWN_REACH)
-    samples, means = (_own_normal(values, quiet) for values in (series.values, level))
-    return Comparison(series.unit, series.time, series.values, *samples, level, *means, reach, reach)
+def _own_past(series: Series, start: float, begin: float, end: float) -> Comparison:
+    """Compare the channel up to `end` with its past from `start` until `begin` [s]: constant mean and spread."""
+    cut = slice(int(series.time.searchsorted(start)), int(series.time.searchsorted(end)))
+    time, values, level = series.time[cut], series.values[cut], levels_of(series)[cut]
+    quiet = int(time.searchsorted(begin))
+    reach = np.full((2, values.shape[1]), _OWN_REACH)
+    samples, means = (_own_normal(part, quiet) for part in (values, level))
+    running = np.zeros(len(time), dtype=np.bool_)
+    return Comparison(series.unit, time, values, *samples, level, *means, running, reach, reach)
 
 
-def _own_normal(values: FloatArray, quiet: slice) -> tuple[FloatArray, FloatArray]:
-    past, shape = values[quiet], values.shape
+def _own_normal(values: FloatArray, quiet: int) -> tuple[FloatArray, FloatArray]:
+    past, shape = values[:quiet], values.shape
     if np.count_nonzero(np.isfinite(past).all(axis=1)) < _ENOUGH:
         return np.full(shape, np.nan), np.full(shape, np.nan)
     spread = np.maximum(np.nanstd(past, axis=0), 1e-3 * np.nanmax(np.abs(past), axis=0))
     return np.broadcast_to(np.nanmean(past, axis=0), shape), np.broadcast_to(spread, shape)
 
 
-def _own_offset(past: FloatArray, reach: float) -> float:
+def _own_offset(past: FloatArray, scratch: FloatArray, reach: float) -> float:
     """Return a run's own constant distance from the mean [spreads], up to `reach`.
 
     With too little data it is 0, or unknown (NaN) if it is unlimited.
     """
-    middle = median_of_known(np.ascontiguousarray(past), np.empty(len(past)), _ENOUGH)
+    middle = median_of_known(past, scratch, _ENOUGH)
     if math.isnan(middle):
         return 0.0 if math.isfinite(reach) else math.nan
     return float(min(max(middle, -reach), reach))
-
-
-def _first_out(samples: FloatArray, level: FloatArray) -> tuple[int, bool, bool] | None:
-    """Return the first sample of a departure (above 1), whether it is upward, and whether it is the level's."""
-    found = []
-    for values, of_level in ((samples, False), (level, True)):
-        for sign in (1.0, -1.0):
-            k = first_beyond(values, sign, _SUCCESSION)
-            if k >= 0:
-                found.append((k, sign > 0.0, of_level))
-    return min(found) if found else None
 
 
 def _began(time: FloatArray, shares: FloatArray) -> int:
@@ -241,11 +308,15 @@ def _bend(time: FloatArray, shares: FloatArray, first: int) -> int:
 
     By least squares over the samples from `_BEFORE_BEND` before `first` to the last.
     """
-    begin = int(np.searchsorted(time, time[first] - _BEFORE_BEND))
-    known = begin + np.flatnonzero(np.isfinite(shares[begin:]))
-    candidates = np.unique(np.linspace(first, len(shares) - _SUCCESSION, _BENDS).astype(np.int64))
-    since = time - time[begin]
-    return int(steepest_bend(since[known], shares[known], first, since[candidates], candidates))
+    begin = int(time.searchsorted(time[first] - _BEFORE_BEND))
+    candidates = np.empty(_BENDS, dtype=np.int64)
+    candidates = candidates[: fill_evenly(first, len(shares) - _SUCCESSION, candidates)]
+    bends = time[candidates] - time[begin]
+    since, shares = time[begin:] - time[begin], shares[begin:]
+    known = np.isfinite(shares)
+    if not known.all():
+        since, shares = since[known], shares[known]
+    return int(steepest_bend(since, shares, first, bends, candidates))
 
 
 def _side(value: float) -> str:
@@ -253,30 +324,89 @@ def _side(value: float) -> str:
 
 
 def _mean(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else math.nan
+    is_known = np.isfinite(values)
+    known = values if is_known.all() else values[is_known]
+    # The bits of `known.mean()`, without the time of its checks.
+    return float(np.add.reduce(known) / len(known)) if len(known) else math.nan
 
 
-@kernel(f"int64({READ_ONLY}, float64, int64)")
-def first_beyond(values: FloatArray, sign: float, succession: int) -> int:
-    """Return the first of `succession` consecutive samples above 1 on that side, -1 without; NaN interrupts them."""
-    run = 0
-    for k in range(len(values)):
-        run = run + 1 if sign * values[k] > 1.0 else 0
-        if run == succession:
-            return k - succession + 1
-    return -1
+@kernel(
+    f"UniTuple(int64, 3)({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), Limits, float64, float64, "
+    "float64, int64, int64, int64)",
+    exact=True,
+)
+def find_departure(  # noqa: C901, PLR0913  a kernel: one loop, arrays and numbers one by one
+    raw: FloatArray,
+    raw_level: FloatArray,
+    running: BoolArray,
+    limits: Limits,
+    shift: float,
+    own: float,
+    own_level: float,
+    begin: int,
+    end: int,
+    succession: int,
+) -> tuple[int, int, int]:
+    """Return the `Departure` of a track from sample `begin` until `end`, its first sample, and the farthest one.
+
+    The farthest is one after the departure, if there is any. It takes `succession` consecutive samples outside on one
+    side; samples that are not known interrupt them. Of several that begin at the same sample, the first in the order
+    of `Departure` counts.
+    """
+    found, first, known = 0, -1, 0
+    samples_down = samples_up = level_down = level_up = 0
+    for k in range(begin, end):
+        sample, level = raw[k] - shift - own, raw_level[k] - own_level
+        known += math.isfinite(sample)
+        limit = limits.samples_running if running[k] else limits.samples
+        level_limit = limits.level_running if running[k] else limits.level
+        samples_down = samples_down + 1 if sample < -limit else 0
+        level_down = level_down + 1 if level < -level_limit else 0
+        samples_up = samples_up + 1 if sample > limit else 0
+        level_up = level_up + 1 if level > level_limit else 0
+        if first < 0 and max(samples_down, samples_up, level_down, level_up) == succession:
+            first = k - succession + 1
+            if samples_down == succession:
+                found = Departure.SAMPLES_DOWN.value
+            elif level_down == succession:
+                found = Departure.LEVEL_DOWN.value
+            elif samples_up == succession:
+                found = Departure.SAMPLES_UP.value
+            else:
+                found = Departure.LEVEL_UP.value
+        if first >= 0 and known >= succession:
+            break
+    if known < succession:
+        return Departure.UNKNOWN.value, -1, -1
+    sign = 1.0 if found >= Departure.SAMPLES_UP.value else -1.0
+    farthest, most, outside = first, -np.inf, 0
+    for k in range(first if first >= 0 else begin, end):
+        distance = raw[k] - shift
+        size = abs(distance) if first < 0 else sign * (distance - own)
+        if math.isfinite(size) and size > most:
+            farthest, most = k, size
+        if first < 0:
+            outside = outside + 1 if size > (limits.samples_running if running[k] else limits.samples) else 0
+            if outside == succession:
+                return Departure.BEFORE.value, k - succession + 1, -1
+    return found if first >= 0 else Departure.NONE.value, first, farthest
 
 
-@kernel(f"float64({READ_ONLY}, float64[::1], int64)", exact=True)
-def median_of_known(values: FloatArray, scratch: FloatArray, least: int) -> float:
-    """Return the median of the finite values, NaN with fewer than `least`; `scratch` (n,) is overwritten."""
-    count = 0
-    for value in values:
-        if np.isfinite(value):
-            scratch[count] = value
+@kernel("int64(int64, int64, int64[::1])", exact=True)
+def fill_evenly(first: int, last: int, numbers: npt.NDArray[np.int64]) -> int:
+    """Fill at most n whole numbers, evenly from one number to another as by numpy's `linspace`; return how many.
+
+    In increasing order, and each only once.
+    """
+    count, n = 0, len(numbers)
+    step = (last - first) / (n - 1)
+    for i in range(n):
+        k = i if step > 0.0 else n - 1 - i
+        number = last if k == n - 1 else int(k * step + first)
+        if count == 0 or number > numbers[count - 1]:
+            numbers[count] = number
             count += 1
-    return float(median_of(scratch, count)) if count >= least else np.nan
+    return count
 
 
 @kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64, {READ_ONLY}, int64[::1])")

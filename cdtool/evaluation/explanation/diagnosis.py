@@ -15,7 +15,7 @@ from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.explanation.transient import Transient
 from cdtool.recording import REFERENCES, Recording
-from cdtool.thresholds.normal_motion import POSITIONS, NormalMotion
+from cdtool.thresholds.normal_motion import NormalMotion
 
 # Departures are searched from this long before the signal left its band permanently [s]: a soft contact takes as long.
 _BEFORE = 0.9
@@ -59,13 +59,13 @@ def diagnose_alarm(
     normal = found if isinstance(found, NormalMotion) else None
     begin = event.left - _BEFORE if normal is None else _search_begin(recording, normal, event.left)
     end = min(event.alarm + _AFTER, recording.end)
-    tracks = tracks_of(recording, normal, recording.joints, begin, end)
     motion = normal.motion if normal is not None else event.motion
     leading, direction = recording.joints[motion.joint], motion.direction or 1
+    tracks = tracks_of(recording, normal, leading, begin, end)
     cause = Cause(CauseKind.UNCLEAR)
     if normal is not None or _steady(tracks, leading, begin):
         cause = likely_cause(recording, tracks, leading, direction, event, end)
-    moved = list(own_past()) if normal is None else moved_channels(tracks, event.joint, begin, end, leading)
+    moved = list(own_past()) if normal is None else moved_channels(tracks, event.joint, begin, end)
     if cause.transient is not None:
         moved = _with_transient(moved, cause.transient, [] if normal is None else tracks)
     return Diagnosis(in_order(moved, event.joint), cause, absent, normal.runs if normal is not None else 0)
@@ -84,19 +84,14 @@ def diagnose_contact(
     if not isinstance(normal, NormalMotion):
         return Diagnosis(tuple(own_past()), Cause(CauseKind.CONTACT), normal)
     end = min(until, recording.end)
-    tracks = tracks_of(recording, normal, recording.joints, onset, end)
-    leading = recording.joints[normal.motion.joint]
-    return Diagnosis(
-        in_order(moved_channels(tracks, joint, onset, end, leading), joint), Cause(CauseKind.CONTACT), None, normal.runs
-    )
+    tracks = tracks_of(recording, normal, recording.joints[normal.motion.joint], onset, end)
+    moved = moved_channels(tracks, joint, onset, end)
+    return Diagnosis(in_order(moved, joint), Cause(CauseKind.CONTACT), None, normal.runs)
 
 
-def moved_channels(tracks: Sequence[Track], joint: str, begin: float, end: float, leading: str) -> list[Movement]:
-    """Return every channel of the signal's joint, and those of other joints that left their normal band.
-
-    The position of the leading joint is the location in the stroke itself: the others are compared at that location.
-    """
-    found = [track.movement(begin, end) for track in tracks if track.channel not in POSITIONS or track.joint != leading]
+def moved_channels(tracks: Sequence[Track], joint: str, begin: float, end: float) -> list[Movement]:
+    """Return every channel of the signal's joint, and those of other joints that left their normal band."""
+    found = [track.movement(begin, end) for track in tracks]
     return [item for item in found if (joint,) == WHOLE_MACHINE or item.joint == joint or not math.isnan(item.time)]
 
 
@@ -104,7 +99,7 @@ def _steady(tracks: Sequence[Track], leading: str, begin: float) -> bool:
     """Whether the leading joint ran steadily up to `begin` [s], so that its own past can serve as normal."""
     for track in tracks:
         if (track.channel, track.joint) == ("speed", leading):
-            past = track.value[: track.between(begin, begin).start]
+            past = track.compared.value[track.first : track.between(begin, begin).start]
             known = past[np.isfinite(past)]
             middle = abs(float(np.median(known))) if len(known) >= _ENOUGH else 0.0
             return middle > 0.0 and float(np.ptp(known)) < _STEADY * middle
@@ -114,8 +109,9 @@ def _steady(tracks: Sequence[Track], leading: str, begin: float) -> bool:
 def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> float:
     """Return the start of the search for departures [s]: not far into the acceleration, if that was shortly before."""
     clock = recording["speed"].time
-    ran = clock[normal.progress(recording, clock).running]
-    settled = float(ran[0]) + _SETTLING if len(ran) else -math.inf
+    running = normal.progress(recording, clock).running
+    ran = int(running.argmax()) if len(running) else 0
+    settled = float(clock[ran]) + _SETTLING if len(running) and running[ran] else -math.inf
     return max(left - _BEFORE, min(settled, left - _LEAST_BEFORE))
 
 
@@ -145,9 +141,9 @@ def _with_transient(moved: Sequence[Movement], found: Transient, tracks: Sequenc
     )
     for track in tracks:
         if (track.channel, track.joint) == (found.channel, found.joint):
-            part = track.between(found.start, found.end)
-            k = part.start + int(abs(track.value[part] - track.mean[part]).argmax())
-            value, mean, spread = (float(part[k]) for part in (track.value, track.mean, track.spread))
+            part, compared = track.between(found.start, found.end), track.compared
+            k = part.start + int(abs(compared.value[part] - compared.mean[part]).argmax())
+            value, mean, spread = (float(part[k]) for part in (compared.value, compared.mean, compared.spread))
             movement = replace(movement, value=value, mean=mean, spread=spread)
     return [*others, replace(movement, brief=True)]
 

@@ -203,7 +203,7 @@ def explain_alarm(
     """
     margin = (margins or joint_margins(detection))[alarm.joint]
     at = int(np.searchsorted(margin.time, alarm.time))
-    runs = margin.runs()
+    runs = margin.runs
     containing = runs[(runs[:, 0] <= at) & (runs[:, 1] >= at), 0]
     if not len(containing):
         raise UsageError(f"{detection.operation.name}: no alarm at {alarm.time:g} s", "give one of this detection")

@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.detection import REASONS, Status
+from cdtool.detection import REASONS, Status, StatusArray
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
 
@@ -58,8 +60,6 @@ class JointMargin:
 
     detection: Detection
     joint: int
-    margin: FloatArray
-    share: FloatArray
 
     @property
     def name(self) -> str:
@@ -70,6 +70,24 @@ class JointMargin:
     def time(self) -> FloatArray:
         """(n,) [s]."""
         return self.detection.statistic.time
+
+    @cached_property
+    def margin(self) -> FloatArray:
+        """Return the distance of the statistic from its nearest limit."""
+        statistic, band, j = self.detection.statistic, self.detection.band, self.joint
+        value = statistic.values[:, j]
+        margin = np.minimum(band.upper[:, j] - value, value - band.lower[:, j])
+        margin[statistic.status[:, j] != Status.VALID] = np.nan
+        return margin
+
+    @cached_property
+    def share(self) -> FloatArray:
+        """Return the share of the limit; NaN everywhere if no threshold applies."""
+        detection = self.detection
+        if detection.threshold is None:
+            return np.full(len(self.time), np.nan)
+        share = detection.exceedance()[:, self.joint] / detection.threshold.safety_factor
+        return np.where(detection.statistic.status[:, self.joint] == Status.VALID, share, np.nan)
 
     def moment(self, k: int) -> Moment:
         """Sample k."""
@@ -86,18 +104,18 @@ class JointMargin:
         """Return the last sample at or before each of `times` [s]; in order of time, each sample once."""
         # An alarm minus 5 ms is the sample 5 ms before it, independent of the last bit of the difference.
         at = np.searchsorted(self.time, np.asarray(times) + 1e-9, side="right") - 1
-        return tuple(self.moment(int(k)) for k in np.unique(at[at >= 0]))
+        return tuple(self.moment(k) for k in sorted({k for k in at.tolist() if k >= 0}))
 
+    @cached_property
     def runs(self) -> npt.NDArray[np.int64]:
         """Return runs outside the band, as counted by the activation (r, 3): first and last sample, how many.
 
         Missing samples do not interrupt a run and do not count.
         """
-        present = np.flatnonzero(self.detection.statistic.status[:, self.joint] != Status.GAP)
-        outside = np.concatenate(([False], self.margin[present] < 0.0, [False]))
-        edges = np.flatnonzero(np.diff(outside.astype(np.int8)))
-        first, after = edges[::2], edges[1::2]
-        return np.column_stack((present[first], present[after - 1], after - first)).astype(np.int64)
+        status = np.ascontiguousarray(self.detection.statistic.status[:, self.joint])
+        runs = np.empty((count_runs(self.margin, status, np.empty((0, 3), dtype=np.int64)), 3), dtype=np.int64)
+        count_runs(self.margin, status, runs)
+        return runs
 
     def approach(self, start: float, end: float, debounce: int) -> Approach | None:
         """Return how near it came to an alarm from `start` to `end` [s]; None without limit or assessable sample."""
@@ -106,7 +124,7 @@ class JointMargin:
         if not np.isfinite(margin).any():
             return None
         nearest = self.moment(int(first + np.nanargmin(margin)))
-        runs = self.runs()
+        runs = self.runs
         runs = runs[(runs[:, 1] >= first) & (runs[:, 0] < after)]
         latched = math.nan
         if len(runs) and np.count_nonzero(self.margin[runs[0, 0] : first] < 0.0) >= debounce:
@@ -151,13 +169,7 @@ def joint_margins(detection: Detection) -> tuple[JointMargin, ...]:
     >>> gate.name, bool(np.nanmin(gate.margin) < 0.0), bool(np.nanmax(gate.share) > 1.0)
     ('gate', True, True)
     """
-    statistic, band = detection.statistic, detection.band
-    share = np.full(statistic.values.shape, np.nan)
-    if detection.threshold is not None:
-        share = detection.exceedance() / detection.threshold.safety_factor
-    margin = np.minimum(band.upper - statistic.values, statistic.values - band.lower)
-    margin, share = (np.where(statistic.valid, item, np.nan) for item in (margin, share))
-    return tuple(JointMargin(detection, j, margin[:, j], share[:, j]) for j in range(margin.shape[1]))
+    return tuple(JointMargin(detection, j) for j in range(detection.statistic.values.shape[1]))
 
 
 def _held(share: FloatArray, debounce: int) -> float:
@@ -166,3 +178,25 @@ def _held(share: FloatArray, debounce: int) -> float:
         return math.nan
     least = np.lib.stride_tricks.sliding_window_view(share, debounce).min(axis=1)
     return math.nan if np.isnan(least).all() else float(np.nanmax(least))
+
+
+@kernel(f"int64({READ_ONLY}, Array(uint8, 1, 'C', readonly=True), int64[:, ::1])")
+def count_runs(margin: FloatArray, status: StatusArray, runs: npt.NDArray[np.int64]) -> int:
+    """Return the number of runs with a margin below 0, and fill `runs` (r, 3) with as many as it has rows.
+
+    First and last sample of each, and its number of samples; missing ones do not interrupt it and do not count.
+    """
+    found = count = first = last = 0
+    for k in range(len(margin) + 1):
+        if k < len(margin) and status[k] == Status.GAP:
+            continue
+        if k < len(margin) and margin[k] < 0.0:
+            first = k if count == 0 else first
+            last = k
+            count += 1
+        elif count > 0:
+            if found < len(runs):
+                runs[found] = first, last, count
+            found += 1
+            count = 0
+    return found

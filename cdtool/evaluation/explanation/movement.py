@@ -14,6 +14,8 @@ import numpy as np
 
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.median_kernel import median_of
 from cdtool.recording import MEASURED, REFERENCES, FloatArray, Recording
 
 # Commands to the machine. The reference torque is not one: it is a controller output and responds to a contact.
@@ -120,66 +122,151 @@ def which_moved_first(
 
 
 def _movement(channel: str, joint: str, time: FloatArray, value: FloatArray, begin: float, before: float) -> Movement:
-    off = _off_line(time, value, np.full(len(time), begin), before)
-    quiet = (time >= begin - before) & (time <= begin)
-    # A log that begins shortly before the event has nothing to extrapolate: the line's own residuals are used.
-    usual = [_usual(_off_line(time, value, time - ahead, before)[quiet], off[quiet]) for ahead in _AHEAD]
-    later = np.flatnonzero(time > begin)
-    if len(later) < _SUCCESSION or not np.isfinite([*usual, *off[later]]).all():
-        return Movement(channel, joint, math.nan, reason="too few samples")
-    least = max(_ROUNDING * _step(value[time <= begin]), _SMALLEST * float(np.abs(value).max()))
-    noise = np.maximum(np.interp(time[later] - begin, _AHEAD, usual), least)
-    off = off[later]
-    outside = np.abs(off) > _MOVED * noise
-    run = np.lib.stride_tricks.sliding_window_view(outside, _SUCCESSION).all(axis=1)
-    if not run.any():
-        return Movement(channel, joint, math.nan, reason="no departure found")
-    first = int(np.argmax(run))
-    upward = bool(off[first] > 0.0)
-    calm = np.flatnonzero((off if upward else -off)[:first] <= _BACK_TO * noise[:first])
-    start = int(calm[-1]) + 1 if len(calm) else 0
-    return Movement(channel, joint, float(time[later[start]]), "up" if upward else "down")
+    start, direction = -1, 0
+    if len(time) >= _SUCCESSION:
+        start, direction = find_movement(time, value, value.mean(), begin, before, np.empty((5, len(time) + 1)))
+    if direction:
+        return Movement(channel, joint, float(time[start]), "up" if direction > 0 else "down")
+    return Movement(channel, joint, math.nan, reason="too few samples" if start < 0 else "no departure found")
 
 
-def _usual(tried: FloatArray, residuals: FloatArray) -> float:
-    """Return the usual deviation of a channel from its line: a standard deviation; NaN with too few samples."""
-    for off in (tried, residuals):
-        known = off[np.isfinite(off)]
-        if len(known) >= _ENOUGH:
-            return _MAD * float(np.median(np.abs(known)))
-    return math.nan
+@kernel(
+    f"UniTuple(int64, 2)({READ_ONLY}, {READ_ONLY}, float64, float64, float64, float64[:, ::1])",
+    exact=True,
+)
+def find_movement(
+    time: FloatArray, value: FloatArray, mean: float, begin: float, length: float, sums: FloatArray
+) -> tuple[int, int]:
+    """Return the sample at which a channel moved after `begin` [s], and its direction, 1 or -1; 0 if it did not.
 
-
-def _off_line(time: FloatArray, value: FloatArray, ends: FloatArray, length: float) -> FloatArray:
-    """Return each sample's distance from the least-squares line through the `length` seconds up to its entry of `ends`.
-
-    NaN if that interval has too few samples, or covers less than half of its length.
+    Then the sample is 0, or -1 if there are too few. `mean` is that of the values (n,), and `length` [s] that of a
+    line. `sums` (5, n + 1) is overwritten.
     """
-    if not len(time):
-        return np.empty(0)
-    # Sums from the first sample, about it and about the mean, so that they keep their digits at any time and offset.
-    t, v = time - time[0], value - value.mean()
-    first = np.searchsorted(time, ends - length, side="left")
-    after = np.searchsorted(time, ends, side="right")
-    count = (after - first).astype(np.float64)
+    fill_sums(time, value, mean, sums)
+    first = past = 0
+    for k in range(len(time)):
+        first += time[k] < begin - length
+        past += time[k] <= begin
+    if len(time) - past < _SUCCESSION:
+        return -1, 0
+    usual = (
+        _usual(time, value, mean, sums, first, past, _AHEAD[0], length),
+        _usual(time, value, mean, sums, first, past, _AHEAD[1], length),
+        _usual(time, value, mean, sums, first, past, _AHEAD[2], length),
+    )
+    off, line = sums[4], line_of(time, sums, first, past, length)
+    is_known = math.isfinite(usual[0]) and math.isfinite(usual[1]) and math.isfinite(usual[2])
+    size = 0.0
+    for k in range(len(time)):
+        size = max(size, abs(value[k]))
+        off[k] = value[k] - mean - line[1] - line[2] * (time[k] - time[0] - line[0])
+        is_known = is_known and (k < past or math.isfinite(off[k]))
+    if not is_known:
+        return -1, 0
+    least = max(_ROUNDING * _step(value, past), _SMALLEST * size)
+    outside = 0
+    for k in range(past, len(time)):
+        outside = outside + 1 if abs(off[k]) > _MOVED * max(_interpolated(time[k] - begin, usual), least) else 0
+        if outside == _SUCCESSION:
+            at = k - _SUCCESSION + 1
+            sign = 1 if off[at] > 0.0 else -1
+            while at > past and sign * off[at - 1] > _BACK_TO * max(_interpolated(time[at - 1] - begin, usual), least):
+                at -= 1
+            return at, sign
+    return 0, 0
 
-    def total(terms: FloatArray) -> FloatArray:
-        sums = np.concatenate(([0.0], np.cumsum(terms)))
-        difference: FloatArray = sums[after] - sums[first]
-        return difference
 
-    held = time[np.maximum(after, 1) - 1] - time[np.minimum(first, len(time) - 1)]
-    enough = (count >= _ENOUGH) & (held >= 0.5 * length)
-    count = np.maximum(count, 1.0)
-    mean_t, mean_v = total(t) / count, total(v) / count
-    variance = total(t * t) / count - mean_t**2
-    covariance = total(t * v) / count - mean_t * mean_v
-    slope = np.divide(covariance, variance, out=np.zeros(len(t)), where=enough)
-    return np.where(enough, v - mean_v - slope * (t - mean_t), np.nan)
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64, float64[:, ::1])", exact=True)
+def fill_sums(time: FloatArray, value: FloatArray, mean: float, sums: FloatArray) -> None:
+    """Fill the sums up to each sample of time, value, time squared, and time by value.
+
+    From the first sample and about the mean, so that they keep their digits at any time and offset.
+    """
+    sums[:4, 0] = 0.0
+    for k in range(len(time)):
+        t, v = time[k] - time[0], value[k] - mean
+        terms = (t, v, t * t, t * v)
+        for i in range(4):
+            sums[i, k + 1] = sums[i, k] + terms[i] if k > 0 else terms[i]
 
 
-def _step(value: FloatArray) -> float:
-    """Return the smallest step between samples, that of a quantised channel; 0 for a channel that does not change."""
-    steps = np.abs(np.diff(value))
-    steps = steps[steps > _SMALLEST * np.abs(value).max(initial=0.0)]
-    return float(steps.min()) if len(steps) else 0.0
+@kernel(f"UniTuple(float64, 3)({READ_ONLY}, float64[:, ::1], int64, int64, float64)", exact=True, inline=True)
+def line_of(time: FloatArray, sums: FloatArray, first: int, after: int, length: float) -> tuple[float, float, float]:
+    """Return the least-squares line through the samples from `first` until `after`: mean time and value, and slope.
+
+    NaN if they are too few, or cover less than half of the `length` [s].
+    """
+    count = float(after - first)
+    if count < _ENOUGH or not time[after - 1] - time[first] >= 0.5 * length:
+        return math.nan, math.nan, math.nan
+    mean_t = (sums[0, after] - sums[0, first]) / count
+    mean_v = (sums[1, after] - sums[1, first]) / count
+    variance = (sums[2, after] - sums[2, first]) / count - mean_t * mean_t
+    covariance = (sums[3, after] - sums[3, first]) / count - mean_t * mean_v
+    return mean_t, mean_v, covariance / variance
+
+
+@kernel(
+    f"float64({READ_ONLY}, {READ_ONLY}, float64, float64[:, ::1], int64, int64, float64, float64)",
+    exact=True,
+)
+def _usual(  # noqa: PLR0913  a kernel: arrays and numbers one by one
+    time: FloatArray,
+    value: FloatArray,
+    mean: float,
+    sums: FloatArray,
+    first: int,
+    after: int,
+    ahead: float,
+    length: float,
+) -> float:
+    """Return the usual deviation of the samples from `first` until `after` from lines that end `ahead` [s] before each.
+
+    A standard deviation. A log that begins shortly before the event has nothing to extrapolate: then it is that from
+    the line through these samples; NaN if they are too few for that, too.
+    """
+    sizes = sums[4]
+    known = begins = ends = 0
+    for k in range(first, after):
+        end = time[k] - ahead
+        while begins < len(time) and time[begins] < end - length:
+            begins += 1
+        while ends < len(time) and time[ends] <= end:
+            ends += 1
+        line = line_of(time, sums, begins, ends, length)
+        sizes[known] = abs(value[k] - mean - line[1] - line[2] * (time[k] - time[0] - line[0]))
+        known += math.isfinite(sizes[known])
+    if known >= _ENOUGH:
+        return float(_MAD * median_of(sizes, known))
+    known = 0
+    line = line_of(time, sums, first, after, length)
+    for k in range(first, after):
+        sizes[known] = abs(value[k] - mean - line[1] - line[2] * (time[k] - time[0] - line[0]))
+        known += math.isfinite(sizes[known])
+    return float(_MAD * median_of(sizes, known)) if known >= _ENOUGH else math.nan
+
+
+@kernel("float64(float64, UniTuple(float64, 3))", exact=True, inline=True)
+def _interpolated(since: float, usual: tuple[float, float, float]) -> float:
+    """Return the usual deviation this long after the end of a line [s], between those after `_AHEAD`."""
+    if since <= _AHEAD[0]:
+        return usual[0]
+    if since >= _AHEAD[2]:
+        return usual[2]
+    i = 0 if since < _AHEAD[1] else 1
+    slope = (usual[i + 1] - usual[i]) / (_AHEAD[i + 1] - _AHEAD[i])
+    return float(slope * (since - _AHEAD[i]) + usual[i])
+
+
+@kernel(f"float64({READ_ONLY}, int64)", exact=True)
+def _step(value: FloatArray, count: int) -> float:
+    """Return the smallest step between the first samples, that of a quantised channel; 0 if they do not change."""
+    size = 0.0
+    for k in range(count):
+        size = max(size, abs(value[k]))
+    smallest = math.inf
+    for k in range(1, count):
+        step = abs(value[k] - value[k - 1])
+        if step > _SMALLEST * size:
+            smallest = min(smallest, step)
+    return smallest if smallest < math.inf else 0.0

@@ -8,12 +8,16 @@ from enum import StrEnum
 
 import numpy as np
 
-from cdtool.recording import Recording
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.median_kernel import median_of
+from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.normal_motion import Comparison, NormalMotion
 
 # A class of motion fits if the leading joint's speed is within this many spreads of it, in the median up to the event.
 _FITS = 4.0
 _BEFORE, _LEAST_SAMPLES = 1.0, 5
+# Alarms of other detectors are explained in much the same time: so much more of a channel is compared at once [s].
+_AROUND = 0.25
 
 
 class Absence(StrEnum):
@@ -54,25 +58,47 @@ class NormalMotions:
 
 @dataclass(frozen=True)
 class _OnceCompared(NormalMotion):
-    """A normal motion for one operation, shared by all detectors."""
+    """A normal motion for one operation, shared by all detectors; their alarms are close to each other."""
 
-    compared: dict[str, Comparison] = field(default_factory=dict, compare=False, repr=False)
+    compared: dict[str, tuple[float, float, Comparison]] = field(default_factory=dict, compare=False, repr=False)
 
-    def compare(self, recording: Recording, channel: str) -> Comparison:
-        """Compare as NormalMotion does; the recording is always the same."""
-        if channel not in self.compared:
-            self.compared[channel] = super().compare(recording, channel)
-        return self.compared[channel]
+    def compare(
+        self, recording: Recording, channel: str, start: float = -math.inf, end: float = math.inf
+    ) -> Comparison:
+        """Compare as NormalMotion does, maybe more of the channel; the recording is always the same."""
+        first, last, known = self.compared.get(channel, (math.inf, -math.inf, None))
+        if known is not None and first <= start and end <= last:
+            return known
+        first, last = min(first, start - _AROUND), max(last, end + _AROUND)
+        known = super().compare(recording, channel, first, last)
+        self.compared[channel] = first, last, known
+        return known
 
 
 def _distance(normal: NormalMotion, recording: Recording, until: float) -> float:
     """Return the leading joint's speed deviation from a class of motion [spreads]; infinite without a motion."""
     if "speed" not in normal.channels:
         return math.inf
-    compared = normal.compare(recording, "speed")
-    part = slice(*np.searchsorted(compared.time, (until - _BEFORE, until)))
-    joint = normal.motion.joint
-    with np.errstate(invalid="ignore", divide="ignore"):
-        off = np.abs(compared.level - compared.level_mean)[part, joint] / compared.level_spread[part, joint]
-    known = off[np.isfinite(off)]
-    return float(np.median(known)) if len(known) >= _LEAST_SAMPLES else math.inf
+    begin, joint = until - _BEFORE, normal.motion.joint
+    compared = normal.compare(recording, "speed", begin, until)
+    part = slice(int(compared.time.searchsorted(begin)), int(compared.time.searchsorted(until)))
+    level, mean, spread = (
+        np.ascontiguousarray(item[part, joint]) for item in (compared.level, compared.level_mean, compared.level_spread)
+    )
+    distance = median_distance(level, mean, spread, np.empty(len(level)), _LEAST_SAMPLES)
+    return math.inf if math.isnan(distance) else float(distance)
+
+
+@kernel(f"float64({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64[::1], int64)", exact=True)
+def median_distance(value: FloatArray, mean: FloatArray, spread: FloatArray, scratch: FloatArray, least: int) -> float:
+    """Return the median distance of the values from the mean [spreads], NaN if fewer than `least` are known.
+
+    `scratch` (n,) is overwritten.
+    """
+    count = 0
+    for k in range(len(value)):
+        off = abs(value[k] - mean[k]) / spread[k]
+        if math.isfinite(off):
+            scratch[count] = off
+            count += 1
+    return float(median_of(scratch, count)) if count >= least else math.nan

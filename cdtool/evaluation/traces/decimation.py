@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import UsageError
+from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 IndexArray = npt.NDArray[np.intp]
@@ -73,25 +74,42 @@ def kept_samples(time: FloatArray, values: FloatArray, pixels: int) -> IndexArra
     >>> kept_samples(np.arange(3.0), np.zeros(3), pixels=100).tolist()
     [0, 1, 2]
     """
+    kept = np.zeros(len(time), dtype=np.bool_)
+    mark_kept(time, values, pixels, kept)
+    return np.flatnonzero(kept)
+
+
+def mark_kept(time: FloatArray, values: FloatArray, pixels: int, kept: BoolArray) -> None:
+    """Mark the samples that `decimate` keeps in addition to those that are marked in `kept` (n,)."""
     if pixels < 2:
         raise UsageError(f"pixels is {pixels}", "a plot is at least 2 pixels wide")
     if len(time) <= 4 * pixels:
-        return np.arange(len(time))
+        kept[:] = True
+        return
     edges = np.searchsorted(time, np.linspace(time[0], time[-1], pixels + 1)[1:-1])
-    starts = np.unique([0, *edges.tolist()])
-    starts = starts[starts < len(time)]
-    column = np.repeat(np.arange(len(starts)), np.diff([*starts.tolist(), len(time)]))
-    missing = np.isnan(values)
-    low, high = np.where(missing, np.inf, values), np.where(missing, -np.inf, values)
-    least, greatest = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
-    marks = (~missing & (low == least[column]), ~missing & (high == greatest[column]), missing)
-    ends = np.array([0, len(time) - 1])
-    return np.unique(np.concatenate([ends, *(_first_of_each(mark, column) for mark in marks)]))
+    _mark_extremes(np.ascontiguousarray(values, dtype=np.float64), edges.astype(np.int64, copy=False), kept)
 
 
-def _first_of_each(mark: BoolArray, column: IndexArray) -> IndexArray:
-    """Return the first marked sample of each column of pixels that has one."""
-    at = np.flatnonzero(mark)
-    first = np.ones(len(at), dtype=bool)
-    first[1:] = column[at[1:]] != column[at[:-1]]
-    return at[first]
+@kernel(f"void({READ_ONLY}, int64[::1], b1[::1])", exact=True)
+def _mark_extremes(values: FloatArray, edges: IndexArray, kept: BoolArray) -> None:
+    """Mark the ends of a curve, and the first smallest, largest and missing value of each column of pixels.
+
+    Each of `edges`, in increasing order, is the first sample of a column other than the first one.
+    """
+    kept[0] = kept[-1] = True
+    first = 0
+    for column in range(len(edges) + 1):
+        after = edges[column] if column < len(edges) else len(values)
+        least = greatest = missing = -1
+        for k in range(first, after):
+            if np.isnan(values[k]):
+                missing = k if missing < 0 else missing
+                continue
+            if least < 0 or values[k] < values[least]:
+                least = k
+            if greatest < 0 or values[k] > values[greatest]:
+                greatest = k
+        for k in (least, greatest, missing):
+            if k >= 0:
+                kept[k] = True
+        first = after

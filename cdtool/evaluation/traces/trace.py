@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from cdtool.detection import StatusArray
-from cdtool.evaluation.traces.decimation import kept_samples
+from cdtool.evaluation.traces.decimation import mark_kept
 from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
@@ -56,13 +56,13 @@ class StatisticCurve:
 
     def decimated(self, view: Span | None) -> StatisticCurve:
         """Return the samples that draw the same picture: coarse for the whole, fine in the view."""
-        kept = kept_samples(self.time, self.value, _WHOLE)
+        kept = np.zeros(len(self.time), dtype=np.bool_)
+        mark_kept(self.time, self.value, _WHOLE, kept)
         if view is not None:
             first, last = np.searchsorted(self.time, view[0]), np.searchsorted(self.time, view[1], side="right")
             if last > first:
-                fine = first + kept_samples(self.time[first:last], self.value[first:last], _VIEW)
-                kept = np.union1d(kept, fine)
-        return self.at(kept)
+                mark_kept(self.time[first:last], self.value[first:last], _VIEW, kept[first:last])
+        return self.at(np.flatnonzero(kept))
 
 
 @dataclass(frozen=True)

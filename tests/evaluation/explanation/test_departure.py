@@ -6,19 +6,65 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.evaluation.explanation.departure import first_beyond, median_of_known, steepest_bend
-
-VALUES = st.sampled_from([0.0, 0.5, 1.0, 1.0 + 1e-15, 1.5, -1.0, -2.0, np.inf, -np.inf, np.nan])
+from cdtool.evaluation.explanation.departure import Departure, Limits, fill_evenly, find_departure, steepest_bend
 
 
-@given(st.lists(VALUES, max_size=30), st.sampled_from([1.0, -1.0]), st.integers(1, 4))
-def test_the_first_of_consecutive_samples_outside_is_that_of_a_sliding_window(values, sign, succession):
-    samples = np.array(values, dtype=np.float64)
-    expected = -1
-    if len(samples) >= succession:
-        run = np.lib.stride_tricks.sliding_window_view(sign * samples > 1.0, succession).all(axis=1)
-        expected = int(np.argmax(run)) if run.any() else -1
-    assert first_beyond(samples, sign, succession) == expected
+def _first_beyond(values, sign):
+    outside = sign * values > 1.0
+    if len(values) < 3:
+        return -1
+    runs = np.lib.stride_tricks.sliding_window_view(outside, 3).all(axis=1)
+    return int(np.argmax(runs)) if runs.any() else -1
+
+
+def _by_windows(raw, level, running, limits, shift, own, own_level):
+    """Return what is found with shares of the limits and sliding windows over whole arrays."""
+    raw = raw - shift
+    samples, level = raw - own, level - own_level
+    out, level_out = (np.where(running, limits[i + 1], limits[i]) for i in (0, 2))
+    if np.count_nonzero(np.isfinite(samples)) < 3:
+        return Departure.UNKNOWN, -1, -1
+    both = ((samples / out, Departure.SAMPLES_DOWN), (level / level_out, Departure.LEVEL_DOWN))
+    found = [
+        (_first_beyond(shares, sign), down + (2 if sign > 0.0 else 0))
+        for shares, down in both
+        for sign in (1.0, -1.0)
+        if _first_beyond(shares, sign) >= 0
+    ]
+    if not found:
+        first = _first_beyond(np.where(np.abs(raw) > out, 2.0, 0.0), 1.0)
+        if first >= 0:
+            return Departure.BEFORE, first, -1
+        return Departure.NONE, -1, int(np.nanargmax(np.abs(raw)))
+    k, what = min(found)
+    known = np.where(np.isfinite(samples), (1.0 if what >= Departure.SAMPLES_UP else -1.0) * samples, -np.inf)
+    return what, k, k + int(np.argmax(known[k:]))
+
+
+DISTANCES = st.sampled_from([0.0, -0.0, 4.0, 5.0, 5.0 + 1e-15, 5.1, 6.0, 9.0, -5.0, -6.0, -9.0, np.nan])
+
+
+@given(
+    st.lists(st.tuples(DISTANCES, DISTANCES, st.booleans()), max_size=25),
+    st.tuples(*[st.sampled_from([5.0, 7.5, 5.0 + 1e-15])] * 4),
+    st.tuples(*[st.sampled_from([0.0, 1.0, -2.5, np.nan])] * 3),
+    st.integers(0, 4),
+    st.integers(0, 4),
+)
+def test_a_departure_is_that_of_sliding_windows_over_the_shares(rows, limits, offsets, before, after):
+    raw, level, running = (np.array([row[i] for row in rows]) for i in range(3))
+    raw, level, running = raw.astype(float), level.astype(float), running.astype(bool)
+    part = slice(min(before, len(rows)), max(len(rows) - after, min(before, len(rows))))
+    expected = _by_windows(raw[part], level[part], running[part], limits, *offsets)
+    found = find_departure(raw, level, running, Limits(*limits), *offsets, part.start, part.stop, 3)
+    assert found == (expected[0], *(k + part.start if k >= 0 else -1 for k in expected[1:]))
+
+
+@given(st.integers(-3, 400), st.integers(-3, 400), st.integers(2, 60))
+def test_numbers_that_are_filled_evenly_are_those_of_linspace(first, last, count):
+    numbers = np.empty(count, dtype=np.int64)
+    filled = numbers[: fill_evenly(first, last, numbers)]
+    assert filled.tolist() == np.unique(np.linspace(first, last, count).astype(np.int64)).tolist()
 
 
 def _fitted(time, values, bend):
@@ -51,11 +97,3 @@ def test_the_bend_is_that_of_the_smallest_error_by_lstsq(seed, count, bends, noi
         return
     error = dict(zip(candidates.tolist(), fits, strict=True))[found][1]
     assert error <= min(upward, default=(np.inf, 0))[0] + 1e-11 * size
-
-
-@given(st.lists(VALUES, max_size=40), st.integers(1, 12))
-def test_the_median_of_known_values_is_numpys(values, least):
-    samples = np.array(values, dtype=np.float64)
-    known = samples[np.isfinite(samples)]
-    expected = np.median(known) if len(known) >= least else np.nan
-    np.testing.assert_array_equal(median_of_known(samples, np.empty(len(samples)), least), expected)
