@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.channels import ChannelMap, TablePins, read_channel_map
+from cdtool.derived import StoresDerived
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.registry import Registry
@@ -21,7 +22,7 @@ from cdtool.tables import Table, read_toml
 
 
 @dataclass(frozen=True)
-class MachineFile:
+class MachineFile(StoresDerived):
     """A validated machine file: the machine, its channels, and gains that differ from the defaults."""
 
     path: Path

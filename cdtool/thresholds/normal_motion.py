@@ -271,8 +271,8 @@ def _middles(values: FloatArray) -> FloatArray:
         return known
     # As numpy's median, without the time of its checks.
     middle, odd = divmod(len(values), 2)
-    parts: FloatArray = np.partition(values, (max(middle - 1, 0), middle), axis=0)
-    found: FloatArray = parts[middle] if odd else (parts[middle - 1] + parts[middle]) / 2.0
+    parts: FloatArray = np.partition(values, middle, axis=0)
+    found: FloatArray = parts[middle] if odd else (parts[:middle].max(axis=0) + parts[middle]) / 2.0
     return found
 
 
@@ -405,11 +405,13 @@ class NormalCurves(SendsFields):
         by_time, by_travel = self.by_time, self.by_travel
         # Without a curve by travel, nothing is known after the end of that by time.
         beyond = where.running if by_travel is not None else where.elapsed > by_time.end
-        mean, spread = np.full((2, by_time.mean.shape[1], len(where.elapsed)), np.nan)
+        mean, spread = np.empty((2, by_time.mean.shape[1], len(where.elapsed)))
         for j, found in enumerate(zip(mean, spread, strict=True)):
             look_up(where.elapsed, beyond, False, by_time.columns[j], by_time.end, least[j], *found)
             if by_travel is not None:
                 look_up(where.travel, beyond, True, by_travel.columns[j], np.inf, least[j], *found)
+            else:
+                mean[j, beyond] = spread[j, beyond] = np.nan
         return mean.T, spread.T
 
     def updated(self, values: FloatArray, clock: FloatArray, where: Progress, cap: float, forget: float | None) -> Self:

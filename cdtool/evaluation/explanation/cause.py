@@ -169,11 +169,12 @@ def _contact(
 ) -> tuple[Shift, ...]:
     speed, torque = tracks.get(("speed", leading)), tracks.get(("torque", leading))
     if speed is not None:
-        normal = speed.normal(*ended)
-        lost = -direction * speed.change(*ended)
+        normal, change = speed.normal(*ended), speed.change(*ended)
+        lost = -direction * change
         pushes = torque is None or direction * _peak(torque, alarm - 0.3, ended[1], direction) >= _LASTING
         if abs(normal) > 0.0 and lost >= _STOPPED * abs(normal) and pushes:
-            return tuple(_shift(track, ended) for track in (speed, torque) if track is not None)
+            slowed = Shift("speed", leading, speed.compared.unit, normal + change, normal)
+            return (slowed,) if torque is None else (slowed, _shift(torque, ended))
     for joint in joints:
         torque, position = tracks.get(("torque", joint)), tracks.get(("position", joint))
         if joint == leading or torque is None or position is None:

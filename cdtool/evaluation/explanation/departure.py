@@ -39,7 +39,7 @@ _OFFSET = 2.5
 # Spreads by which a channel may deviate from its own past without a departure.
 _OWN_REACH = 5.0
 # Length of the interval from which a run's own distance is computed, up to the search [s].
-_BASELINE = 0.5
+BASELINE = 0.5
 _ENOUGH = 10
 # A departure is brief if it is over after this time [s], followed by this much calm, within this many spreads.
 _BRIEF, _CALM, _BACK = 0.15, 0.03, 3.5
@@ -239,7 +239,7 @@ def tracks_of(recording: Recording, normal: NormalMotion | None, leading: str, b
         joints = [joint for joint in recording.joints if channel not in POSITIONS or joint != leading]
         if not joints:
             continue
-        start = begin - _BASELINE
+        start = begin - BASELINE
         if normal is None:
             compared = _own_past(recording[channel], start, begin, end)
         else:
@@ -255,8 +255,8 @@ def _track(channel: str, joint: str, j: int, compared: Comparison, first: int, b
     column = compared.derived(("column", j), lambda: ComparedChannel.of(channel, joint, compared, j))
     # The assumed start of the motion shifts a whole position: only a change of its distance counts.
     reach = math.inf if channel in POSITIONS else _OFFSET
-    past, scratch = slice(first, min(begin, after)), np.empty(begin - first)
-    own, own_level = (_own_offset(item[past], scratch, reach) for item in (column.raw, column.raw_level))
+    past = slice(first, min(begin, after))
+    own, own_level = own_distances(column.raw[past], column.raw_level[past], reach, np.empty(begin - first), _ENOUGH)
     return Track(column, first, after, own if channel in POSITIONS else 0.0, own, own_level)
 
 
@@ -279,44 +279,17 @@ def _own_normal(values: FloatArray, quiet: int) -> tuple[FloatArray, FloatArray]
     return np.broadcast_to(np.nanmean(past, axis=0), shape), np.broadcast_to(spread, shape)
 
 
-def _own_offset(past: FloatArray, scratch: FloatArray, reach: float) -> float:
-    """Return a run's own constant distance from the mean [spreads], up to `reach`.
-
-    With too little data it is 0, or unknown (NaN) if it is unlimited.
-    """
-    middle = median_of_known(past, scratch, _ENOUGH)
-    if math.isnan(middle):
-        return 0.0 if math.isfinite(reach) else math.nan
-    return float(min(max(middle, -reach), reach))
-
-
 def _began(time: FloatArray, shares: FloatArray) -> int:
     """Return where an upward departure, certain at the last sample, began: traced back to `_BACK_TO` of its limit.
 
     If a channel had drifted that far before, its departure began at the bend of its curve.
     """
-    last = len(shares) - 1
-    within = np.flatnonzero(~(shares > _BACK_TO))
-    first = min(int(within[-1]) + 1, last) if len(within) else 0
-    if time[last] - time[first] <= _SLOW:
-        return first
-    return max(first, _bend(time, shares, first))
-
-
-def _bend(time: FloatArray, shares: FloatArray, first: int) -> int:
-    """Return the sample, `first` or later, at which the shares leave a straight line for a steeper one upward.
-
-    By least squares over the samples from `_BEFORE_BEND` before `first` to the last.
-    """
-    begin = int(time.searchsorted(time[first] - _BEFORE_BEND))
+    since, known, bends = np.empty(len(shares)), np.empty(len(shares)), np.empty(_BENDS)
     candidates = np.empty(_BENDS, dtype=np.int64)
-    candidates = candidates[: fill_evenly(first, len(shares) - _SUCCESSION, candidates)]
-    bends = time[candidates] - time[begin]
-    since, shares = time[begin:] - time[begin], shares[begin:]
-    known = np.isfinite(shares)
-    if not known.all():
-        since, shares = since[known], shares[known]
-    return int(steepest_bend(since, shares, first, bends, candidates))
+    first, count, tried = prepare_bend(time, shares, since, known, bends, candidates)
+    if not tried:
+        return int(first)
+    return max(first, int(steepest_bend(since[:count], known[:count], first, bends[:tried], candidates[:tried])))
 
 
 def _side(value: float) -> str:
@@ -324,9 +297,11 @@ def _side(value: float) -> str:
 
 
 def _mean(values: FloatArray) -> float:
-    is_known = np.isfinite(values)
-    known = values if is_known.all() else values[is_known]
-    # The bits of `known.mean()`, without the time of its checks.
+    # The bits of `known.mean()`, without the time of its checks; a sum is finite only if all values are.
+    total = np.add.reduce(values)
+    if len(values) and math.isfinite(total):
+        return float(total / len(values))
+    known = values[np.isfinite(values)]
     return float(np.add.reduce(known) / len(known)) if len(known) else math.nan
 
 
@@ -360,6 +335,9 @@ def find_departure(  # noqa: C901, PLR0913  a kernel: one loop, arrays and numbe
         known += math.isfinite(sample)
         limit = limits.samples_running if running[k] else limits.samples
         level_limit = limits.level_running if running[k] else limits.level
+        if first < 0 and abs(sample) <= limit and abs(level) <= level_limit:  # most samples
+            samples_down = samples_up = level_down = level_up = 0
+            continue
         samples_down = samples_down + 1 if sample < -limit else 0
         level_down = level_down + 1 if level < -level_limit else 0
         samples_up = samples_up + 1 if sample > limit else 0
@@ -390,6 +368,63 @@ def find_departure(  # noqa: C901, PLR0913  a kernel: one loop, arrays and numbe
             if outside == succession:
                 return Departure.BEFORE.value, k - succession + 1, -1
     return found if first >= 0 else Departure.NONE.value, first, farthest
+
+
+@kernel(f"UniTuple(float64, 2)({READ_ONLY}, {READ_ONLY}, float64, float64[::1], int64)", exact=True)
+def own_distances(
+    raw: FloatArray, raw_level: FloatArray, reach: float, scratch: FloatArray, least: int
+) -> tuple[float, float]:
+    """Return a run's own constant distances from the mean [spreads], of samples and level (n,), each up to `reach`.
+
+    With fewer than `least` known values it is 0, or unknown (NaN) if it is unlimited. `scratch` (n,) is overwritten.
+    """
+    own = _limited(median_of_known(raw, scratch, least), reach)
+    return own, _limited(median_of_known(raw_level, scratch, least), reach)
+
+
+@kernel("float64(float64, float64)", exact=True, inline=True)
+def _limited(middle: float, reach: float) -> float:
+    if math.isnan(middle):
+        return 0.0 if math.isfinite(reach) else math.nan
+    return float(min(max(middle, -reach), reach))
+
+
+@kernel(
+    f"UniTuple(int64, 3)({READ_ONLY}, {READ_ONLY}, float64[::1], float64[::1], float64[::1], int64[::1])", exact=True
+)
+def prepare_bend(
+    time: FloatArray,
+    shares: FloatArray,
+    since: FloatArray,
+    known: FloatArray,
+    bends: FloatArray,
+    candidates: npt.NDArray[np.int64],
+) -> tuple[int, int, int]:
+    """Return the first sample above `_BACK_TO` up to the last one, and what it takes to find the bend from there on.
+
+    Fill the known shares with their times, from `_BEFORE_BEND` before that sample, and the samples tried as bends with
+    theirs; return the numbers of both, 0 if the departure was not slow.
+    """
+    last = len(shares) - 1
+    first = last
+    while first > 0 and shares[first - 1] > _BACK_TO:
+        first -= 1
+    if not shares[last] > _BACK_TO:
+        first = last
+    if time[last] - time[first] <= _SLOW:
+        return first, 0, 0
+    begin = first
+    while begin > 0 and time[begin - 1] >= time[first] - _BEFORE_BEND:
+        begin -= 1
+    count = 0
+    for k in range(begin, last + 1):
+        if math.isfinite(shares[k]):
+            since[count], known[count] = time[k] - time[begin], shares[k]
+            count += 1
+    tried = fill_evenly(first, last + 1 - _SUCCESSION, candidates)
+    for i in range(tried):
+        bends[i] = time[candidates[i]] - time[begin]
+    return first, count, tried
 
 
 @kernel("int64(int64, int64, int64[::1])", exact=True)

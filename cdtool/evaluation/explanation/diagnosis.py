@@ -10,7 +10,7 @@ import numpy as np
 
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.evaluation.explanation.cause import Cause, CauseKind, Event, likely_cause
-from cdtool.evaluation.explanation.departure import Track, tracks_of
+from cdtool.evaluation.explanation.departure import BASELINE, Track, tracks_of
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.explanation.transient import Transient
@@ -61,9 +61,10 @@ def diagnose_alarm(
     end = min(event.alarm + _AFTER, recording.end)
     motion = normal.motion if normal is not None else event.motion
     leading, direction = recording.joints[motion.joint], motion.direction or 1
-    tracks = tracks_of(recording, normal, leading, begin, end)
+    tracks: list[Track] = []
     cause = Cause(CauseKind.UNCLEAR)
-    if normal is not None or _steady(tracks, leading, begin):
+    if normal is not None or _steady(recording, leading, begin):
+        tracks = tracks_of(recording, normal, leading, begin, end)
         cause = likely_cause(recording, tracks, leading, direction, event, end)
     moved = list(own_past()) if normal is None else moved_channels(tracks, event.joint, begin, end)
     if cause.transient is not None:
@@ -95,15 +96,16 @@ def moved_channels(tracks: Sequence[Track], joint: str, begin: float, end: float
     return [item for item in found if (joint,) == WHOLE_MACHINE or item.joint == joint or not math.isnan(item.time)]
 
 
-def _steady(tracks: Sequence[Track], leading: str, begin: float) -> bool:
+def _steady(recording: Recording, leading: str, begin: float) -> bool:
     """Whether the leading joint ran steadily up to `begin` [s], so that its own past can serve as normal."""
-    for track in tracks:
-        if (track.channel, track.joint) == ("speed", leading):
-            past = track.compared.value[track.first : track.between(begin, begin).start]
-            known = past[np.isfinite(past)]
-            middle = abs(float(np.median(known))) if len(known) >= _ENOUGH else 0.0
-            return middle > 0.0 and float(np.ptp(known)) < _STEADY * middle
-    return False
+    if "speed" not in recording:
+        return False
+    series = recording["speed"]
+    past = series.values[slice(*np.searchsorted(series.time, (begin - BASELINE, begin)))]
+    known = past[:, recording.joints.index(leading)]
+    known = known[np.isfinite(known)]
+    middle = abs(float(np.median(known))) if len(known) >= _ENOUGH else 0.0
+    return middle > 0.0 and float(np.ptp(known)) < _STEADY * middle
 
 
 def _search_begin(recording: Recording, normal: NormalMotion, left: float) -> float:

@@ -17,9 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.detection import REASONS, Status, StatusArray
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.kernels import kernel
 from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
+
+_COLUMN = "Array(float64, 1, 'A', readonly=True)"
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,12 @@ class JointMargin:
         share = detection.exceedance()[:, self.joint] / detection.threshold.safety_factor
         return np.where(detection.statistic.status[:, self.joint] == Status.VALID, share, np.nan)
 
+    def _share(self, k: int) -> float:
+        """Return the share of an assessable sample."""
+        if self.detection.threshold is None:
+            return math.nan
+        return float(self.detection.exceedance()[k, self.joint] / self.detection.threshold.safety_factor)
+
     def moment(self, k: int) -> Moment:
         """Sample k."""
         statistic, band, j = self.detection.statistic, self.detection.band, self.joint
@@ -98,7 +106,7 @@ class JointMargin:
             return Moment(time, value, math.nan, math.nan, math.nan, reason)
         lower, upper = float(band.lower[k, j]), float(band.upper[k, j])
         limit = upper if upper - value <= value - lower else lower
-        return Moment(time, value, limit, float(self.margin[k]), float(self.share[k]))
+        return Moment(time, value, limit, float(np.minimum(upper - value, value - lower)), self._share(k))
 
     def moments(self, times: Sequence[float]) -> tuple[Moment, ...]:
         """Return the last sample at or before each of `times` [s]; in order of time, each sample once."""
@@ -112,10 +120,10 @@ class JointMargin:
 
         Missing samples do not interrupt a run and do not count.
         """
-        status = np.ascontiguousarray(self.detection.statistic.status[:, self.joint])
-        runs = np.empty((count_runs(self.margin, status, np.empty((0, 3), dtype=np.int64)), 3), dtype=np.int64)
-        count_runs(self.margin, status, runs)
-        return runs
+        statistic, band, j = self.detection.statistic, self.detection.band, self.joint
+        columns = statistic.values[:, j], band.lower[:, j], band.upper[:, j], statistic.status[:, j]
+        runs = np.empty((len(statistic.time) // 2 + 1, 3), dtype=np.int64)
+        return runs[: find_runs(*columns, runs)]
 
     def approach(self, start: float, end: float, debounce: int) -> Approach | None:
         """Return how near it came to an alarm from `start` to `end` [s]; None without limit or assessable sample."""
@@ -180,23 +188,29 @@ def _held(share: FloatArray, debounce: int) -> float:
     return math.nan if np.isnan(least).all() else float(np.nanmax(least))
 
 
-@kernel(f"int64({READ_ONLY}, Array(uint8, 1, 'C', readonly=True), int64[:, ::1])")
-def count_runs(margin: FloatArray, status: StatusArray, runs: npt.NDArray[np.int64]) -> int:
-    """Return the number of runs with a margin below 0, and fill `runs` (r, 3) with as many as it has rows.
+@kernel(f"int64({_COLUMN}, {_COLUMN}, {_COLUMN}, Array(uint8, 1, 'A', readonly=True), int64[:, ::1])", exact=True)
+def find_runs(
+    value: FloatArray, lower: FloatArray, upper: FloatArray, status: StatusArray, runs: npt.NDArray[np.int64]
+) -> int:
+    """Fill `runs` with the runs of assessable samples outside their limits, and return how many there are.
 
     First and last sample of each, and its number of samples; missing ones do not interrupt it and do not count.
     """
     found = count = first = last = 0
-    for k in range(len(margin) + 1):
-        if k < len(margin) and status[k] == Status.GAP:
+    for k in range(len(value)):
+        if status[k] == Status.GAP:
             continue
-        if k < len(margin) and margin[k] < 0.0:
+        above, below = upper[k] - value[k], value[k] - lower[k]
+        is_outside = (above < 0.0 and not math.isnan(below)) or (below < 0.0 and not math.isnan(above))
+        if is_outside and status[k] == Status.VALID:
             first = k if count == 0 else first
             last = k
             count += 1
         elif count > 0:
-            if found < len(runs):
-                runs[found] = first, last, count
+            runs[found] = first, last, count
             found += 1
             count = 0
+    if count > 0:
+        runs[found] = first, last, count
+        found += 1
     return found

@@ -17,7 +17,7 @@ from cdtool.thresholds.normal_motion import Comparison, NormalMotion
 _FITS = 4.0
 _BEFORE, _LEAST_SAMPLES = 1.0, 5
 # Alarms of other detectors are explained in much the same time: so much more of a channel is compared at once [s].
-_AROUND = 0.25
+_AROUND = 0.75
 
 
 class Absence(StrEnum):

@@ -86,30 +86,27 @@ def mark_kept(time: FloatArray, values: FloatArray, pixels: int, kept: BoolArray
     if len(time) <= 4 * pixels:
         kept[:] = True
         return
-    edges = np.searchsorted(time, np.linspace(time[0], time[-1], pixels + 1)[1:-1])
-    _mark_extremes(np.ascontiguousarray(values, dtype=np.float64), edges.astype(np.int64, copy=False), kept)
+    _mark_extremes(*(np.ascontiguousarray(item, dtype=np.float64) for item in (time, values)), pixels, kept)
 
 
-@kernel(f"void({READ_ONLY}, int64[::1], b1[::1])", exact=True)
-def _mark_extremes(values: FloatArray, edges: IndexArray, kept: BoolArray) -> None:
-    """Mark the ends of a curve, and the first smallest, largest and missing value of each column of pixels.
-
-    Each of `edges`, in increasing order, is the first sample of a column other than the first one.
-    """
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, int64, b1[::1])", exact=True)
+def _mark_extremes(time: FloatArray, values: FloatArray, pixels: int, kept: BoolArray) -> None:
+    """Mark the ends of a curve, and the first smallest, largest and missing value of each column of pixels."""
     kept[0] = kept[-1] = True
-    first = 0
-    for column in range(len(edges) + 1):
-        after = edges[column] if column < len(edges) else len(values)
+    width = (time[-1] - time[0]) / pixels
+    k = 0
+    for column in range(1, pixels + 1):
+        edge = column * width + time[0]
         least = greatest = missing = -1
-        for k in range(first, after):
+        while k < len(time) and (column == pixels or time[k] < edge):
             if np.isnan(values[k]):
                 missing = k if missing < 0 else missing
-                continue
-            if least < 0 or values[k] < values[least]:
-                least = k
-            if greatest < 0 or values[k] > values[greatest]:
-                greatest = k
-        for k in (least, greatest, missing):
-            if k >= 0:
-                kept[k] = True
-        first = after
+            else:
+                if least < 0 or values[k] < values[least]:
+                    least = k
+                if greatest < 0 or values[k] > values[greatest]:
+                    greatest = k
+            k += 1
+        for found in (least, greatest, missing):
+            if found >= 0:
+                kept[found] = True

@@ -6,7 +6,14 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.evaluation.explanation.departure import Departure, Limits, fill_evenly, find_departure, steepest_bend
+from cdtool.evaluation.explanation.departure import (
+    Departure,
+    Limits,
+    fill_evenly,
+    find_departure,
+    prepare_bend,
+    steepest_bend,
+)
 
 
 def _first_beyond(values, sign):
@@ -41,6 +48,7 @@ def _by_windows(raw, level, running, limits, shift, own, own_level):
     return what, k, k + int(np.argmax(known[k:]))
 
 
+SHARES = [0.0, 0.4, 0.4 + 1e-15, 0.9, 0.9, 0.9, 1.5, -2.0, np.inf, np.nan]
 DISTANCES = st.sampled_from([0.0, -0.0, 4.0, 5.0, 5.0 + 1e-15, 5.1, 6.0, 9.0, -5.0, -6.0, -9.0, np.nan])
 
 
@@ -97,3 +105,28 @@ def test_the_bend_is_that_of_the_smallest_error_by_lstsq(seed, count, bends, noi
         return
     error = dict(zip(candidates.tolist(), fits, strict=True))[found][1]
     assert error <= min(upward, default=(np.inf, 0))[0] + 1e-11 * size
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from([1e-3, 1e-3, 0.02, 0.2]), st.sampled_from(SHARES)), min_size=3, max_size=120),
+    st.lists(st.just((1e-3, 0.9)), max_size=60),
+)
+def test_the_bend_is_searched_among_the_samples_that_whole_arrays_have(rows, outside):
+    rows = [*rows, *outside, (1e-3, 1.5)]
+    time, shares = np.cumsum([row[0] for row in rows]), np.array([row[1] for row in rows])
+    last = len(shares) - 1
+    within = np.flatnonzero(~(shares > 0.4))
+    first = min(int(within[-1]) + 1, last) if len(within) else 0
+    since, known, bends, candidates = *np.empty((3, len(rows) + 60)), np.empty(60, dtype=np.int64)
+    found, count, tried = prepare_bend(time, shares, since, known, bends, candidates)
+    assert found == first
+    if time[last] - time[first] <= 0.03:
+        assert (count, tried) == (0, 0)
+        return
+    begin = int(np.searchsorted(time, time[first] - 0.1))
+    samples = begin + np.flatnonzero(np.isfinite(shares[begin:]))
+    expected = np.unique(np.linspace(first, len(shares) - 3, 60).astype(np.int64))
+    assert since[:count].tolist() == (time - time[begin])[samples].tolist()
+    assert known[:count].tolist() == shares[samples].tolist()
+    assert candidates[:tried].tolist() == expected.tolist()
+    assert bends[:tried].tolist() == (time - time[begin])[expected].tolist()

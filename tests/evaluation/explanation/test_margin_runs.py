@@ -1,4 +1,4 @@
-"""Runs outside the band: the compiled count finds those of whole arrays."""
+"""Runs outside the band: the compiled search finds those of whole arrays."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.detection import Status
-from cdtool.evaluation.explanation.margin import count_runs
+from cdtool.evaluation.explanation.margin import find_runs
 
-MARGINS = st.sampled_from([1.0, 0.0, -0.0, -1e-300, -1.0, -np.inf, np.nan])
+VALUES = st.sampled_from([1.0, 0.0, -0.0, 1.0 + 1e-15, -1.0, 2.0, -np.inf, np.inf, np.nan])
+LIMITS = st.sampled_from([1.0, 1.0, -1.0, np.inf, -np.inf, np.nan])
 
 
-def _by_whole_arrays(margin, status):
+def _by_whole_arrays(value, lower, upper, status):
+    with np.errstate(invalid="ignore"):
+        margin = np.where(status == Status.VALID, np.minimum(upper - value, value - lower), np.nan)
     present = np.flatnonzero(status != Status.GAP)
     outside = np.concatenate(([False], margin[present] < 0.0, [False]))
     edges = np.flatnonzero(np.diff(outside.astype(np.int8)))
@@ -20,12 +23,11 @@ def _by_whole_arrays(margin, status):
     return np.column_stack((present[first], present[after - 1], after - first))
 
 
-@given(st.lists(st.tuples(MARGINS, st.sampled_from([0, 0, 3, 3, 4])), max_size=40))
+@given(st.lists(st.tuples(VALUES, LIMITS, LIMITS, st.sampled_from([0, 0, 0, 3, 4])), max_size=40))
 def test_runs_outside_the_band_are_those_of_whole_arrays(rows):
-    margin = np.array([row[0] for row in rows], dtype=np.float64)
-    status = np.array([row[1] for row in rows], dtype=np.uint8)
-    expected = _by_whole_arrays(margin, status)
-    runs = np.full((len(rows), 3), -1, dtype=np.int64)
-    assert count_runs(margin, status, runs) == len(expected)
+    value, lower, upper = (np.array([row[i] for row in rows], dtype=np.float64) for i in range(3))
+    status = np.array([row[3] for row in rows], dtype=np.uint8)
+    expected = _by_whole_arrays(value, lower, upper, status)
+    runs = np.full((len(rows) // 2 + 1, 3), -1, dtype=np.int64)
+    assert find_runs(value, lower, upper, status, runs) == len(expected)
     np.testing.assert_array_equal(runs[: len(expected)], expected)
-    assert count_runs(margin, status, np.empty((0, 3), dtype=np.int64)) == len(expected)
