@@ -338,11 +338,12 @@ def _belonging(alarm: Alarm, detection: Detection, matching: Matching) -> tuple[
     for item in matching.matches:
         if item.alarm == alarm:
             return item.contact, "detection"
-    if alarm in matching.false_alarms:
+    earlier = [item.contact for item in matching.matches if item.contact.start - item.contact.uncertainty <= alarm.time]
+    # Alarms of several joints at much the same time count as one false alarm.
+    if alarm in matching.false_alarms or not earlier:
         recording = detection.operation.recording
         known = bool(matching.matches) or any(channel in recording for channel in GROUND_TRUTH)
         return None, "false alarm" if known else "alarm"
-    earlier = [item.contact for item in matching.matches if item.contact.start - item.contact.uncertainty <= alarm.time]
     return max(earlier, key=lambda contact: contact.start), "further alarm"
 
 

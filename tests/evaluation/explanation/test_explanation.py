@@ -270,6 +270,14 @@ def test_without_ground_truth_an_alarm_is_not_called_false():
     assert isinstance(found, AlarmExplanation) and found.role == "false alarm"
 
 
+def test_alarms_of_two_joints_that_count_as_one_false_alarm_are_both_explained_as_false():
+    item = detection(np.column_stack((pulse(1000, 30), pulse(1005, 30))), limits=(1.0, 1.0))
+    found = matching(item, CONTACT)
+    assert (len(item.verdict.alarms), len(found.false_alarms)) == (2, 1)
+    roles = [part.role for part in explain(item, found, NINE) if isinstance(part, AlarmExplanation)]
+    assert roles == ["false alarm", "false alarm"]
+
+
 def test_an_alarm_that_is_latched_still_explains_the_contact_it_detected():
     item = detection(pulse(2800, 30) + pulse(3020, 30))
     assert len(item.verdict.alarms) == 1
