@@ -240,7 +240,26 @@ def levels(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def levels_of(series: Series) -> FloatArray:
-    """Return the levels of a channel (n, J), see `levels`; computed once and stored with it, read-only."""
+    """Return the levels of a channel, computed once and stored with it.
+
+    Parameters
+    ----------
+    series : Series
+        The channel.
+
+    Returns
+    -------
+    ndarray of float, shape (n, J)
+        Its levels, read-only.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.arange(100) * 1e-3
+    >>> series = Series(time, np.where(time < 0.05, 0.0, 10.0), "N")
+    >>> levels_of(series)[[49, 99], 0].round(6).tolist()
+    [0.0, 10.0]
+    """
     return series.derived("levels", lambda: _frozen(_levels(series.time, series.values, series.period)))
 
 
@@ -430,16 +449,10 @@ class NormalCurves(SendsFields):
     def distances(self, values: FloatArray, where: Progress) -> tuple[FloatArray, FloatArray]:
         """Return how far a run is from the mean for 3 samples (J,) [spreads]: while accelerating, and after it."""
         mean, spread = self._looked_up(where, np.full(values.shape[1], -np.inf))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            off = np.abs(values - mean) / spread
-        off = np.where(np.isfinite(off), off, 0.0)
-        kept = np.zeros_like(off)
-        if len(off) >= _SUCCESSION:
-            kept[_SUCCESSION - 1 :] = np.lib.stride_tricks.sliding_window_view(off, _SUCCESSION, axis=0).min(axis=-1)
-        running = where.running if self.by_travel is not None else np.zeros(len(off), dtype=bool)
-        parts = kept[~running], kept[running]
-        by_time, along = (part.max(axis=0, initial=0.0) for part in parts)
-        return by_time, along
+        running = where.running if self.by_travel is not None else np.zeros(len(values), dtype=bool)
+        columns = zip(values.T, mean.T, spread.T, strict=True)
+        found = np.array([farthest_lasting(*column, running, _SUCCESSION) for column in columns])
+        return found[:, 0], found[:, 1]
 
     @cached_property
     def reach(self) -> FloatArray:
@@ -466,6 +479,31 @@ class NormalCurves(SendsFields):
         if any(item.shape != by_time.mean.shape[1:] or not np.isfinite(item).all() for item in farthest):
             raise ValueError("distances of other joints than the curves'")
         return cls(by_time, by_travel, *farthest)
+
+
+@kernel(
+    "UniTuple(float64, 2)(Array(float64, 1, 'A', readonly=True), Array(float64, 1, 'A', readonly=True), "
+    "Array(float64, 1, 'A', readonly=True), Array(bool, 1, 'C', readonly=True), int64)",
+    exact=True,
+)
+def farthest_lasting(
+    values: FloatArray, mean: FloatArray, spread: FloatArray, running: BoolArray, succession: int
+) -> tuple[float, float]:
+    """Return the largest distance from the mean [spreads] that `succession` consecutive samples all have.
+
+    Those that end before the axis is `running`, and those that end there. Distances that are not known count as 0.
+    """
+    before = after = 0.0
+    for k in range(succession - 1, len(values)):
+        least = np.inf
+        for i in range(k - succession + 1, k + 1):
+            off = abs(values[i] - mean[i]) / spread[i]
+            least = min(least, off if math.isfinite(off) else 0.0)
+        if running[k]:
+            after = max(after, least)
+        else:
+            before = max(before, least)
+    return before, after
 
 
 def _in_spreads(off: FloatArray, spread: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from cdtool.derived import SendsFields
 from cdtool.detection import Signal
-from cdtool.kernels import read_only
+from cdtool.kernels import READ_ONLY, kernel, read_only
 from cdtool.motion.progress import Progress
 from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray
@@ -186,18 +186,38 @@ def resample(signal: Signal, where: Progress, curve: Curve, axis: FloatArray) ->
     with fewer samples than grid points, each sample represents those that it has passed since the last one.
     """
     result = np.full((len(curve.count), signal.values.shape[1]), np.nan)
-    grid = curve.grid
+    located = np.isfinite(where.elapsed) & np.isfinite(axis)
+    along, values = np.empty((2, len(axis)))
     for j in range(result.shape[1]):
-        use = np.flatnonzero(signal.valid[:, j] & np.isfinite(where.elapsed) & np.isfinite(axis))
-        if not len(use):
-            continue
-        along = axis[use]
-        passing = np.concatenate(([True], along[1:] > np.maximum.accumulate(along)[:-1]))
-        along, values = along[passing], signal.values[use, j][passing]
-        at = np.searchsorted(along, grid, side="left")
+        count = first_passes(axis, signal.values[:, j], signal.valid[:, j] & located, along, values)
         # After an interval without valid samples the next sample is too far away to represent the grid point.
-        usual = float(np.median(np.diff(along))) if len(along) > 1 else 0.0
-        reached = np.flatnonzero(at < len(along))
-        near = reached[along[at[reached]] - grid[reached] <= _FURTHEST_STEPS * max(curve.step, usual)]
-        result[near, j] = values[at[near]]
+        usual = float(np.median(np.diff(along[:count]))) if count > 1 else 0.0
+        nearest = _FURTHEST_STEPS * max(curve.step, usual)
+        fill_passed(curve.grid, along[:count], values[:count], nearest, result[:, j])
     return result
+
+
+@kernel(
+    f"int64({READ_ONLY}, Array(float64, 1, 'A', readonly=True), Array(bool, 1, 'C', readonly=True), float64[::1], "
+    "float64[::1])",
+    exact=True,
+)
+def first_passes(axis: FloatArray, samples: FloatArray, use: BoolArray, along: FloatArray, values: FloatArray) -> int:
+    """Fill locations and values of the samples that are farther than all before them; return how many there are."""
+    count = 0
+    for k in range(len(axis)):
+        if use[k] and (count == 0 or axis[k] > along[count - 1]):
+            along[count], values[count] = axis[k], samples[k]
+            count += 1
+    return count
+
+
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64, float64[:])", exact=True)
+def fill_passed(grid: FloatArray, along: FloatArray, values: FloatArray, nearest: float, result: FloatArray) -> None:
+    """Fill the value of the first location at or after each grid point, if it is within `nearest` of it."""
+    at = 0
+    for k in range(len(grid)):
+        while at < len(along) and along[at] < grid[k]:
+            at += 1
+        if at < len(along) and along[at] - grid[k] <= nearest:
+            result[k] = values[at]

@@ -289,7 +289,7 @@ def _began(time: FloatArray, shares: FloatArray) -> int:
     first, count, tried = prepare_bend(time, shares, since, known, bends, candidates)
     if not tried:
         return int(first)
-    return max(first, int(steepest_bend(since[:count], known[:count], first, bends[:tried], candidates[:tried])))
+    return int(max(first, steepest_bend(since[:count], known[:count], first, bends[:tried], candidates[:tried])))
 
 
 def _side(value: float) -> str:
