@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from cdtool.clock import previous_value
-from cdtool.clock.held_samples import READ_MARKS, READ_TABLE, is_held, is_on_clock, newest_at
+from cdtool.clock.held_samples import READ_MARKS, READ_TABLE, fill_held, is_on_clock
 from cdtool.clock.lost_samples import lost_samples
-from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.kernels import kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 if TYPE_CHECKING:
@@ -417,25 +416,8 @@ def held_on(clock: FloatArray, series: Series) -> tuple[FloatArray, BoolArray]:
         return hold_last(series.values, missing), missing
     held = np.empty((len(clock), series.joint_count))
     missing = np.empty(held.shape, dtype=np.bool_)
-    _fill_held(series.time, series.values, usual_steps(series.time), np.ascontiguousarray(clock), held, missing)
+    fill_held(series.time, series.values, np.ascontiguousarray(clock), True, held, missing)
     return held, missing
-
-
-@kernel(f"void({READ_ONLY}, {READ_TABLE}, {READ_ONLY}, {READ_ONLY}, float64[:, ::1], b1[:, ::1])")
-def _fill_held(
-    time: FloatArray, values: FloatArray, usual: FloatArray, clock: FloatArray, held: FloatArray, missing: BoolArray
-) -> None:
-    at = -1
-    for k in range(len(clock)):
-        at = newest_at(time, clock[k], at)
-        fresh = is_held(time, usual, clock[k], at)
-        for j in range(values.shape[1]):
-            present = fresh and math.isfinite(values[at, j])
-            missing[k, j] = not present
-            if present:
-                held[k, j] = values[at, j]
-            else:
-                held[k, j] = held[k - 1, j] if k > 0 else 0.0
 
 
 def missing_after_first(missing: BoolArray) -> BoolArray:
