@@ -204,8 +204,7 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     (0.58, 2.0)
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
-    sums = np.empty((5, samples)), np.empty((4, 4)), np.empty((4, values.shape[1]))
-    _polynomial_rates(time, np.ascontiguousarray(values), samples, *sums, first, second)
+    _polynomial_rates(time, np.ascontiguousarray(values), samples, np.empty((5, samples)), first, second)
     return first, second
 
 
@@ -296,29 +295,19 @@ def _fill_starts(time: FloatArray, missing: BoolArray, longest_gap: FloatArray, 
             starts[k, j] = start
 
 
-@kernel(f"void({READ_ONLY}, {READ_TABLE}, int64, {', '.join(5 * ['float64[:, ::1]'])})")
-def _polynomial_rates(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
-    time: FloatArray,
-    values: FloatArray,
-    samples: int,
-    powers: FloatArray,
-    matrix: FloatArray,
-    right: FloatArray,
-    first: FloatArray,
-    second: FloatArray,
+@kernel(f"void({READ_ONLY}, {READ_TABLE}, int64, float64[:, ::1], float64[:, ::1], float64[:, ::1])")
+def _polynomial_rates(
+    time: FloatArray, values: FloatArray, samples: int, powers: FloatArray, first: FloatArray, second: FloatArray
 ) -> None:
     """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting.
 
-    All joints have the same matrix (4, 4); `right` (4, J) are their right-hand sides. Both are overwritten.
+    All joints have the same matrix, which is eliminated once. `powers` (5, samples) of x are overwritten.
     """
-    joints = values.shape[1]
     for k in range(len(time)):
         start = k - samples + 1 if k >= samples else 0
         span = time[k] - time[start]
         if k - start < 4 or not span > 0.0:
             continue
-        s1 = s2 = s3 = s4 = s5 = s22 = s33 = 0.0
-        right[:] = 0.0
         count = k + 1 - start
         for i in range(count):
             x = (time[start + i] - time[k]) / span
@@ -327,35 +316,37 @@ def _polynomial_rates(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by
             powers[2, i] = x * x * x
             powers[3, i] = x * (x * x * x)
             powers[4, i] = (x * x) * (x * x * x)
+        s1 = s2 = s3 = s4 = s5 = s22 = s33 = 0.0
         for i in range(count):
-            x, square, cube = powers[0, i], powers[1, i], powers[2, i]
-            s1 += x
-            s2 += square
-            s3 += cube
+            s1 += powers[0, i]
+            s2 += powers[1, i]
+            s3 += powers[2, i]
             s4 += powers[3, i]
             s5 += powers[4, i]
-            s22 += square * square
-            s33 += cube * cube
-            for j in range(joints):
+            s22 += powers[1, i] * powers[1, i]
+            s33 += powers[2, i] * powers[2, i]
+        # Rows (count, s1, s2, s3), (s1, s2, s3, s4), (s2, s3, s22, s5), (s3, s4, s5, s33): f are the factors of a row.
+        f10, f20, f30 = s1 / count, s2 / count, s3 / count
+        m11, m12, m13 = s2 - f10 * s1, s3 - f10 * s2, s4 - f10 * s3
+        m21, m22, m23 = s3 - f20 * s1, s22 - f20 * s2, s5 - f20 * s3
+        m31, m32, m33 = s4 - f30 * s1, s5 - f30 * s2, s33 - f30 * s3
+        f21, f31 = m21 / m11, m31 / m11
+        m22, m23 = m22 - f21 * m12, m23 - f21 * m13
+        m32, m33 = m32 - f31 * m12, m33 - f31 * m13
+        f32 = m32 / m22
+        m33 -= f32 * m23
+        for j in range(values.shape[1]):
+            r0 = r1 = r2 = r3 = 0.0
+            for i in range(count):
                 change = values[start + i, j] - values[k, j]
-                right[0, j] += change
-                right[1, j] += x * change
-                right[2, j] += square * change
-                right[3, j] += cube * change
-        matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3] = float(count), s1, s2, s3
-        matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3] = s1, s2, s3, s4
-        matrix[2, 0], matrix[2, 1], matrix[2, 2], matrix[2, 3] = s2, s3, s22, s5
-        matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[3, 3] = s3, s4, s5, s33
-        for pivot in range(4):
-            for row in range(pivot + 1, 4):
-                factor = matrix[row, pivot] / matrix[pivot, pivot]
-                for column in range(pivot, 4):
-                    matrix[row, column] -= factor * matrix[pivot, column]
-                for j in range(joints):
-                    right[row, j] -= factor * right[pivot, j]
-        for j in range(joints):
-            cubic = right[3, j] / matrix[3, 3]
-            quadratic = (right[2, j] - matrix[2, 3] * cubic) / matrix[2, 2]
-            linear = (right[1, j] - matrix[1, 2] * quadratic - matrix[1, 3] * cubic) / matrix[1, 1]
+                r0 += change
+                r1 += powers[0, i] * change
+                r2 += powers[1, i] * change
+                r3 += powers[2, i] * change
+            r1, r2, r3 = r1 - f10 * r0, r2 - f20 * r0, r3 - f30 * r0
+            r2, r3 = r2 - f21 * r1, r3 - f31 * r1
+            cubic = (r3 - f32 * r2) / m33
+            square = (r2 - m23 * cubic) / m22
+            linear = (r1 - m12 * square - m13 * cubic) / m11
             first[k, j] = linear / span
-            second[k, j] = 2.0 * quadratic / (span * span)
+            second[k, j] = 2.0 * square / (span * span)

@@ -19,6 +19,7 @@ import numpy as np
 
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.machines import tree_rows as rows
+from cdtool.machines.tree_inertia_kernel import sweep_inertia
 from cdtool.machines.tree_inverse_kernel import sweep_inverse_dynamics, sweep_jacobian
 from cdtool.machines.tree_kernel import sweep_energies, sweep_momentum
 from cdtool.recording import FloatArray
@@ -117,11 +118,15 @@ class KinematicTree:
         """Return M(q), (n, J, J), drive inertias on its diagonal. Raises UsageError if shapes do not fit."""
         position = self._table("position", position)
         matrix = np.empty((*position.shape, len(self.joints)))
-        for column in range(len(self.joints)):
-            unit = np.zeros_like(position)
-            unit[:, column] = 1.0
-            matrix[:, :, column] = self.inertia_times(position, unit)
+        sweep_inertia(self._bodies, self._route, position, np.empty_like(position), matrix)
         return matrix
+
+    def inertia_diagonal(self, position: FloatArray) -> FloatArray:
+        """Return the diagonal of M(q), (n, J), drive inertias included. Raises UsageError if shapes do not fit."""
+        position = self._table("position", position)
+        diagonal, none = np.empty_like(position), np.empty((0, 0, 0))
+        sweep_inertia(self._bodies, self._route, position, diagonal, none)
+        return diagonal
 
     def contact_jacobian(self, position: FloatArray, link: str, point: tuple[float, float, float]) -> FloatArray:
         """Return J_c (n, 6, J): linear, then angular velocity of a point of a link per joint speed, base axes (2.2).
@@ -178,6 +183,7 @@ class KinematicTree:
             row[rows.COLUMN] = self.order.index(joint.name)
             row[rows.BEFORE] = last if follows else last + 1
             row[rows.COPY_OF] = -1 if follows else parent
+            row[rows.PARENT] = joint.parent
             last = int(row[rows.BEFORE]) + 1
             own.append(last)
         return table

@@ -36,8 +36,9 @@ SLOT = 29 * BLOCK
 # Columns of the constants (one row per joint): R and R' t of its placement, own and moved mass, s, upper triangle of I.
 ROTATION, TRANSLATION, MASS, MOMENT, INERTIA, DRIVE, SLIDES, MOVED_MASS, CONSTANTS = 0, 9, 12, 13, 16, 22, 23, 24, 25
 
-# Columns of the route (one row per joint): the recording's column, the slot before its own, its original (-1: none).
-COLUMN, BEFORE, COPY_OF, STEPS = 0, 1, 2, 3
+# Columns of the route (one row per joint): the recording's column, the slot before its own, its original (-1: none),
+# and the row of the parent (-1: the base).
+COLUMN, BEFORE, COPY_OF, PARENT, STEPS = 0, 1, 2, 3, 4
 
 ROW = "Array(float64, 1, 'C')"
 READ_TABLE = "Array(float64, 2, 'C', readonly=True)"
