@@ -137,6 +137,8 @@ def require_positive(detector: object, *names: str) -> None:
     """
     for name in names:
         value = getattr(detector, name)
+        if isinstance(value, float) and 0.0 < value < math.inf:
+            continue
         numbers = np.atleast_1d(value)
         if not (numbers.size and np.all(np.isfinite(numbers) & (numbers > 0.0))):
             raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed, or one per joint")
@@ -172,7 +174,7 @@ def per_joint(value: Gain, joints: int) -> FloatArray:
     if isinstance(value, tuple) and len(value) != joints:
         many = "the whole machine" if joints == 1 else f"{joints} joints"
         raise ConfigurationError(f"a gain has {len(value)} values for {many}", "give one number, or one per joint")
-    return np.array(np.broadcast_to(value, joints), dtype=np.float64)
+    return np.full(joints, value, dtype=np.float64)
 
 
 def of_joint(detector: AnyDetector, joint: int, joints: int) -> AnyDetector:
@@ -204,7 +206,11 @@ def of_joint(detector: AnyDetector, joint: int, joints: int) -> AnyDetector:
     Momentum(bandwidth=60.0)
     """
     gains = {item.name: getattr(detector, item.name) for item in fields(detector)}
-    return replace(detector, **{name: float(per_joint(value, joints)[joint]) for name, value in gains.items()})
+    numbers = {
+        name: value if isinstance(value, float) else float(per_joint(value, joints)[joint])
+        for name, value in gains.items()
+    }
+    return replace(detector, **numbers)
 
 
 def single(value: Gain) -> float:
@@ -230,7 +236,7 @@ def single(value: Gain) -> float:
     >>> single((80.0,))
     80.0
     """
-    return float(per_joint(value, 1)[0])
+    return value if isinstance(value, float) else float(per_joint(value, 1)[0])
 
 
 def require_channels(detector: Detector, recording: Recording, *more: str) -> None:
@@ -461,7 +467,7 @@ def for_every_joint(missing: BoolArray) -> BoolArray:
     Returns
     -------
     ndarray of bool, shape (n, J)
-        True for all joints wherever it is True for one.
+        True for all joints wherever it is True for one. If no sample is missing, it is `missing` itself, not a copy.
 
     Examples
     --------
@@ -469,6 +475,8 @@ def for_every_joint(missing: BoolArray) -> BoolArray:
     >>> for_every_joint(np.array([[False, True], [False, False]])).tolist()
     [[True, True], [False, False]]
     """
+    if not missing.any():
+        return missing
     return np.repeat(np.any(missing, axis=1, keepdims=True), missing.shape[1], axis=1)
 
 

@@ -19,9 +19,8 @@ import numpy as np
 
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.machines import tree_rows as rows
-from cdtool.machines.tree_inertia_kernel import sweep_inertia
 from cdtool.machines.tree_inverse_kernel import sweep_inverse_dynamics, sweep_jacobian
-from cdtool.machines.tree_kernel import sweep_energies, sweep_momentum
+from cdtool.machines.tree_kernel import sweep_energies, sweep_inertia, sweep_inertia_times, sweep_momentum
 from cdtool.recording import FloatArray
 
 
@@ -102,7 +101,10 @@ class KinematicTree:
 
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
         """Return M(q) x (n, J) for a vector x per sample, without M; raises UsageError if shapes do not fit."""
-        return self.momentum_terms(position, vector)[0]
+        position, vector = self._table("position", position), self._table("speed", vector, position)
+        product = np.empty_like(position)
+        sweep_inertia_times(self._bodies, self._route, position, vector, product)
+        return product
 
     def inverse_dynamics(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Return M qdd + C qd + g, (n, J): torques of the motion without friction and contact, drives included.

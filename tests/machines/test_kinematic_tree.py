@@ -160,7 +160,7 @@ def test_inertia_matrix_and_jacobian_are_those_of_pinocchio(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_columns_of_the_inertia_matrix_are_the_momenta_of_unit_speeds(seed):
     tree = random_tree(seed)
-    position, _ = states(tree, 75, seed)
+    position, speed = states(tree, 75, seed)
     matrix = tree.inertia_matrix(position)
     for column in range(len(tree.order)):
         unit = np.zeros_like(position)
@@ -169,6 +169,7 @@ def test_the_columns_of_the_inertia_matrix_are_the_momenta_of_unit_speeds(seed):
         assert np.max(error) < 2e-15 * np.max(np.abs(matrix))
     assert np.array_equal(matrix, matrix.transpose(0, 2, 1))
     assert np.array_equal(tree.inertia_diagonal(position), np.einsum("nii->ni", matrix))
+    assert np.array_equal(tree.inertia_times(position, speed), tree.momentum_terms(position, speed)[0])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
