@@ -173,6 +173,7 @@ def _emit_add_products() -> Callable[..., Any]:
     from numba.core import cgutils
     from numba.extending import intrinsic
 
+    build: Any = cgutils
     vector = ir.VectorType(ir.DoubleType(), LANES)
 
     def emit(_: Any, sums: Any, at: Any, first: Any, first_at: Any, second: Any, second_at: Any, count: Any) -> Any:
@@ -182,8 +183,8 @@ def _emit_add_products() -> Callable[..., Any]:
                 return builder.gep(array.data, [arguments[number + 1]])
 
             total, (a, b) = builder.bitcast(place(0), vector.as_pointer()), (place(2), place(4))
-            kept = cgutils.alloca_once_value(builder, builder.load(total, align=8))
-            with cgutils.for_range(builder, arguments[6]) as loop:
+            kept = build.alloca_once_value(builder, builder.load(total, align=8))
+            with build.for_range(builder, arguments[6]) as loop:
                 step = [builder.mul(loop.index, ir.Constant(loop.index.type, STRIDE))]
                 one, other = (
                     builder.load(builder.bitcast(builder.gep(item, step), vector.as_pointer()), align=8)

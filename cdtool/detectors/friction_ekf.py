@@ -163,15 +163,15 @@ class FrictionEkf:
             np.where(unknown, np.nan, item) if unknown.any() else item for item in (drive.speed, drive.position)
         )
         # Joint by joint in memory, as the filter reads and writes it.
-        inputs = (np.ascontiguousarray(item.T) for item in (speed, position, missing, acceleration.values))
+        inputs = (np.ascontiguousarray(item.T) for item in (speed, missing, acceleration.values))
         friction = np.empty(speed.shape[::-1])
         status = np.empty(friction.shape, dtype=np.uint8)
         for j, (equation, *own) in enumerate(zip(equations, *inputs, strict=True)):
-            own_speed, own_position, own_missing, own_acceleration = own
+            own_speed, own_missing, own_acceleration = own
             motion = JointMeasurements(
                 drive.time,
                 own_speed,
-                own_position,
+                position[:, j],
                 own_missing.view(np.uint8),
                 acceleration.time,
                 own_acceleration,

@@ -219,15 +219,15 @@ def _fill_steps(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
             # Over a gap the balance is based on held values: it is interpolated by a straight line.
             for i in range(joints):
                 forces[i * BLOCK + lane] = 0.5 * (balance[k, i] + balance[last, i]) * elapsed[lane]
+        now, before = inertia[k - first], inertia[last - first]
         for i in range(joints):
-            for j in range(i + 1):
-                mean = 0.5 * (inertia[k - first, i, j] + inertia[last - first, i, j])
-                scaled[(i * joints + j) * BLOCK + lane] = mean / (root[i] * root[j])
-                forces[i * BLOCK + lane] -= mean * (speed[k, j] - speed[last, j])
-                if i != j:
-                    forces[j * BLOCK + lane] -= mean * (speed[k, i] - speed[last, i])
-        for i in range(joints):
-            forces[i * BLOCK + lane] /= elapsed[lane] * root[i]
+            force, scale = forces[i * BLOCK + lane], 1.0 / root[i]
+            for j in range(joints):
+                mean = 0.5 * (now[i, j] + before[i, j])
+                force -= mean * (speed[k, j] - speed[last, j])
+                if j <= i:
+                    scaled[(i * joints + j) * BLOCK + lane] = mean * scale / root[j]
+            forces[i * BLOCK + lane] = force * scale / elapsed[lane]
 
 
 @kernel(f"float64({_MATRICES}, int64, int64, {READ_ONLY}, float64[:, :, ::1])")

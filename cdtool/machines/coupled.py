@@ -51,7 +51,7 @@ class CoupledMachine(JointMachine, ABC):
 
     def inertia_diagonal(self, position: FloatArray) -> FloatArray:
         """Return the diagonal of M (n, J)."""
-        return np.einsum("njj->nj", self.inertia_matrix(position))
+        return np.asarray(np.einsum("njj->nj", self.inertia_matrix(position)))
 
     @abstractmethod
     def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -301,7 +301,7 @@ def _put_body(body: FloatArray, pair: FloatArray) -> None:
 
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _unit_momentum(body: FloatArray, pair: FloatArray) -> None:
-    """Momentum of everything that a joint moves at a speed of 1 of the joint alone, and the joint's own inertia.
+    """Momentum of everything that a joint moves at a speed of 1, the other joints at rest; the joint's own inertia.
 
     Turning: l = z x s, k = I z; sliding: l = m z, k = s x z.
     """

@@ -175,10 +175,7 @@ def return_load(slots: FloatArray, origin: int, copy: int) -> None:
 
 @kernel(f"void({READ_ONLY}, {ROW})")
 def carry_load(body: FloatArray, pair: FloatArray) -> None:
-    """What a joint moves, added to its parent's load: l_p += R l, k_p += R (k + t x l), s_p += R (s + m t).
-
-    Force and torque, in place of l and k, are carried by the same equations.
-    """
+    """What a joint moves, added to its parent's load: l_p += R l, k_p += R (k + t x l), s_p += R (s + m t)."""
     rotation = rotation_of(body)
     mass, (tx, ty, tz) = body[MOVED_MASS], vector_of(body, TRANSLATION)
     for j in range(BLOCK):

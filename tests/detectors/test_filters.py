@@ -174,7 +174,7 @@ def test_starts_and_what_has_not_settled_are_the_bits_of_masks_over_arrays(seed)
 
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("cutoff", [(5.0, 5.0, 5.0), (5.0, 80.0, 400.0)])
-def test_joints_together_have_the_bits_of_each_joint_alone(seed, cutoff):
+def test_joints_together_have_the_bits_of_one_joint_at_a_time(seed, cutoff):
     time, lost = random_clock_and_marks(seed)
     values = np.random.default_rng(seed).normal(size=lost.shape)
     together = *low_pass(time, values, lost, np.array(cutoff)), *polynomial_rates(time, values, 21)
