@@ -373,14 +373,16 @@ def _polynomial_rates(  # noqa: PLR0913  a kernel: one loop, arrays one by one
                 column[i] = values[min(max(begin - before + i, 0), len(time) - 1), j]
             for k in range(_R0, _R3 + BLOCK):
                 rows[k] = 0.0
-            for m in range(samples):
-                own = powers[m * _POWERS : (m + 1) * _POWERS]
+            # Two samples of a window at once; the newest one, whose change is 0, may be left out.
+            for m in range(0, samples - 1, 2):
+                own, newest = powers[m * _POWERS : (m + 2) * _POWERS], column[before : before + BLOCK]
+                pair = column[m : m + BLOCK + 1]
                 for k in range(BLOCK):
-                    change = column[m + k] - column[before + k]
-                    rows[_R0 + k] += own[_WEIGHT + k] * change
-                    rows[_R1 + k] += own[_X + k] * change
-                    rows[_R2 + k] += own[_SQUARE + k] * change
-                    rows[_R3 + k] += own[_CUBE + k] * change
+                    older, newer = pair[k] - newest[k], pair[k + 1] - newest[k]
+                    rows[_R0 + k] = rows[_R0 + k] + own[_WEIGHT + k] * older + own[_POWERS + _WEIGHT + k] * newer
+                    rows[_R1 + k] = rows[_R1 + k] + own[_X + k] * older + own[_POWERS + _X + k] * newer
+                    rows[_R2 + k] = rows[_R2 + k] + own[_SQUARE + k] * older + own[_POWERS + _SQUARE + k] * newer
+                    rows[_R3 + k] = rows[_R3 + k] + own[_CUBE + k] * older + own[_POWERS + _CUBE + k] * newer
             for k in range(BLOCK):
                 r0 = rows[_R0 + k]
                 r1, r2 = rows[_R1 + k] - rows[_F10 + k] * r0, rows[_R2 + k] - rows[_F20 + k] * r0
