@@ -1,4 +1,7 @@
-"""Processor instructions for kernels that numba does not provide: `prefetch`, `store`, `load`, and two on bits."""
+"""Processor instructions for kernels that numba does not provide.
+
+`prefetch`, `store`, `load`, two on bits, and `add_products` on several numbers at once.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,9 @@ from collections.abc import Callable
 from typing import Any
 
 from cdtool.kernels import Kernel
+
+# `add_products` handles so many numbers at once, and those of the next product are so many elements further.
+LANES, STRIDE = 16, 32
 
 
 class _Instruction(Kernel):
@@ -153,8 +159,51 @@ def _emit_trailing_zeros() -> Callable[..., Any]:
     return made
 
 
+def _add_products(sums: Any, at: Any, first: Any, first_at: Any, second: Any, second_at: Any, count: Any) -> None:
+    """Add products to 16 numbers of the array `sums` from index `at` on: those of `first` and `second`, `count` times.
+
+    They begin at `first_at` and `second_at`, and each time 32 elements further. All must be in the arrays, of float64.
+    A loop over few numbers takes longer to find that arrays do not overlap than to compute.
+    """
+
+
+def _emit_add_products() -> Callable[..., Any]:
+    from llvmlite import ir
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+
+    build: Any = cgutils
+    vector = ir.VectorType(ir.DoubleType(), LANES)
+
+    def emit(_: Any, sums: Any, at: Any, first: Any, first_at: Any, second: Any, second_at: Any, count: Any) -> Any:
+        def lines(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            def place(number: int) -> Any:
+                array = context.make_array(signature.args[number])(context, builder, arguments[number])
+                return builder.gep(array.data, [arguments[number + 1]])
+
+            total, (a, b) = builder.bitcast(place(0), vector.as_pointer()), (place(2), place(4))
+            kept = build.alloca_once_value(builder, builder.load(total, align=8))
+            with build.for_range(builder, arguments[6]) as loop:
+                step = [builder.mul(loop.index, ir.Constant(loop.index.type, STRIDE))]
+                one, other = (
+                    builder.load(builder.bitcast(builder.gep(item, step), vector.as_pointer()), align=8)
+                    for item in (a, b)
+                )
+                product = builder.fmul(one, other, flags=("contract",))
+                builder.store(builder.fadd(builder.load(kept), product, flags=("contract",)), kept)
+            builder.store(builder.load(kept), total, align=8)
+            return context.get_dummy_value()
+
+        return types.void(sums, at, first, first_at, second, second_at, count), lines
+
+    made: Callable[..., Any] = intrinsic(emit)
+    return made
+
+
 prefetch = _Instruction(_prefetch, _emit_prefetch)
 store = _Instruction(_store, _emit_store)
 load = _Instruction(_load, _emit_load)
 equal_bytes = _Instruction(_equal_bytes, _emit_equal_bytes)
 trailing_zeros = _Instruction(_trailing_zeros, _emit_trailing_zeros)
+add_products = _Instruction(_add_products, _emit_add_products)

@@ -1,6 +1,7 @@
 """Instructions in kernels: prefetch changes nothing at any address; store writes a value only at its address.
 
-load reads eight bytes at any address; equal_bytes and trailing_zeros agree with the same operation in Python.
+load reads eight bytes at any address; equal_bytes, trailing_zeros and add_products agree with the same operation in
+Python.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.instructions import equal_bytes, load, prefetch, store, trailing_zeros
+from cdtool.instructions import LANES, STRIDE, add_products, equal_bytes, load, prefetch, store, trailing_zeros
 from cdtool.kernels import kernel
 
 
@@ -94,3 +95,24 @@ def test_a_bit_is_set_for_each_equal_byte(content, letter):
 
 def test_the_zeros_below_the_lowest_bit_are_counted():
     assert [zeros_below(word) for word in (1, 2, 3, 96, 2**63, 0)] == [0, 1, 0, 5, 63, 64]
+
+
+@kernel("void(float64[::1], int64, float64[::1], int64, float64[::1], int64, int64)")
+def add_to(sums, at, first, first_at, second, second_at, count):
+    add_products(sums, at, first, first_at, second, second_at, count)
+
+
+@given(st.integers(0, 5), st.integers(0, 40), st.integers(0, 40), st.integers(0, 40))
+def test_products_are_added_to_their_own_numbers_only(count, at, first_at, second_at):
+    rng = np.random.default_rng(count)
+    sums, first, second = rng.normal(size=(3, 6 * STRIDE + 40))
+    expected = sums.copy()
+    for number in range(count):
+        a, b = (item[start + number * STRIDE :][:LANES] for item, start in ((first, first_at), (second, second_at)))
+        expected[at : at + LANES] += a * b
+    before = sums.copy()
+    add_to(sums, at, first, first_at, second, second_at, count)
+    np.testing.assert_allclose(sums, expected, rtol=0.0, atol=1e-14)
+    beside = np.ones(len(sums), dtype=bool)
+    beside[at : at + LANES] = False
+    np.testing.assert_array_equal(sums[beside], before[beside])

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from cdtool.clock.recent_steps import usual_steps
+from cdtool.clock.recent_steps import RECENT_STEPS
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.recording import FloatArray, Series
+from cdtool.recording import BoolArray, FloatArray, Series
 
 # A held value older than this many periods of its channel is missing.
 HOLD_PERIODS = 5.0
 # So many samples are passed one by one before the next sample is searched for.
-_ONE_BY_ONE = 8
+ONE_BY_ONE = 8
 
 # The signatures of the values (n, J) of a channel, and of marks of them.
 READ_TABLE = "Array(float64, 2, 'C', readonly=True)"
@@ -24,9 +24,10 @@ def previous_value(series: Series, clock: FloatArray) -> FloatArray:
     """Return the last sample at or before each time of `clock` [s] (m, J); NaN if it is missing or too old."""
     if is_on_clock(series, clock):
         return series.values
-    held = np.empty((len(clock), series.joint_count))
-    _fill_previous(series.time, series.values, usual_steps(series.time), np.ascontiguousarray(clock), held)
-    return held
+    values = np.empty((len(clock), series.joint_count))
+    missing = np.empty(values.shape, dtype=np.bool_)
+    fill_held(series.time, series.values, np.ascontiguousarray(clock), False, values, missing)
+    return values
 
 
 def is_on_clock(series: Series, clock: FloatArray) -> bool:
@@ -38,7 +39,7 @@ def is_on_clock(series: Series, clock: FloatArray) -> bool:
 
 
 @kernel(f"int64({READ_ONLY}, float64, int64, int64)")
-def _search(time: FloatArray, now: float, low: int, high: int) -> int:
+def search(time: FloatArray, now: float, low: int, high: int) -> int:
     """Return the last index from `low` to below `high` with time <= now, or `low` if every one is later."""
     while high - low > 1:
         middle = (low + high) // 2
@@ -49,34 +50,58 @@ def _search(time: FloatArray, now: float, low: int, high: int) -> int:
     return low
 
 
-@kernel(f"int64({READ_ONLY}, float64, int64)")
-def newest_at(time: FloatArray, now: float, at: int) -> int:
-    """Return the index of the last sample with time <= now, -1 before the first one; `at`: that of the query before."""
-    if at >= 0 and now < time[at]:
-        return int(_search(time, now, -1, at))
-    for _ in range(_ONE_BY_ONE):
-        if at + 1 >= len(time) or time[at + 1] > now:
-            return at
-        at += 1
-    return int(_search(time, now, at, len(time)))
+@kernel(f"float64({READ_ONLY}, int64)")
+def shortest_recent_step(time: FloatArray, at: int) -> float:
+    """Return the shortest of the last 9 steps up to sample `at`."""
+    shortest = math.inf
+    for k in range(max(at - RECENT_STEPS + 1, 1), at + 1):
+        shortest = min(shortest, time[k] - time[k - 1])
+    return shortest
 
 
-@kernel(f"b1({READ_ONLY}, {READ_ONLY}, float64, int64)")
-def is_held(time: FloatArray, usual: FloatArray, now: float, at: int) -> bool:
-    """Return whether the sample `at` is held until `now`, by the `usual` step (n,) of its channel."""
-    return at >= 0 and not now - time[at] > HOLD_PERIODS * usual[at]
+@kernel(f"b1({READ_ONLY}, int64, float64, float64)")
+def _within_median(time: FloatArray, at: int, factor: float, age: float) -> bool:
+    """Return whether age <= factor * (median of the last 9 steps up to sample `at`, which is not the first).
+
+    It is if 5 of the 9 steps are long enough. Steps before the first are assumed to equal it.
+    """
+    long_enough = 0
+    for k in range(at - RECENT_STEPS + 1, at + 1):
+        end = max(k, 1)
+        long_enough += 1 if age <= factor * (time[end] - time[end - 1]) else 0
+    return long_enough > RECENT_STEPS // 2
 
 
-@kernel(f"void({READ_ONLY}, {READ_TABLE}, {READ_ONLY}, {READ_ONLY}, float64[:, ::1])")
-def _fill_previous(
-    time: FloatArray, values: FloatArray, usual: FloatArray, clock: FloatArray, held: FloatArray
+@kernel(f"void({READ_ONLY}, {READ_TABLE}, {READ_ONLY}, b1, float64[:, ::1], b1[:, ::1])")
+def fill_held(
+    time: FloatArray, values: FloatArray, clock: FloatArray, hold: bool, held: FloatArray, missing: BoolArray
 ) -> None:
+    """Fill `held` (m, J) with the `values` (n, J) of samples at `time` (n,), and where one is `missing` or too old.
+
+    What is missing is NaN, or with `hold` the last value, 0 before the first. A sample is too old after 5 times the
+    median of its last 9 steps. The median is at least the `shortest` step, so that it is rarely needed.
+    """
     at = -1
+    shortest = math.inf
     for k in range(len(clock)):
-        at = newest_at(time, clock[k], at)
-        if is_held(time, usual, clock[k], at):
-            for j in range(values.shape[1]):
-                held[k, j] = values[at, j]
-        else:
-            for j in range(values.shape[1]):
-                held[k, j] = math.nan
+        now = clock[k]
+        if at >= 0 and now < time[at]:
+            at, shortest = search(time, now, -1, at), -math.inf
+        passed = 0
+        while at + 1 < len(time) and time[at + 1] <= now:
+            at += 1
+            passed += 1
+            if at > 0:
+                shortest = min(shortest, time[at] - time[at - 1])
+            if passed == ONE_BY_ONE:
+                at, shortest = search(time, now, at, len(time)), -math.inf
+        fresh = at >= 0
+        if at > 0 and now - time[at] > HOLD_PERIODS * shortest:
+            fresh = _within_median(time, at, HOLD_PERIODS, now - time[at])
+            shortest = shortest_recent_step(time, at)
+        for j in range(values.shape[1]):
+            value = values[at, j] if fresh else math.nan
+            missing[k, j] = not math.isfinite(value)
+            held[k, j] = value
+            if hold and missing[k, j]:
+                held[k, j] = held[k - 1, j] if k > 0 else 0.0

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from cdtool.clock.held_samples import READ_MARKS, is_on_clock, newest_at
+from cdtool.clock.held_samples import ONE_BY_ONE, READ_MARKS, is_on_clock, search
 from cdtool.clock.recent_steps import RECENT_STEPS, usual_steps
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
@@ -76,8 +76,16 @@ def _fill_lost(time: FloatArray, usual: FloatArray, missing: BoolArray, clock: F
     shared = 0
     count = 0
     for k in range(len(clock)):
-        at = newest_at(time, clock[k], at)
-        age = clock[k] - time[max(at, 0)]
+        now = clock[k]
+        if at >= 0 and now < time[at]:
+            at = search(time, now, -1, at)
+        passed = 0
+        while at + 1 < len(time) and time[at + 1] <= now:
+            at += 1
+            passed += 1
+            if passed == ONE_BY_ONE:
+                at = search(time, now, at, len(time))
+        age = now - time[max(at, 0)]
         late = count >= _SHARED_SAMPLES and age > 0.0
         if at > 0 and not late and age > _LATE * usual[at]:
             late = age > _LATE * min(_longest_recent_step(time, at), _USUAL * usual[at])

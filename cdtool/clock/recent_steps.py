@@ -10,6 +10,7 @@ from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
 
 RECENT_STEPS = 9
+_BEFORE = RECENT_STEPS - 1
 # Samples whose medians are computed together: their work arrays fit into the fastest cache.
 _BLOCK = 512
 # A window of nine is three triples, the oldest of them six samples before the newest.
@@ -49,8 +50,10 @@ def usual_steps(time: FloatArray) -> FloatArray:
         return kept[1]
     usual = np.full(len(time), np.inf)
     if len(time) > 1:
-        steps = np.diff(time)
-        usual[1:] = recent_medians(steps, float(steps[0]))
+        padded = np.empty(len(time) + _BEFORE - 1)
+        np.subtract(time[1:], time[:-1], out=padded[_BEFORE:])
+        padded[:_BEFORE] = padded[_BEFORE]
+        _take_medians(padded, usual[1:])
     usual.flags.writeable = False
     if not time.flags.writeable and len(time) <= _MOST_KEPT:
         key = id(time)
@@ -63,12 +66,17 @@ def recent_medians(steps: FloatArray, before: float) -> FloatArray:
 
     NaN where one of the nine is NaN.
     """
-    padded = np.concatenate((np.full(RECENT_STEPS - 1, before), steps))
     medians = np.empty(len(steps))
-    if _fill_medians(padded, *np.empty((3, _BLOCK + _TRIPLES_BACK)), medians) and len(steps):
-        unknown = np.lib.stride_tricks.sliding_window_view(np.isnan(padded), RECENT_STEPS)
-        medians[unknown.any(axis=1)] = np.nan
+    _take_medians(np.concatenate((np.full(_BEFORE, before), steps)), medians)
     return medians
+
+
+def _take_medians(padded: FloatArray, medians: FloatArray) -> None:
+    """Fill `medians` (n,) with those of nine consecutive steps (n + 8,)."""
+    unknown = _fill_medians(padded, *np.empty((3, _BLOCK + _TRIPLES_BACK)), medians)
+    if unknown and len(medians):
+        windows = np.lib.stride_tricks.sliding_window_view(np.isnan(padded), RECENT_STEPS)
+        medians[windows.any(axis=1)] = np.nan
 
 
 @kernel(f"int64({READ_ONLY}, float64[::1], float64[::1], float64[::1], float64[::1])")

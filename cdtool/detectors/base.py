@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from cdtool.clock import previous_value
-from cdtool.clock.held_samples import READ_MARKS, READ_TABLE, is_held, is_on_clock, newest_at
+from cdtool.clock.held_samples import READ_MARKS, READ_TABLE, fill_held, is_on_clock
 from cdtool.clock.lost_samples import lost_samples
-from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.kernels import READ_ONLY, kernel
+from cdtool.kernels import kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 if TYPE_CHECKING:
@@ -138,6 +137,8 @@ def require_positive(detector: object, *names: str) -> None:
     """
     for name in names:
         value = getattr(detector, name)
+        if isinstance(value, float) and 0.0 < value < math.inf:
+            continue
         numbers = np.atleast_1d(value)
         if not (numbers.size and np.all(np.isfinite(numbers) & (numbers > 0.0))):
             raise ConfigurationError(f"gain {name} is {value}", "a number above 0 is needed, or one per joint")
@@ -173,7 +174,7 @@ def per_joint(value: Gain, joints: int) -> FloatArray:
     if isinstance(value, tuple) and len(value) != joints:
         many = "the whole machine" if joints == 1 else f"{joints} joints"
         raise ConfigurationError(f"a gain has {len(value)} values for {many}", "give one number, or one per joint")
-    return np.array(np.broadcast_to(value, joints), dtype=np.float64)
+    return np.full(joints, value, dtype=np.float64)
 
 
 def of_joint(detector: AnyDetector, joint: int, joints: int) -> AnyDetector:
@@ -205,7 +206,11 @@ def of_joint(detector: AnyDetector, joint: int, joints: int) -> AnyDetector:
     Momentum(bandwidth=60.0)
     """
     gains = {item.name: getattr(detector, item.name) for item in fields(detector)}
-    return replace(detector, **{name: float(per_joint(value, joints)[joint]) for name, value in gains.items()})
+    numbers = {
+        name: value if isinstance(value, float) else float(per_joint(value, joints)[joint])
+        for name, value in gains.items()
+    }
+    return replace(detector, **numbers)
 
 
 def single(value: Gain) -> float:
@@ -231,7 +236,7 @@ def single(value: Gain) -> float:
     >>> single((80.0,))
     80.0
     """
-    return float(per_joint(value, 1)[0])
+    return value if isinstance(value, float) else float(per_joint(value, 1)[0])
 
 
 def require_channels(detector: Detector, recording: Recording, *more: str) -> None:
@@ -417,25 +422,8 @@ def held_on(clock: FloatArray, series: Series) -> tuple[FloatArray, BoolArray]:
         return hold_last(series.values, missing), missing
     held = np.empty((len(clock), series.joint_count))
     missing = np.empty(held.shape, dtype=np.bool_)
-    _fill_held(series.time, series.values, usual_steps(series.time), np.ascontiguousarray(clock), held, missing)
+    fill_held(series.time, series.values, np.ascontiguousarray(clock), True, held, missing)
     return held, missing
-
-
-@kernel(f"void({READ_ONLY}, {READ_TABLE}, {READ_ONLY}, {READ_ONLY}, float64[:, ::1], b1[:, ::1])")
-def _fill_held(
-    time: FloatArray, values: FloatArray, usual: FloatArray, clock: FloatArray, held: FloatArray, missing: BoolArray
-) -> None:
-    at = -1
-    for k in range(len(clock)):
-        at = newest_at(time, clock[k], at)
-        fresh = is_held(time, usual, clock[k], at)
-        for j in range(values.shape[1]):
-            present = fresh and math.isfinite(values[at, j])
-            missing[k, j] = not present
-            if present:
-                held[k, j] = values[at, j]
-            else:
-                held[k, j] = held[k - 1, j] if k > 0 else 0.0
 
 
 def missing_after_first(missing: BoolArray) -> BoolArray:
@@ -479,7 +467,7 @@ def for_every_joint(missing: BoolArray) -> BoolArray:
     Returns
     -------
     ndarray of bool, shape (n, J)
-        True for all joints wherever it is True for one.
+        True for all joints wherever it is True for one. If no sample is missing, it is `missing` itself, not a copy.
 
     Examples
     --------
@@ -487,6 +475,8 @@ def for_every_joint(missing: BoolArray) -> BoolArray:
     >>> for_every_joint(np.array([[False, True], [False, False]])).tolist()
     [[True, True], [False, False]]
     """
+    if not missing.any():
+        return missing
     return np.repeat(np.any(missing, axis=1, keepdims=True), missing.shape[1], axis=1)
 
 

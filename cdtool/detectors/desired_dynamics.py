@@ -113,8 +113,8 @@ class DesiredDynamics:
         residual, _ = low_pass(time, balance, waits, cutoff)
         settle = settling_time(cutoff)
         started = started_at(time, waits, longest_gap(cutoff))
-        status = np.where(time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
-        lost = np.abs(np.nan_to_num(error)) > per_joint(self.tracking_limit, error.shape[1])
+        status = np.where(time[:, np.newaxis] < started + settle, np.uint8(Status.START_UP), np.uint8(Status.VALID))
+        lost = np.abs(error) > per_joint(self.tracking_limit, error.shape[1])
         status[for_every_joint(lost) if machine.coupled else lost] = Status.NOT_APPLICABLE
         status[missing] = Status.GAP
         notes = _tracking_notes(error, recording.joints, machine.load_units["position"])
@@ -138,8 +138,9 @@ def _rates(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 def _tracking_notes(error: FloatArray, joints: tuple[str, ...], unit: str) -> tuple[str, ...]:
     notes = []
-    for joint, column in zip(joints, error.T, strict=True):
-        known = column[np.isfinite(column)]
+    for joint, column in zip(joints, np.ascontiguousarray(error.T), strict=True):
+        is_known = np.isfinite(column)
+        known = column if is_known.all() else column[is_known]
         if len(known):
             rms, largest = float(np.sqrt(np.mean(known**2))), float(np.abs(known).max())
             notes.append(f"tracking error of {joint}: rms {rms:.3g} {unit}, largest {largest:.3g} {unit}")

@@ -89,7 +89,9 @@ class Direct:
         residual = filtered - machine.inertia_times(drive.position, acceleration)
         settle = settling_time(cutoff)
         started = started_at(drive.time, waits, longest_gap(cutoff))
-        status = np.where(drive.time[:, np.newaxis] < started + settle, Status.START_UP, Status.VALID).astype(np.uint8)
+        status = np.where(
+            drive.time[:, np.newaxis] < started + settle, np.uint8(Status.START_UP), np.uint8(Status.VALID)
+        )
         missing = for_every_joint(drive.missing) if machine.coupled else drive.missing
         status[missing] = Status.GAP
         return Signal(drive.time, residual, status, self.unit(machine), self.signed)

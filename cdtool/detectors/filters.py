@@ -16,6 +16,16 @@ from cdtool.recording import BoolArray, FloatArray
 
 # Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
 _SETTLE = 3.0 * math.sqrt(2.0)
+# The samples whose cubics are computed at once, and the fewest that determine a cubic with one to spare.
+BLOCK, _FEWEST = 32, 5
+# Rows of the work space of a cubic: sums of powers; factors and matrix of its elimination; right-hand side.
+_SPAN, _COUNT, _FOURTH, _FIFTH = range(0, 4 * BLOCK, BLOCK)
+_S1, _S2, _S3, _S4, _S5, _S22, _S33 = range(4 * BLOCK, 11 * BLOCK, BLOCK)
+_F10, _F20, _F30, _F21, _F31, _F32 = range(11 * BLOCK, 17 * BLOCK, BLOCK)
+_M11, _M12, _M13, _M22, _M23, _M33 = range(17 * BLOCK, 23 * BLOCK, BLOCK)
+_R0, _R1, _R2, _R3, _ROWS = range(23 * BLOCK, 28 * BLOCK, BLOCK)
+# Rows of the powers of x of one sample of the window.
+_WEIGHT, _X, _SQUARE, _CUBE, _POWERS = range(0, 5 * BLOCK, BLOCK)
 # No gap is cut into more steps than this.
 _MOST_PIECES = 10_000
 
@@ -204,8 +214,9 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     (0.58, 2.0)
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
-    sums = np.empty((5, samples)), np.empty((4, 4)), np.empty((4, values.shape[1]))
-    _polynomial_rates(time, np.ascontiguousarray(values), samples, *sums, first, second)
+    if samples >= _FEWEST:
+        work = np.empty(samples * _POWERS), np.empty(_ROWS), np.empty((2, BLOCK + samples - 1))
+        _polynomial_rates(time, np.ascontiguousarray(values), samples, *work, first, second)
     return first, second
 
 
@@ -296,66 +307,112 @@ def _fill_starts(time: FloatArray, missing: BoolArray, longest_gap: FloatArray, 
             starts[k, j] = start
 
 
-@kernel(f"void({READ_ONLY}, {READ_TABLE}, int64, {', '.join(5 * ['float64[:, ::1]'])})")
-def _polynomial_rates(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
+@kernel(f"void({READ_ONLY}, int64, int64, float64[:, ::1], float64[::1], float64[::1])")
+def _fill_powers(
+    time: FloatArray, begin: int, before: int, window: FloatArray, powers: FloatArray, rows: FloatArray
+) -> None:
+    """Fill the powers of x = (t - t_k) / span of a block of windows, which end at `begin` and later, and their sums.
+
+    The sample is innermost, and its rows are at distances known at compile time: otherwise one instruction handles one
+    sample. In a window that begins before the first sample, what is missing there does not count: weight and x are 0.
+    """
+    clock = window[0]
+    for i in range(BLOCK + before):
+        clock[i] = time[min(max(begin - before + i, 0), len(time) - 1)]
+    for k in range(BLOCK):
+        rows[_SPAN + k] = clock[before + k] - clock[k]
+        rows[_COUNT + k] = min(begin + k, before) + 1.0
+    for k in range(_S1, _S33 + BLOCK):
+        rows[k] = 0.0
+    for m in range(before + 1):
+        own = powers[m * _POWERS : (m + 1) * _POWERS]
+        for k in range(BLOCK):
+            own[_WEIGHT + k] = 1.0 if begin + k + m >= before else 0.0
+            x = own[_WEIGHT + k] * ((clock[m + k] - clock[before + k]) / rows[_SPAN + k])
+            own[_X + k] = x
+            own[_SQUARE + k] = x * x
+            own[_CUBE + k] = x * x * x
+            rows[_FOURTH + k] = x * (x * x * x)
+            rows[_FIFTH + k] = (x * x) * (x * x * x)
+        for k in range(BLOCK):
+            rows[_S1 + k] += own[_X + k]
+            rows[_S2 + k] += own[_SQUARE + k]
+            rows[_S3 + k] += own[_CUBE + k]
+            rows[_S4 + k] += rows[_FOURTH + k]
+            rows[_S5 + k] += rows[_FIFTH + k]
+            rows[_S22 + k] += own[_SQUARE + k] * own[_SQUARE + k]
+            rows[_S33 + k] += own[_CUBE + k] * own[_CUBE + k]
+
+
+@kernel(
+    f"void({READ_ONLY}, {READ_TABLE}, int64, float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], "
+    "float64[:, ::1])"
+)
+def _polynomial_rates(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
     values: FloatArray,
     samples: int,
     powers: FloatArray,
-    matrix: FloatArray,
-    right: FloatArray,
+    rows: FloatArray,
+    window: FloatArray,
     first: FloatArray,
     second: FloatArray,
 ) -> None:
     """Normal equations of a cubic in the scaled time x = (t - t_k) / span, definite: no pivoting.
 
-    All joints have the same matrix (4, 4); `right` (4, J) are their right-hand sides. Both are overwritten.
+    All joints have the same matrix, which is eliminated once per sample, and a block of samples is computed at once.
+    `powers`, `rows` and `window` are work space; what `first` and `second` (n, J) hold stays where x is too short.
     """
-    joints = values.shape[1]
-    for k in range(len(time)):
-        start = k - samples + 1 if k >= samples else 0
-        span = time[k] - time[start]
-        if k - start < 4 or not span > 0.0:
-            continue
-        s1 = s2 = s3 = s4 = s5 = s22 = s33 = 0.0
-        right[:] = 0.0
-        count = k + 1 - start
-        for i in range(count):
-            x = (time[start + i] - time[k]) / span
-            powers[0, i] = x
-            powers[1, i] = x * x
-            powers[2, i] = x * x * x
-            powers[3, i] = x * (x * x * x)
-            powers[4, i] = (x * x) * (x * x * x)
-        for i in range(count):
-            x, square, cube = powers[0, i], powers[1, i], powers[2, i]
-            s1 += x
-            s2 += square
-            s3 += cube
-            s4 += powers[3, i]
-            s5 += powers[4, i]
-            s22 += square * square
-            s33 += cube * cube
-            for j in range(joints):
-                change = values[start + i, j] - values[k, j]
-                right[0, j] += change
-                right[1, j] += x * change
-                right[2, j] += square * change
-                right[3, j] += cube * change
-        matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3] = float(count), s1, s2, s3
-        matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3] = s1, s2, s3, s4
-        matrix[2, 0], matrix[2, 1], matrix[2, 2], matrix[2, 3] = s2, s3, s22, s5
-        matrix[3, 0], matrix[3, 1], matrix[3, 2], matrix[3, 3] = s3, s4, s5, s33
-        for pivot in range(4):
-            for row in range(pivot + 1, 4):
-                factor = matrix[row, pivot] / matrix[pivot, pivot]
-                for column in range(pivot, 4):
-                    matrix[row, column] -= factor * matrix[pivot, column]
-                for j in range(joints):
-                    right[row, j] -= factor * right[pivot, j]
-        for j in range(joints):
-            cubic = right[3, j] / matrix[3, 3]
-            quadratic = (right[2, j] - matrix[2, 3] * cubic) / matrix[2, 2]
-            linear = (right[1, j] - matrix[1, 2] * quadratic - matrix[1, 3] * cubic) / matrix[1, 1]
-            first[k, j] = linear / span
-            second[k, j] = 2.0 * quadratic / (span * span)
+    before = samples - 1
+    column = window[1]
+    for begin in range(0, len(time), BLOCK):
+        _fill_powers(time, begin, before, window, powers, rows)
+        _eliminate(rows)
+        for j in range(values.shape[1]):
+            for i in range(BLOCK + before):
+                column[i] = values[min(max(begin - before + i, 0), len(time) - 1), j]
+            for k in range(_R0, _R3 + BLOCK):
+                rows[k] = 0.0
+            # Two samples of a window at once; the newest one, whose change is 0, may be left out.
+            for m in range(0, samples - 1, 2):
+                own, newest = powers[m * _POWERS : (m + 2) * _POWERS], column[before : before + BLOCK]
+                pair = column[m : m + BLOCK + 1]
+                for k in range(BLOCK):
+                    older, newer = pair[k] - newest[k], pair[k + 1] - newest[k]
+                    rows[_R0 + k] = rows[_R0 + k] + own[_WEIGHT + k] * older + own[_POWERS + _WEIGHT + k] * newer
+                    rows[_R1 + k] = rows[_R1 + k] + own[_X + k] * older + own[_POWERS + _X + k] * newer
+                    rows[_R2 + k] = rows[_R2 + k] + own[_SQUARE + k] * older + own[_POWERS + _SQUARE + k] * newer
+                    rows[_R3 + k] = rows[_R3 + k] + own[_CUBE + k] * older + own[_POWERS + _CUBE + k] * newer
+            for k in range(BLOCK):
+                r0 = rows[_R0 + k]
+                r1, r2 = rows[_R1 + k] - rows[_F10 + k] * r0, rows[_R2 + k] - rows[_F20 + k] * r0
+                r3 = rows[_R3 + k] - rows[_F30 + k] * r0
+                r2, r3 = r2 - rows[_F21 + k] * r1, r3 - rows[_F31 + k] * r1
+                cubic = (r3 - rows[_F32 + k] * r2) / rows[_M33 + k]
+                square = (r2 - rows[_M23 + k] * cubic) / rows[_M22 + k]
+                linear = (r1 - rows[_M12 + k] * square - rows[_M13 + k] * cubic) / rows[_M11 + k]
+                rows[_R0 + k] = linear / rows[_SPAN + k]
+                rows[_R1 + k] = 2.0 * square / (rows[_SPAN + k] * rows[_SPAN + k])
+            for k in range(max(_FEWEST - 1 - begin, 0), min(BLOCK, len(time) - begin)):
+                first[begin + k, j] = rows[_R0 + k]
+                second[begin + k, j] = rows[_R1 + k]
+
+
+@kernel("void(float64[::1])")
+def _eliminate(rows: FloatArray) -> None:
+    """Eliminate (n, s1, s2, s3), (s1, s2, s3, s4), (s2, s3, s22, s5), (s3, s4, s5, s33): factors and upper rows."""
+    for k in range(BLOCK):
+        n, s1, s2, s3 = rows[_COUNT + k], rows[_S1 + k], rows[_S2 + k], rows[_S3 + k]
+        s4, s5, s22, s33 = rows[_S4 + k], rows[_S5 + k], rows[_S22 + k], rows[_S33 + k]
+        f10, f20, f30 = s1 / n, s2 / n, s3 / n
+        m11, m12, m13 = s2 - f10 * s1, s3 - f10 * s2, s4 - f10 * s3
+        m21, m22, m23 = s3 - f20 * s1, s22 - f20 * s2, s5 - f20 * s3
+        m31, m32, m33 = s4 - f30 * s1, s5 - f30 * s2, s33 - f30 * s3
+        f21, f31 = m21 / m11, m31 / m11
+        m22, m23 = m22 - f21 * m12, m23 - f21 * m13
+        m32, m33 = m32 - f31 * m12, m33 - f31 * m13
+        f32 = m32 / m22
+        rows[_F10 + k], rows[_F20 + k], rows[_F30 + k] = f10, f20, f30
+        rows[_F21 + k], rows[_F31 + k], rows[_F32 + k] = f21, f31, f32
+        rows[_M11 + k], rows[_M12 + k], rows[_M13 + k] = m11, m12, m13
+        rows[_M22 + k], rows[_M23 + k], rows[_M33 + k] = m22, m23, m33 - f32 * m23

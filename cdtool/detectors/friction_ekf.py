@@ -157,20 +157,27 @@ class FrictionEkf:
         acceleration = recording["acceleration"]
         others, lost = held_on(drive.time, acceleration)
         equations = machine.joint_equations(drive.torque, drive.position, drive.speed, others)
-        measured = np.where(drive.speed_missing, np.nan, drive.speed)
         missing = drive.missing | for_every_joint(lost) if machine.coupled else drive.missing
-        friction = np.zeros(measured.shape)
-        status = np.zeros(measured.shape, dtype=np.uint8)
-        for j, equation in enumerate(equations):
+        unknown = drive.speed_missing
+        speed, position = (
+            np.where(unknown, np.nan, item) if unknown.any() else item for item in (drive.speed, drive.position)
+        )
+        # Joint by joint in memory, as the filter reads and writes it.
+        inputs = (np.ascontiguousarray(item.T) for item in (speed, missing, acceleration.values))
+        friction = np.empty(speed.shape[::-1])
+        status = np.empty(friction.shape, dtype=np.uint8)
+        for j, (equation, *own) in enumerate(zip(equations, *inputs, strict=True)):
+            own_speed, own_missing, own_acceleration = own
             motion = JointMeasurements(
                 drive.time,
-                np.ascontiguousarray(measured[:, j]),
-                np.where(drive.speed_missing[:, j], np.nan, drive.position[:, j]),
-                np.ascontiguousarray(missing[:, j]).view(np.uint8),
+                own_speed,
+                position[:, j],
+                own_missing.view(np.uint8),
                 acceleration.time,
-                np.ascontiguousarray(acceleration.values[:, j]),
+                own_acceleration,
             )
-            friction[:, j], status[:, j] = of_joint(self, j, len(equations)).estimate(motion, equation)
+            friction[j], status[j] = of_joint(self, j, len(equations)).estimate(motion, equation)
+        friction, status = np.ascontiguousarray(friction.T), np.ascontiguousarray(status.T)
         late = lost_samples(recording, ("acceleration",), drive.time)
         lost = drive.missing if late is None else drive.missing | late
         behind = unsettled(drive.time, for_every_joint(lost) if machine.coupled else lost, _LONGEST_UNSETTLED)

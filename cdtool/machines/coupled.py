@@ -49,6 +49,10 @@ class CoupledMachine(JointMachine, ABC):
     def inertia_matrix(self, position: FloatArray) -> FloatArray:
         """Return M (n, J, J), drives included."""
 
+    def inertia_diagonal(self, position: FloatArray) -> FloatArray:
+        """Return the diagonal of M (n, J)."""
+        return np.asarray(np.einsum("njj->nj", self.inertia_matrix(position)))
+
     @abstractmethod
     def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return kinetic and potential energy, each (n,) [J]."""
@@ -124,12 +128,10 @@ class CoupledMachine(JointMachine, ABC):
         """M_jj a_j = tau_j - (C v + g)_j - sum over the others M_ji a_i - d v_j: the other joints are measured."""
         own = np.zeros_like(speed)
         force = self.minus_friction(torque - self.inverse_dynamics(position, speed, own), speed, own)
-        inertia = self.inertia_matrix(position)
-        coupling = np.einsum("nji,ni->nj", inertia, acceleration)
-        equations = []
-        for j in range(len(self.joints)):
-            diagonal = np.ascontiguousarray(inertia[:, j, j])
-            known = np.ascontiguousarray(force[:, j] - coupling[:, j] + diagonal * acceleration[:, j])
-            viscous = self.viscous_friction[j] / self.transmission_ratio[j] ** 2
-            equations.append(JointEquation(diagonal, known, viscous))
-        return equations
+        diagonal = self.inertia_diagonal(position)
+        known = force - self.inertia_times(position, acceleration) + diagonal * acceleration
+        rows = zip(np.ascontiguousarray(diagonal.T), np.ascontiguousarray(known.T), strict=True)
+        return [
+            JointEquation(inertia, own, self.viscous_friction[j] / self.transmission_ratio[j] ** 2)
+            for j, (inertia, own) in enumerate(rows)
+        ]

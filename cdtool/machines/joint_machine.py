@@ -146,12 +146,15 @@ class JointMachine:
         else it is sign(v) Coulomb, and below the stick speed it balances the force up to its magnitude, so that a
         resting machine under static torque leaves no residual.
         """
-        for j in range(len(self.joints)):
-            ratio = self.transmission_ratio[j]
-            column = force[:, j]
+        ratios = zip(self.viscous_friction, self.transmission_ratio, strict=True)
+        viscous = [friction / ratio**2 for friction, ratio in ratios]
+        if all(viscous):
             # In place: on long logs allocating memory takes longer than the arithmetic.
-            if self.viscous_friction[j]:
-                column -= velocity[:, j] * (self.viscous_friction[j] / ratio**2)
+            force -= velocity * viscous
+        for j, ratio in enumerate(self.transmission_ratio):
+            column = force[:, j]
+            if viscous[j] and not all(viscous):
+                column -= velocity[:, j] * viscous[j]
             if self.constant_force[j]:
                 column -= self.constant_force[j] / ratio
             coulomb = self.coulomb_friction[j] / abs(ratio)

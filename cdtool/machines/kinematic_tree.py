@@ -20,7 +20,7 @@ import numpy as np
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.machines import tree_rows as rows
 from cdtool.machines.tree_inverse_kernel import sweep_inverse_dynamics, sweep_jacobian
-from cdtool.machines.tree_kernel import sweep_energies, sweep_momentum
+from cdtool.machines.tree_kernel import sweep_energies, sweep_inertia, sweep_inertia_times, sweep_momentum
 from cdtool.recording import FloatArray
 
 
@@ -101,7 +101,10 @@ class KinematicTree:
 
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
         """Return M(q) x (n, J) for a vector x per sample, without M; raises UsageError if shapes do not fit."""
-        return self.momentum_terms(position, vector)[0]
+        position, vector = self._table("position", position), self._table("speed", vector, position)
+        product = np.empty_like(position)
+        sweep_inertia_times(self._bodies, self._route, position, vector, product)
+        return product
 
     def inverse_dynamics(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Return M qdd + C qd + g, (n, J): torques of the motion without friction and contact, drives included.
@@ -117,11 +120,15 @@ class KinematicTree:
         """Return M(q), (n, J, J), drive inertias on its diagonal. Raises UsageError if shapes do not fit."""
         position = self._table("position", position)
         matrix = np.empty((*position.shape, len(self.joints)))
-        for column in range(len(self.joints)):
-            unit = np.zeros_like(position)
-            unit[:, column] = 1.0
-            matrix[:, :, column] = self.inertia_times(position, unit)
+        sweep_inertia(self._bodies, self._route, position, np.empty_like(position), matrix)
         return matrix
+
+    def inertia_diagonal(self, position: FloatArray) -> FloatArray:
+        """Return the diagonal of M(q), (n, J), drive inertias included. Raises UsageError if shapes do not fit."""
+        position = self._table("position", position)
+        diagonal, none = np.empty_like(position), np.empty((0, 0, 0))
+        sweep_inertia(self._bodies, self._route, position, diagonal, none)
+        return diagonal
 
     def contact_jacobian(self, position: FloatArray, link: str, point: tuple[float, float, float]) -> FloatArray:
         """Return J_c (n, 6, J): linear, then angular velocity of a point of a link per joint speed, base axes (2.2).
@@ -178,6 +185,7 @@ class KinematicTree:
             row[rows.COLUMN] = self.order.index(joint.name)
             row[rows.BEFORE] = last if follows else last + 1
             row[rows.COPY_OF] = -1 if follows else parent
+            row[rows.PARENT] = joint.parent
             last = int(row[rows.BEFORE]) + 1
             own.append(last)
         return table

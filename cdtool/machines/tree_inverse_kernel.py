@@ -38,13 +38,11 @@ from cdtool.machines.tree_rows import (
     K,
     L,
     Matrix,
-    S,
     V,
     Vector,
     W,
     about_z,
     add,
-    carry_load,
     clear,
     copy_motion,
     cross,
@@ -100,17 +98,26 @@ def _carry_acceleration(body: FloatArray, pair: FloatArray) -> None:
         put_vector(pair, SLOT + DV + j, dv)
         put_vector(pair, SLOT + L + j, force)
         put_vector(pair, SLOT + K + j, torque)
-        put_vector(pair, SLOT + S + j, (0.0, 0.0, 0.0))
 
 
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _joint_torque(body: FloatArray, pair: FloatArray) -> None:
-    """The joint's share of force and torque of everything it moves, and what its drive's inertia takes."""
+    """The joint's share of force and torque of everything it moves, and what its drive's inertia takes.
+
+    Force and torque, in place of l and k, are added to the parent's: l_p += R l, k_p += R (k + t x l).
+    """
     slides, drive = body[SLIDES], body[DRIVE]
     turns = 1.0 - slides
+    rotation, (tx, ty, tz) = rotation_of(body), vector_of(body, TRANSLATION)
     for j in range(BLOCK):
-        share = turns * pair[SLOT + K + 2 * BLOCK + j] + slides * pair[SLOT + L + 2 * BLOCK + j]
-        pair[SLOT + TERMS + j] = drive * pair[SLOT + RATE_CHANGE + j] + share
+        force, torque = get_vector(pair, SLOT + L + j), get_vector(pair, SLOT + K + j)
+        pair[SLOT + TERMS + j] = drive * pair[SLOT + RATE_CHANGE + j] + (turns * torque[2] + slides * force[2])
+        sine, cosine = pair[SLOT + SINE + j], pair[SLOT + COSINE + j]
+        linear = about_z(sine, cosine, force)
+        place = tx, ty, tz + pair[SLOT + OFFSET + j]
+        angular = add(about_z(sine, cosine, torque), cross(place, linear))
+        put_vector(pair, L + j, add(get_vector(pair, L + j), times(rotation, linear)))
+        put_vector(pair, K + j, add(get_vector(pair, K + j), times(rotation, angular)))
 
 
 def sweep_inverse_dynamics(
@@ -155,7 +162,6 @@ def _sweep(
             before, origin = route[i, BEFORE], route[i, COPY_OF]
             pair = slots[before * SLOT : (before + 2) * SLOT]
             _joint_torque(bodies[i], pair)
-            carry_load(bodies[i], pair)
             if origin >= 0:
                 return_load(slots, origin, before)
         for i in range(len(bodies)):

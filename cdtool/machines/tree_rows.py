@@ -24,7 +24,7 @@ IndexArray = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
-BLOCK = 32
+BLOCK = 16
 # Where the rows of a slot begin: joint, motion (W to DV), load (L to S), results.
 SINE, COSINE, OFFSET, RATE, RATE_CHANGE = 0 * BLOCK, 1 * BLOCK, 2 * BLOCK, 3 * BLOCK, 4 * BLOCK
 W, V, GRAVITY = 5 * BLOCK, 8 * BLOCK, 11 * BLOCK
@@ -36,8 +36,9 @@ SLOT = 29 * BLOCK
 # Columns of the constants (one row per joint): R and R' t of its placement, own and moved mass, s, upper triangle of I.
 ROTATION, TRANSLATION, MASS, MOMENT, INERTIA, DRIVE, SLIDES, MOVED_MASS, CONSTANTS = 0, 9, 12, 13, 16, 22, 23, 24, 25
 
-# Columns of the route (one row per joint): the recording's column, the slot before its own, its original (-1: none).
-COLUMN, BEFORE, COPY_OF, STEPS = 0, 1, 2, 3
+# Columns of the route (one row per joint): the recording's column, the slot before its own, its original (-1: none),
+# and the row of the parent (-1: the base).
+COLUMN, BEFORE, COPY_OF, PARENT, STEPS = 0, 1, 2, 3, 4
 
 ROW = "Array(float64, 1, 'C')"
 READ_TABLE = "Array(float64, 2, 'C', readonly=True)"
@@ -174,10 +175,7 @@ def return_load(slots: FloatArray, origin: int, copy: int) -> None:
 
 @kernel(f"void({READ_ONLY}, {ROW})")
 def carry_load(body: FloatArray, pair: FloatArray) -> None:
-    """What a joint moves, added to its parent's load: l_p += R l, k_p += R (k + t x l), s_p += R (s + m t).
-
-    Force and torque, in place of l and k, are carried by the same equations.
-    """
+    """What a joint moves, added to its parent's load: l_p += R l, k_p += R (k + t x l), s_p += R (s + m t)."""
     rotation = rotation_of(body)
     mass, (tx, ty, tz) = body[MOVED_MASS], vector_of(body, TRANSLATION)
     for j in range(BLOCK):

@@ -78,6 +78,10 @@ class UrdfRobot(CoupledMachine):
         """M (n, J, J), drives included."""
         return self.tree.inertia_matrix(position)
 
+    def inertia_diagonal(self, position: FloatArray) -> FloatArray:
+        """The diagonal of M (n, J), without the rest of it."""
+        return self.tree.inertia_diagonal(position)
+
     def energies(self, position: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Kinetic and potential energy, each (n,) [J]."""
         return self.tree.energies(position, speed)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from scipy.signal import bilinear, butter, lfilter, lfilter_zi
 
+from cdtool.clock.recent_steps import usual_steps
 from cdtool.detection import Status
 from cdtool.detectors.desired_dynamics import DesiredDynamics
 from cdtool.detectors.direct import Direct
-from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.detectors.filters import longest_gap, low_pass, polynomial_rates, settling_time, started_at, unsettled
+from cdtool.kernels import kernel
+from cdtool.recording import BoolArray, FloatArray, Recording, Series
 from tests.synthetic.machines import machine_of
 
 TIME = np.arange(4000) * 1e-3
@@ -134,3 +139,128 @@ def test_a_reference_that_the_axis_does_not_follow_makes_the_method_not_applicab
     assert signal.valid[~lost & (TIME > 0.5)].all()
     rms = np.sqrt((3.0 * 0.01**2 + 1.0 * 0.06**2) / 4.0)
     assert signal.notes == (f"tracking error of axis: rms {rms:.3g} m, largest 0.06 m",)
+
+
+def random_clock_and_marks(seed: int) -> tuple[FloatArray, BoolArray]:
+    """A clock with jitter and pauses, and which samples of three joints are lost."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 120))
+    time = np.cumsum(np.where(rng.random(count) < 0.05, rng.integers(2, 12, count), 1.0 + 0.1 * rng.random(count)))
+    lost = rng.random((count, 3)) < 0.1
+    lost[: rng.integers(0, count), 1] = True
+    return 1e-3 * time, lost
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_starts_and_what_has_not_settled_are_the_bits_of_masks_over_arrays(seed):
+    time, lost = random_clock_and_marks(seed)
+    steps = np.diff(time)
+    usual = np.concatenate((steps[:1], steps[:1], usual_steps(time)[1:-1]))
+    for j in range(3):
+        known = np.flatnonzero(~lost[:, j])
+        starts = [math.inf] * len(time)
+        for number, row in enumerate(known):
+            again = number == 0 or time[row] - time[known[number - 1]] > 0.01
+            starts[row:] = [time[row] if again else starts[row]] * (len(time) - row)
+        np.testing.assert_array_equal(started_at(time, lost, 0.01)[:, j], starts)
+        if len(time) < 3:
+            continue
+        seen = np.concatenate(([time[0]], np.where(lost[:, j], np.nan, time)[:-1]))
+        since = time - np.fmax.accumulate(seen)
+        behind = (since > 2.5 * usual) & ~lost[:, j]
+        until = np.maximum.accumulate(np.where(behind, time + np.minimum(since - usual, 0.01), -np.inf))
+        np.testing.assert_array_equal(unsettled(time, lost, 0.01)[:, j], time < until - 0.5 * usual)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("cutoff", [(5.0, 5.0, 5.0), (5.0, 80.0, 400.0)])
+def test_joints_together_have_the_bits_of_one_joint_at_a_time(seed, cutoff):
+    time, lost = random_clock_and_marks(seed)
+    values = np.random.default_rng(seed).normal(size=lost.shape)
+    together = *low_pass(time, values, lost, np.array(cutoff)), *polynomial_rates(time, values, 21)
+    for j in range(3):
+        own = values[:, j : j + 1]
+        alone = *low_pass(time, own, lost[:, j : j + 1], cutoff[j]), *polynomial_rates(time, own, 21)
+        for found, expected in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(found[:, j], expected[:, 0])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_rates_are_those_of_exact_normal_equations(seed):
+    time, _ = random_clock_and_marks(seed + 100)
+    values = np.random.default_rng(seed).normal(size=len(time))
+    k = len(time) - 1
+    window = slice(max(k - 20, 0), k + 1)
+    x, y = ([Fraction(each) for each in (item[window] - item[k]).tolist()] for item in (time, values))
+    first, second = (item[k, 0] for item in polynomial_rates(time, values[:, np.newaxis], 21))
+    if len(x) < 5:
+        assert np.isnan(first) and np.isnan(second)
+        return
+    table = [[sum(a ** (row + c) for a in x) for c in range(4)] for row in range(4)]
+    table = [[*row, sum(b * a**power for a, b in zip(x, y, strict=True))] for power, row in enumerate(table)]
+    for p in range(4):
+        for row in range(4):
+            if row != p:
+                factor = table[row][p] / table[p][p]
+                table[row] = [a - factor * b for a, b in zip(table[row], table[p], strict=True)]
+    linear, square = (float(table[p][4] / table[p][p]) for p in (1, 2))
+    span = time[k] - time[window.start]
+    assert first == pytest.approx(linear, rel=1e-9, abs=1e-9 / span)
+    assert second == pytest.approx(2.0 * square, rel=1e-9, abs=1e-9 / span**2)
+
+
+@kernel("void(float64[::1], float64[:, ::1], int64, float64[:, ::1], float64[:, ::1], float64[:, ::1])")
+def fill_rates_one_by_one(time, values, samples, powers, first, second):
+    """The cubic of one sample after the other, each over its own window."""
+    for k in range(len(time)):
+        start = k - samples + 1 if k >= samples else 0
+        span = time[k] - time[start]
+        if k - start < 4:
+            continue
+        count = k + 1 - start
+        for i in range(count):
+            x = (time[start + i] - time[k]) / span
+            powers[0, i], powers[1, i], powers[2, i] = x, x * x, x * x * x
+            powers[3, i], powers[4, i] = x * (x * x * x), (x * x) * (x * x * x)
+        s1 = s2 = s3 = s4 = s5 = s22 = s33 = 0.0
+        for i in range(count):
+            s1, s2, s3 = s1 + powers[0, i], s2 + powers[1, i], s3 + powers[2, i]
+            s4, s5 = s4 + powers[3, i], s5 + powers[4, i]
+            s22, s33 = s22 + powers[1, i] * powers[1, i], s33 + powers[2, i] * powers[2, i]
+        f10, f20, f30 = s1 / count, s2 / count, s3 / count
+        m11, m12, m13 = s2 - f10 * s1, s3 - f10 * s2, s4 - f10 * s3
+        m21, m22, m23 = s3 - f20 * s1, s22 - f20 * s2, s5 - f20 * s3
+        m31, m32, m33 = s4 - f30 * s1, s5 - f30 * s2, s33 - f30 * s3
+        f21, f31 = m21 / m11, m31 / m11
+        m22, m23, m32, m33 = m22 - f21 * m12, m23 - f21 * m13, m32 - f31 * m12, m33 - f31 * m13
+        f32 = m32 / m22
+        m33 -= f32 * m23
+        for j in range(values.shape[1]):
+            r0 = r1 = r2 = r3 = 0.0
+            for i in range(count):
+                change = values[start + i, j] - values[k, j]
+                r0, r1 = r0 + change, r1 + powers[0, i] * change
+                r2, r3 = r2 + powers[1, i] * change, r3 + powers[2, i] * change
+            r1, r2, r3 = r1 - f10 * r0, r2 - f20 * r0, r3 - f30 * r0
+            r2, r3 = r2 - f21 * r1, r3 - f31 * r1
+            cubic = (r3 - f32 * r2) / m33
+            square = (r2 - m23 * cubic) / m22
+            first[k, j] = (r1 - m12 * square - m13 * cubic) / m11 / span
+            second[k, j] = 2.0 * square / (span * span)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_rates_of_a_block_of_samples_have_the_bits_of_one_sample_after_the_other(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.choice([0, 1, 4, 5, 6, 20, 21, 22, 31, 32, 33, 64, 90, 150]))
+    samples, joints = int(rng.choice([3, 4, 5, 8, 21, 40])), int(rng.integers(1, 8))
+    time = np.cumsum(np.where(rng.random(count) < 0.05, 0.05, 1e-3 + 1e-4 * rng.random(count)))
+    values = rng.normal(size=(count, joints))
+    values[rng.random(values.shape) < 0.01] = np.nan
+    values[rng.random(values.shape) < 0.005] = np.inf
+    found = polynomial_rates(time, values, samples)
+    expected = np.full((2, count, joints), np.nan)
+    fill_rates_one_by_one(time, values, samples, np.empty((5, samples)), *expected)
+    expected[~np.isfinite(expected)] = np.nan
+    for rates, own in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(np.where(np.isfinite(rates), rates, np.nan), own)

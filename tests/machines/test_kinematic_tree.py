@@ -158,6 +158,21 @@ def test_inertia_matrix_and_jacobian_are_those_of_pinocchio(seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_the_columns_of_the_inertia_matrix_are_the_momenta_of_unit_speeds(seed):
+    tree = random_tree(seed)
+    position, speed = states(tree, 75, seed)
+    matrix = tree.inertia_matrix(position)
+    for column in range(len(tree.order)):
+        unit = np.zeros_like(position)
+        unit[:, column] = 1.0
+        error = np.abs(matrix[:, :, column] - tree.momentum_terms(position, unit)[0])
+        assert np.max(error) < 2e-15 * np.max(np.abs(matrix))
+    assert np.array_equal(matrix, matrix.transpose(0, 2, 1))
+    assert np.array_equal(tree.inertia_diagonal(position), np.einsum("nii->ni", matrix))
+    assert np.array_equal(tree.inertia_times(position, speed), tree.momentum_terms(position, speed)[0])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_the_momentum_changes_as_torque_velocity_force_and_gravity_say(seed):
     """dp/dt = tau + C' qd - g, which holds for dM/dt = C + C' only."""
     tree = random_tree(seed)
@@ -261,13 +276,14 @@ def test_what_a_sample_gives_does_not_depend_on_the_samples_around_it(seed):
     tree = random_tree(seed)
     position, speed = states(tree, 75)
     whole = (*tree.momentum_terms(position, speed), *tree.energies(position, speed))
-    torque = tree.inverse_dynamics(position, speed, speed)
+    torque, matrix = tree.inverse_dynamics(position, speed, speed), tree.inertia_matrix(position)
     for k in (0, 1, 31, 32, 63, 64, 74):
         one = slice(k, k + 1)
         alone = (*tree.momentum_terms(position[one], speed[one]), *tree.energies(position[one], speed[one]))
         for found, expected in zip(alone, whole, strict=True):
             assert np.array_equal(found, expected[one])
         assert np.array_equal(tree.inverse_dynamics(position[one], speed[one], speed[one]), torque[one])
+        assert np.array_equal(tree.inertia_matrix(position[one]), matrix[one])
 
 
 @pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
@@ -286,6 +302,9 @@ def test_a_value_that_is_not_finite_voids_its_own_sample_only(missing):
     for found, expected in zip(results(broken_position, broken_speed), results(position, speed), strict=True):
         assert np.isnan(found[touched]).all()
         assert np.array_equal(found[~touched], expected[~touched])
+    matrix, whole = tree.inertia_matrix(broken_position), tree.inertia_matrix(position)
+    assert np.isnan(matrix[5]).all() and np.isnan(tree.inertia_diagonal(broken_position)[5]).all()
+    assert np.array_equal(np.delete(matrix, 5, axis=0), np.delete(whole, 5, axis=0))
     jacobian = tree.contact_jacobian(broken_position, link, (0.0, 0.0, 0.0))
     assert np.isnan(jacobian[5]).all()
     assert np.isfinite(np.delete(jacobian, 5, axis=0)).all()
