@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any, ClassVar, Self
 
 from cdtool.formats.mcap.container.serialisation import (
@@ -16,6 +17,7 @@ from cdtool.formats.mcap.container.serialisation import (
     index_entries,
     long_block,
     mapping,
+    numbers_by_channel,
     rest,
     string,
     uint8,
@@ -42,10 +44,15 @@ class Record:
     def read(cls, body: memoryview) -> Self:
         """Return the record with the content `body`; raises DamageError."""
         values, at = [], 0
-        for each in fields(cls):  # type: ignore[arg-type]
-            value, at = each.metadata["read"](body, at)
+        for read in _readers(cls):  # type: ignore[arg-type]
+            value, at = read(body, at)
             values.append(value)
         return cls(*values)
+
+
+@cache
+def _readers(kind: type[Record]) -> tuple[Read, ...]:
+    return tuple(each.metadata["read"] for each in fields(kind))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -133,7 +140,7 @@ class ChunkIndex(Record):
     message_end_time: int = wire(uint64)
     chunk_start_offset: int = wire(uint64)
     chunk_length: int = wire(uint64)
-    message_index_offsets: Mapping[int, int] = wire(mapping(uint16, uint64))
+    message_index_offsets: Mapping[int, int] = wire(numbers_by_channel)
     message_index_length: int = wire(uint64)
     compression: str = wire(string)
     compressed_size: int = wire(uint64)
@@ -180,7 +187,7 @@ class Statistics(Record):
     chunk_count: int = wire(uint32)
     message_start_time: int = wire(uint64)
     message_end_time: int = wire(uint64)
-    channel_message_counts: Mapping[int, int] = wire(mapping(uint16, uint64))
+    channel_message_counts: Mapping[int, int] = wire(numbers_by_channel)
 
 
 @dataclass(frozen=True)

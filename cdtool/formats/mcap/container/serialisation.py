@@ -12,6 +12,8 @@ from typing import Any
 
 from cdtool.formats.mcap.container.damage import DamageError
 
+_CHANNEL_NUMBER = struct.Struct("<HQ")
+
 Read = Callable[[memoryview, int], tuple[Any, int]]
 
 
@@ -19,9 +21,10 @@ def _integer(code: str) -> Read:
     unpack, size = struct.Struct(f"<{code}").unpack_from, struct.calcsize(f"<{code}")
 
     def read(body: memoryview, at: int) -> tuple[int, int]:
-        if at + size > len(body):
-            raise DamageError(f"a record of {len(body)} bytes ends within a number")
-        return unpack(body, at)[0], at + size
+        try:
+            return unpack(body, at)[0], at + size
+        except struct.error as fault:
+            raise DamageError(f"a record of {len(body)} bytes ends within a number") from fault
 
     return read
 
@@ -71,6 +74,14 @@ def mapping(key: Read, value: Read) -> Read:
         return entries, at
 
     return read
+
+
+def numbers_by_channel(body: memoryview, at: int) -> tuple[dict[int, int], int]:
+    """Read Map<uint16, uint64>."""
+    content, at_end = block(body, at)
+    if len(content) % _CHANNEL_NUMBER.size:  # cut off within an entry
+        return mapping(uint16, uint64)(body, at)
+    return dict(_CHANNEL_NUMBER.iter_unpack(content)), at_end
 
 
 def index_entries(body: memoryview, at: int) -> tuple[tuple[tuple[int, int], ...], int]:
