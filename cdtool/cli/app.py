@@ -18,6 +18,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from cdtool.cli.first_use import compilation_shown
 from cdtool.cli.streams import lost_output, open_standard_streams
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
@@ -168,7 +169,8 @@ def main() -> None:
 def _run_app(came: list[int]) -> Any:
     """Run the app and return its status. A signal ends it even if a library replaced the exception during an import."""
     try:
-        return app(standalone_mode=False)
+        with compilation_shown():
+            return app(standalone_mode=False)
     except (KeyboardInterrupt, SystemExit, typer.Abort):
         raise
     except BaseException:

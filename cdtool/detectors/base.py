@@ -421,7 +421,7 @@ def held_on(clock: FloatArray, series: Series) -> tuple[FloatArray, BoolArray]:
     return held, missing
 
 
-@kernel(f"void({READ_ONLY}, {READ_TABLE}, {READ_ONLY}, {READ_ONLY}, float64[:, ::1], b1[:, ::1])")
+@kernel(f"void({READ_ONLY}, {READ_TABLE}, {READ_ONLY}, {READ_ONLY}, float64[:, ::1], b1[:, ::1])", rare=True)
 def _fill_held(
     time: FloatArray, values: FloatArray, usual: FloatArray, clock: FloatArray, held: FloatArray, missing: BoolArray
 ) -> None:

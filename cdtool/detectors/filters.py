@@ -211,7 +211,8 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
 
 @kernel(
     f"void({READ_ONLY}, {READ_TABLE}, {READ_MARKS}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64[::1], "
-    "float64[:, ::1], float64[:, ::1])"
+    "float64[:, ::1], float64[:, ::1])",
+    rare=True,
 )
 def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
@@ -296,7 +297,7 @@ def _fill_starts(time: FloatArray, missing: BoolArray, longest_gap: FloatArray, 
             starts[k, j] = start
 
 
-@kernel(f"void({READ_ONLY}, {READ_TABLE}, int64, {', '.join(5 * ['float64[:, ::1]'])})")
+@kernel(f"void({READ_ONLY}, {READ_TABLE}, int64, {', '.join(5 * ['float64[:, ::1]'])})", rare=True)
 def _polynomial_rates(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
     values: FloatArray,
