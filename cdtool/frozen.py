@@ -41,7 +41,7 @@ def frozen(kind: type[T]) -> type[T]:
 
 
 class _Completion:
-    """Makes a class a dataclass when it is first called; other threads wait until the class is complete."""
+    """Completion of a class as a dataclass, at the first call; other threads wait for it."""
 
     def __init__(self, kind: type[Any]) -> None:
         self.kind = kind
