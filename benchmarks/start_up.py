@@ -1,7 +1,11 @@
-"""Start-up: `cdtool --help` compared with a bare typer app, one `cdtool detect` with its plot, and cold compilation.
+"""Start-up: how long commands take that do little, warm and at first use.
 
-Every number is that of a new process. The bare app has as many commands, subcommands and options as cdtool has now, and
-is started in the same way.
+* `cdtool --help` compared with a bare typer app of as many commands, subcommands and options, started in the same way.
+* CPU time and time on the clock of short commands on the sample logs, kernels cached; `import numba` as a peer.
+* `cdtool detect` with its plot.
+* The first `cdtool benchmark` of a fresh installation, alone and two at once, and the compilation of every kernel.
+
+Every number is that of a new process.
 """
 
 from __future__ import annotations
@@ -10,8 +14,10 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from timing import Spread, interleaved, main, ratio, table, verdict
@@ -20,11 +26,17 @@ import cdtool
 from cdtool.simulation.gate_recordings import write_gate_recordings
 
 HELP_ROUNDS = 25
+COMMAND_ROUNDS = 7
 DETECT_ROUNDS = 5
+FIRST_ROUNDS = 2
 COLD_ROUNDS = 3
 HELP_AT_MOST = 1.3
+DETECT_AT_MOST_CPU_S = 0.6
 DETECT_AT_MOST_S = 2.0
+# Two first starts at once over one first start and one later start: what both compile is paid twice.
+TWICE_AT_MOST = 1.3
 COLD_AT_MOST_S = 20.0
+SAMPLES = Path(cdtool.__file__).parents[1] / "sample_logs" / "gate"
 
 _CDTOOL = "from cdtool.cli.app import main\n\nmain()\n"
 _BARE = "from bare_app import app\n\napp()\n"
@@ -32,13 +44,15 @@ _BARE = "from bare_app import app\n\napp()\n"
 _COMPILE_ALL = """
 import importlib, pkgutil
 from time import perf_counter
-import cdtool, cdtool.kernel_warm_up
+import cdtool, cdtool.kernel_warm_up, cdtool.kernels
 for item in pkgutil.walk_packages(cdtool.__path__, "cdtool."):
     importlib.import_module(item.name)
 import numba
 begin = perf_counter()
-count = cdtool.kernel_warm_up.compile_loaded()
-print(count, perf_counter() - begin)
+cdtool.kernel_warm_up.compile_loaded()
+for item in cdtool.kernels.entries():
+    item.compiled
+print(len(cdtool.kernels.loaded()), perf_counter() - begin)
 """
 
 
@@ -46,14 +60,22 @@ def measure() -> bool:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = _environment(folder)
-        return all([_help(folder, environment), _cold(folder, environment), _detect(folder, environment)])
+        (folder / "cdtool_command.py").write_text(_CDTOOL, encoding="utf-8")
+        return all(
+            [
+                _help(folder, environment),
+                _cold(folder, environment),
+                _commands(folder, environment),
+                _detect(folder, environment),
+                _first_start(folder, environment),
+            ]
+        )
 
 
 def _help(folder: Path, environment: dict[str, str]) -> bool:
     source, commands, options = _bare_app()
     (folder / "bare_app.py").write_text(source, encoding="utf-8")
     (folder / "bare.py").write_text(_BARE, encoding="utf-8")
-    (folder / "cdtool_command.py").write_text(_CDTOOL, encoding="utf-8")
     tasks = {
         "cdtool --help": lambda: _run([str(folder / "cdtool_command.py"), "--help"], environment),
         "bare typer app --help": lambda: _run([str(folder / "bare.py"), "--help"], environment),
@@ -79,6 +101,81 @@ def _cold(folder: Path, environment: dict[str, str]) -> bool:
     held = verdict(f"cold compilation of {count} kernels, s", spread, COLD_AT_MOST_S, at_most=True)
     print()
     return held
+
+
+def _commands(folder: Path, environment: dict[str, str]) -> bool:
+    """Short commands on the sample logs; the kernels are cached in the round that is not counted."""
+    log, machine = str(SAMPLES / "stiff" / "03.csv"), ["--machine", str(SAMPLES / "machine.toml")]
+    free = sorted(map(str, (SAMPLES / "free").iterdir()))
+    signature = str(folder / "signature.json")
+    learn = ["learn-signature", *free, *machine, "--detector", "momentum", "-o", signature, "--force"]
+    arguments = {
+        "--help": ["--help"],
+        "learn-signature": learn,
+        "info": ["info", log, *machine],
+        "detect --limit": ["detect", log, *machine, "--detector", "momentum", "--limit", "400"],
+        "detect --signature": ["detect", log, *machine, "--signature", signature],
+        "benchmark": ["benchmark", str(SAMPLES / "benchmark.toml"), "--json"],
+    }
+    command = str(folder / "cdtool_command.py")
+    _run([command, *learn], environment)
+    runs = {f"cdtool {name}": [command, *each] for name, each in arguments.items()}
+    runs |= {"python -c 'import numba'": ["-c", "import numba"], "python -c pass": ["-c", "pass"]}
+    clock, processor = measured({name: _task(each, environment) for name, each in runs.items()}, COMMAND_ROUNDS)
+    spread = Spread.of(processor["cdtool detect --limit"])
+    held = verdict("cdtool detect --limit, CPU s", spread, DETECT_AT_MOST_CPU_S, at_most=True)
+    table(
+        ("task", "CPU s (low-high)", "s (low-high)"),
+        [(name, Spread.of(processor[name]), Spread.of(clock[name])) for name in runs],
+    )
+    print("sample logs of the gate; kernels cached\n")
+    return held
+
+
+def _first_start(folder: Path, environment: dict[str, str]) -> bool:
+    """The benchmark of the samples with an empty cache: alone, again, and two at once."""
+    arguments = [str(folder / "cdtool_command.py"), "benchmark", str(SAMPLES / "benchmark.toml"), "--json"]
+    caches = iter(str(folder / f"first_{i}") for i in range(2 * FIRST_ROUNDS))
+    times: dict[str, list[tuple[float, float]]] = {"first": [], "again": [], "two first at once": []}
+    for _ in range(FIRST_ROUNDS):
+        alone, shared = ({**environment, "NUMBA_CACHE_DIR": next(caches)} for _ in range(2))
+        times["first"].append(_times(_task(arguments, alone)))
+        times["again"].append(_times(_task(arguments, alone)))
+        times["two first at once"].append(_times(partial(_run_at_once, [arguments] * 2, shared)))
+    pairs = zip(times["two first at once"], times["first"], times["again"], strict=True)
+    spread = Spread.of([both[1] / (first[1] + again[1]) for both, first, again in pairs])
+    held = verdict("two first starts at once / one and a later one, CPU", spread, TWICE_AT_MOST, at_most=True)
+    table(
+        ("cdtool benchmark", "CPU s (low-high)", "s (low-high)"),
+        [
+            (name, Spread.of([processor for _, processor in each]), Spread.of([clock for clock, _ in each]))
+            for name, each in times.items()
+        ],
+    )
+    return held
+
+
+def measured(
+    tasks: Mapping[str, Callable[[], object]], rounds: int
+) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
+    """Seconds on the clock, and of CPU in child processes, of every task in every round."""
+    processor: dict[str, list[float]] = {name: [] for name in tasks}
+
+    def with_cpu(name: str) -> Callable[[], None]:
+        return lambda: processor[name].append(_times(tasks[name])[1])
+
+    clock = interleaved({name: with_cpu(name) for name in tasks}, rounds)
+    return clock, {name: each[-rounds:] for name, each in processor.items()}
+
+
+def _times(task: Callable[[], object]) -> tuple[float, float]:
+    """Seconds on the clock, and of CPU in the child processes of this one and theirs."""
+    import resource
+
+    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
+    task()
+    clock, after = perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return clock, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def _detect(folder: Path, environment: dict[str, str]) -> bool:
@@ -121,6 +218,20 @@ def _run(arguments: Sequence[str], environment: dict[str, str]) -> str:
     if done.returncode:
         sys.exit(f"error: {' '.join(arguments[-4:])}: status {done.returncode}\n{done.stderr}")
     return done.stdout
+
+
+def _task(arguments: Sequence[str], environment: dict[str, str]) -> Callable[[], str]:
+    return lambda: _run(arguments, environment)
+
+
+def _run_at_once(commands: Sequence[Sequence[str]], environment: dict[str, str]) -> None:
+    silent = subprocess.DEVNULL
+    started = [
+        subprocess.Popen([sys.executable, *each], env=environment, stdout=silent, stderr=silent) for each in commands
+    ]
+    statuses = [process.wait() for process in started]
+    if any(statuses):
+        sys.exit("error: of several first starts at once, one failed")
 
 
 def _bare_app() -> tuple[str, int, int]:

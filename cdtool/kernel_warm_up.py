@@ -11,10 +11,9 @@ import subprocess
 import sys
 from collections.abc import Iterable, Sequence
 from importlib import import_module
-from pathlib import Path
-from typing import Any
 
 from cdtool.cores import usable_cores
+from cdtool.kernel_cache import not_cached, report_compilation
 from cdtool.kernels import Kernel, entries, loaded, named
 
 # Compile time, in bytes of byte code: fixed cost of a kernel; cost of starting a process; and the minimum work per
@@ -33,12 +32,14 @@ compile_named(kernels)
 
 
 def compile_loaded() -> int:
-    """Compile every kernel of the modules imported so far (before workers start); return their number.
+    """Compile the `missing` kernels of the modules imported so far; return their number.
 
     Kernels that another process failed to compile are compiled by this one.
     """
-    wanted = entries()
-    own, *others = shares(_not_cached(wanted), usable_cores())
+    absent = missing()
+    if absent:
+        report_compilation(len(absent))
+    own, *others = shares(absent, usable_cores())
     children = [child for share in others if (child := _start(share))]
     try:
         for item in own:
@@ -49,9 +50,14 @@ def compile_loaded() -> int:
         for child in children:
             child.kill()
             child.wait()
-    for item in wanted:
+    for item in absent:
         _ = item.compiled
-    return len(loaded())
+    return len(absent)
+
+
+def missing() -> list[Kernel]:
+    """Return the kernels to compile before work begins: not in the cache, and not `rare`; none without a cache."""
+    return _not_cached(item for item in entries() if not item.rare and not item.is_ready)
 
 
 def compile_named(names: Iterable[tuple[str, str]]) -> None:
@@ -111,34 +117,9 @@ def _weight(items: Iterable[Kernel]) -> int:
 
 
 def _not_cached(items: Iterable[Kernel]) -> list[Kernel]:
-    """Return the kernels that are not in numba's cache; empty without a cache.
-
-    numba cannot query its cache without compiling. This uses documented facts instead: the folder (`stats.cache_path`
-    of a function that is not compiled yet), and one index file `.nbi` per function, named after it. An index older than
-    the kernel's file or than numba is outdated. A wrong answer costs only time: a kernel mistaken for cached is
-    compiled by this process.
-    """
-    import numba
-
-    config: Any = numba.config
-    if config.DISABLE_JIT:
-        return []
-    try:
-        return [item for item in items if not _is_cached(item)]
-    except (RuntimeError, OSError):  # no writable folder
-        return []
-
-
-def _is_cached(item: Kernel) -> bool:
-    import numba
-
-    function = named(item)
-    lazy: Any = numba.njit(cache=True)(function)
-    changed = max(Path(file).stat().st_mtime for file in (item.function.__code__.co_filename, numba.__file__))
-    # numba removes the signs < and > from file names.
-    name = function.__qualname__.translate({ord("<"): None, ord(">"): None})
-    indices = Path(lazy.stats.cache_path).glob(f"*.{name}-*.nbi")
-    return any(index.stat().st_mtime >= changed for index in indices)
+    """Return the kernels that are not in numba's cache; empty without a cache."""
+    functions = {named(item): item for item in items}
+    return [functions[function] for function in not_cached(functions)]
 
 
 def _start(share: Iterable[Kernel]) -> subprocess.Popen[bytes] | None:

@@ -20,6 +20,8 @@ from typing import Any, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.kernel_cache import compile_cached, imported_numba
+
 # The signature of a read-only array (n,) of float64; writable arrays fit it too.
 READ_ONLY = "Array(float64, 1, 'C', readonly=True)"
 
@@ -50,6 +52,8 @@ class Kernel:
 
     A call with arrays takes longer than the reading of a number, as each array is passed as seven words and counted as
     in use: with `inline`, the machine code of a short kernel becomes a part of its callers.
+
+    A `rare` kernel, which few logs need, is compiled at its first call, not before work begins.
     """
 
     def __init__(
@@ -60,12 +64,14 @@ class Kernel:
         entry: bool = False,
         exact: bool = False,
         inline: bool = False,
+        rare: bool = False,
     ) -> None:
         self.function = function
         self.signature = signature
         self.entry = entry
         self.exact = exact
         self.inline = inline
+        self.rare = rare
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Callable[..., Any] | None = None
@@ -97,6 +103,11 @@ class Kernel:
         return not self.signature
 
     @property
+    def is_ready(self) -> bool:
+        """Whether this process has compiled it, or loaded it from the cache."""
+        return self._compiled is not None
+
+    @property
     def tuples(self) -> dict[str, type]:
         """Return the named tuples in its signature, by their names in its module."""
         known = ((name, self.function.__globals__.get(name)) for name in re.findall(r"\w+", self.signature))
@@ -114,14 +125,15 @@ class Kernel:
 
 
 def kernel(
-    signature: str, *, entry: bool = False, exact: bool = False, inline: bool = False
+    signature: str, *, entry: bool = False, exact: bool = False, inline: bool = False, rare: bool = False
 ) -> Callable[[Callable[..., Any]], Kernel]:
     """Mark a function as a kernel with the given numba signature.
 
     `entry`: both Python and kernels call it. `exact`: its numbers have the bits of the same formula in numpy; the
-    kernels that it calls must be exact too. `inline`: its machine code is a part of its callers.
+    kernels that it calls must be exact too. `inline`: its machine code is a part of its callers. `rare`: few logs need
+    it.
     """
-    return lambda function: Kernel(function, signature, entry=entry, exact=exact, inline=inline)
+    return lambda function: Kernel(function, signature, entry=entry, exact=exact, inline=inline, rare=rare)
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -230,16 +242,14 @@ def _signature(item: Kernel) -> Any:
 
 
 def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[..., Any]:
-    import numba
-
     global _told
-    njit: Any = numba.njit
-    function, signature = named(item, suffix), _signature(item)
-    fused: set[str] | bool = False if item.exact else {"contract"}
-    options = {"nogil": True, "error_model": "numpy", "fastmath": fused, **options}
     with _no_collection():
+        numba = imported_numba()
+        function, signature = named(item, suffix), _signature(item)
+        fused: set[str] | bool = False if item.exact else {"contract"}
+        options = {"nogil": True, "error_model": "numpy", "fastmath": fused, **options}
         try:
-            compiled: Callable[..., Any] = njit(signature, cache=True, **options)(function)
+            return compile_cached(function, signature, options)
         except (RuntimeError, OSError) as fault:
             if not _told:
                 _told = True
@@ -249,5 +259,5 @@ def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[...
                     RuntimeWarning,
                     stacklevel=4,
                 )
-            compiled = njit(signature, **options)(function)
+            compiled: Callable[..., Any] = numba.njit(signature, **options)(function)
         return compiled

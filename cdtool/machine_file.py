@@ -53,7 +53,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
                 "operations", "is a key of the benchmark file", "set it there, or give --operations motion"
             )
     machines = _registry("cdtool.machines", "MACHINES")
-    kind = table.choice("type", machines.names(plugins=True))
+    kind = table.choice("type", machines.names_for(table.values.get("type")))
     machine = machines.load(kind).from_table(table)
     table.finish()
     channels = root.table("channels")

@@ -7,13 +7,15 @@ name or a full list, and checked against the contract when they are loaded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cdtool.errors import CdtoolError, UsageError, nearest
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,10 @@ class Registry:
         if plugins:
             found += sorted(set(self._plugins()) - set(found))
         return found
+
+    def names_for(self, name: object) -> list[str]:
+        """Return the names to look `name` up in: with plug-ins only if the table does not have it."""
+        return self.names(plugins=name not in self.names())
 
     def usable_names(self) -> list[str]:
         """Return the names in the table's order, then the usable plug-ins."""
@@ -136,6 +142,13 @@ class Registry:
         # Failures come before the hint: the list of known names is cut at the end of the line.
         told = "; ".join([f"unknown {self.kind} '{name}'", *(item.message for item in broken.values())])
         raise UsageError(told, hint)
+
+
+def entry_points(*, group: str) -> Iterable[EntryPoint]:
+    """Return the entry points of a group; their reader is imported here, since most commands need none."""
+    from importlib import metadata
+
+    return metadata.entry_points(group=group)
 
 
 def plugin_packages() -> dict[str, str]:

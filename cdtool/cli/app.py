@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import logging
 import signal
@@ -18,6 +19,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from cdtool.cli.first_use import compilation_shown
 from cdtool.cli.streams import lost_output, open_standard_streams
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
@@ -168,7 +170,8 @@ def main() -> None:
 def _run_app(came: list[int]) -> Any:
     """Run the app and return its status. A signal ends it even if a library replaced the exception during an import."""
     try:
-        return app(standalone_mode=False)
+        with compilation_shown():
+            return app(standalone_mode=False)
     except (KeyboardInterrupt, SystemExit, typer.Abort):
         raise
     except BaseException:
@@ -179,8 +182,10 @@ def _run_app(came: list[int]) -> Any:
 
 def _main(came: list[int]) -> None:
     open_standard_streams()
-    # Imported modules stay alive: collecting garbage among them takes a tenth of a short command's time.
+    # Imported modules stay alive: collecting garbage among them takes a tenth of a short command's time, and as much
+    # again when Python ends.
     gc.set_threshold(50_000, 10, 10)
+    atexit.register(gc.freeze)
     warnings.showwarning = _show_note
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # hides its advice about its own cache
     try:

@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.errors import CdtoolError
-from cdtool.evaluation.alike import alike
-from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.exit_status import Fact, status_of
 from cdtool.plain_text import LINE_LENGTH, counted, one_line, shorten, shorten_names
 from cdtool.plain_text import plain as plain
@@ -26,6 +24,7 @@ from cdtool.strict_json import strict_json
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from cdtool.evaluation.results import RecordingFinding, Skipped
     from cdtool.findings import Finding
     from cdtool.workflows.detection import Detected
     from cdtool.workflows.workers import Progress
@@ -74,6 +73,10 @@ def print_skipped(skipped: Sequence[Skipped], findings: Sequence[RecordingFindin
 
 
 def _print_alike(word: str, every: Sequence[Skipped | RecordingFinding]) -> None:
+    if not every:
+        return
+    from cdtool.evaluation.alike import alike
+
     items = alike([replace(item, reason=_bare(item)) for item in dict.fromkeys(every)])
     for item in items[:_SHOWN]:
         typer.echo(one_line(f"{word}: {item.recording}: {item.reason}"), err=True)

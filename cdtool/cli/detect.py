@@ -17,11 +17,11 @@ from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
-from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.exit_status import Fact
-from cdtool.findings import Finding
 
 if TYPE_CHECKING:
+    from cdtool.dynamics import Machine
+    from cdtool.evaluation.results import RecordingFinding, Skipped
     from cdtool.pipeline import Detection
     from cdtool.workflows.contact_force import ForceSummary
     from cdtool.workflows.detection import Detected
@@ -47,16 +47,16 @@ def detect(
 
     Example: cdtool detect stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot out.png
     """
+    from cdtool.evaluation.results import Skipped
     from cdtool.files import made_folder
-    from cdtool.workflows.contact_force import ContactPoint, summarise_force
 
     settings = options.settings()
     prepared, machine_file = settings.prepared(), settings.machine_file()
-    contact = ContactPoint.parse(contact_at) if contact_at else None
+    estimate_force = _force_at(contact_at, machine_file.machine) if contact_at else None
     run = _Run(
         settings,
         _plot_names(plot, logs, force=force),
-        partial(summarise_force, machine=machine_file.machine, contact=contact) if contact else None,
+        estimate_force,
         skipped=[*prepared.skipped] if prepared else [],
         findings=[*prepared.losses] if prepared else [],
     )
@@ -110,6 +110,8 @@ class _Run:
 
     def show(self, *, as_json: bool) -> None:
         """Print the results and exit with their status."""
+        from cdtool.evaluation.results import RecordingFinding
+        from cdtool.findings import Finding
         from cdtool.findings.scoring import LearnedFromIt
         from cdtool.workflows.runs import absent_truth
 
@@ -126,6 +128,12 @@ class _Run:
                 if log in self.plot_names:
                     typer.echo(f"plot written to {plain(self.plot_names[log])}")
         leave(self.skipped, self.findings, print_not_assessable((str(log), found) for log, found in self.done))
+
+
+def _force_at(contact_at: str, machine: Machine) -> Callable[[Detection], ForceSummary]:
+    from cdtool.workflows.contact_force import ContactPoint, summarise_force
+
+    return partial(summarise_force, machine=machine, contact=ContactPoint.parse(contact_at))
 
 
 def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:

@@ -10,7 +10,6 @@ import typer
 from cdtool.cli.console import leave, number, print_json, print_skipped, table
 from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
-from cdtool.evaluation.results import Skipped
 
 _KINDS = ("detectors", "thresholds", "machines", "formats", "writers")
 
@@ -23,6 +22,8 @@ def list_known(
 
     Example: cdtool list detectors --json
     """
+    from cdtool.evaluation.results import Skipped
+
     if kind not in _KINDS:
         raise UsageError(f"unknown kind '{kind}'", nearest(kind, _KINDS))
     registry = _registry(kind)

@@ -72,11 +72,12 @@ class LogOptions:
         setting given together with the benchmark file that contains it. Raises what reading these files raises.
         """
         from cdtool.machine_file import read_machine_file
-        from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
         from cdtool.workflows.detection_options import DetectionOptions
 
         limits = limits_of(self.limit)
         if self.benchmark is not None:
+            from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
+
             self._refuse_beside(self.benchmark)
             prepared = prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
             return DetectionOptions(benchmark=prepared)

@@ -10,7 +10,6 @@ import typer
 
 from cdtool.cli.console import leave, number, plain, say, table
 from cdtool.cli.truth_shown import show_truth
-from cdtool.evaluation.results import onset_words
 from cdtool.exit_status import Fact
 
 if TYPE_CHECKING:
@@ -32,6 +31,7 @@ _HEADINGS = {
 
 def show_table(evaluated: Evaluated) -> None:
     """Print the thesis's table 5.1 for each group, with the notes needed to read its numbers."""
+    from cdtool.evaluation.results import onset_words
     from cdtool.report.few_contacts import explained, latency_columns
 
     shown = latency_columns(evaluated.summaries)

@@ -222,7 +222,8 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
 
 @kernel(
     f"void({READ_ONLY}, {READ_TABLE}, {READ_MARKS}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64[::1], "
-    "float64[:, ::1], float64[:, ::1])"
+    "float64[:, ::1], float64[:, ::1])",
+    rare=True,
 )
 def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
@@ -307,7 +308,7 @@ def _fill_starts(time: FloatArray, missing: BoolArray, longest_gap: FloatArray, 
             starts[k, j] = start
 
 
-@kernel(f"void({READ_ONLY}, int64, int64, float64[:, ::1], float64[::1], float64[::1])")
+@kernel(f"void({READ_ONLY}, int64, int64, float64[:, ::1], float64[::1], float64[::1])", rare=True)
 def _fill_powers(
     time: FloatArray, begin: int, before: int, window: FloatArray, powers: FloatArray, rows: FloatArray
 ) -> None:
@@ -346,7 +347,8 @@ def _fill_powers(
 
 @kernel(
     f"void({READ_ONLY}, {READ_TABLE}, int64, float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], "
-    "float64[:, ::1])"
+    "float64[:, ::1])",
+    rare=True,
 )
 def _polynomial_rates(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,

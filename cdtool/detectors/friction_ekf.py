@@ -20,7 +20,6 @@ from cdtool.detectors.base import (
     single,
 )
 from cdtool.detectors.filters import unsettled
-from cdtool.detectors.friction_ekf_arm_kernel import AngleVariances, Link, run_arm_filter
 from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, run_filter
 from cdtool.detectors.look import RED, Look
 from cdtool.dynamics import Gain, JointEquation, Machine
@@ -211,6 +210,8 @@ class FrictionEkf:
             inertia = np.ascontiguousarray(equation.inertia)
             run_filter(samples, inertia, equation.viscous, variances, bounds, friction, status)
             return friction, status
+        from cdtool.detectors.friction_ekf_arm_kernel import AngleVariances, Link, run_arm_filter
+
         link = Link(
             read_only(motion.position),
             read_only(pendulum.other_position),

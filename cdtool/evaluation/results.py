@@ -7,11 +7,12 @@ together with its meaning, from which the published schema is made.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import PureWindowsPath
 from typing import Any, Self
 
 from cdtool.findings import Finding
+from cdtool.frozen import frozen
 
 SCHEMA_VERSION = 4
 # How reports introduce what is lost of a recording that was used.
@@ -45,7 +46,7 @@ def onset_words(provenance: Mapping[str, Any]) -> str:
     return f"{rule}; label file {PureWindowsPath(str(labels)).name}" if labels else str(rule)
 
 
-@dataclass(frozen=True)
+@frozen
 class RecordingResult:
     """One log that was scored."""
 
@@ -59,7 +60,7 @@ class RecordingResult:
     point: str | None = meant("test point: its force figures are averaged", default=None)
 
 
-@dataclass(frozen=True)
+@frozen
 class ContactResult:
     """One contact seen by one detector."""
 
@@ -112,7 +113,7 @@ class ContactResult:
         return self.outcome == "in_progress"
 
 
-@dataclass(frozen=True)
+@frozen
 class FalseAlarmResult:
     """One alarm without a contact."""
 
@@ -126,7 +127,7 @@ class FalseAlarmResult:
     limit: float | None = meant("limit, in the detector's unit", default=None)
 
 
-@dataclass(frozen=True)
+@frozen
 class ExposureResult:
     """How long and how often a detector watched in a group: the denominator of its false alarms."""
 
@@ -139,7 +140,7 @@ class ExposureResult:
     not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
 
 
-@dataclass(frozen=True)
+@frozen
 class ForceStepResult:
     """One step of a force profile, compared with one contact or one test point."""
 
@@ -152,7 +153,7 @@ class ForceStepResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@frozen
 class ForceResult:
     """One contact against a force profile."""
 
@@ -170,7 +171,7 @@ class ForceResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@frozen
 class PointResult:
     """The tests at one point against a force profile, averaged as the profile asks."""
 
@@ -184,7 +185,7 @@ class PointResult:
     reason: str | None = meant("why it does not pass", default=None)
 
 
-@dataclass(frozen=True)
+@frozen
 class SweepResult:
     """One detector in one group with all its limits moved: a point of the latency against false-alarm curve."""
 
@@ -202,7 +203,7 @@ class SweepResult:
     in_use: bool = meant("the benchmark's own limits", default=False)
 
 
-@dataclass(frozen=True)
+@frozen
 class CalibrationResult:
     """How a detector's safety factor was set for a false-alarm budget."""
 
@@ -214,7 +215,7 @@ class CalibrationResult:
     alarms: int = meant("operations that alarm with that factor; of a budget by hour: alarms")
 
 
-@dataclass(frozen=True)
+@frozen
 class LimitResult:
     """One limit of the benchmark file, checked against one metric."""
 
@@ -229,7 +230,7 @@ class LimitResult:
     reason: str | None = meant("why it is not met", default=None)
 
 
-@dataclass(frozen=True)
+@frozen
 class ConclusionResult:
     """What follows from limits, force profiles, missed contacts and what could not be assessed, taken together."""
 
@@ -243,7 +244,7 @@ class ConclusionResult:
     exit_status: int = meant("exit status of the benchmark with these results", default=0)
 
 
-@dataclass(frozen=True)
+@frozen
 class Skipped:
     """What was left out: a recording, a part of one, or a detector."""
 
@@ -251,7 +252,7 @@ class Skipped:
     reason: str = meant("why it was left out")
 
 
-@dataclass(frozen=True)
+@frozen
 class RecordingFinding:
     """A finding about a recording, or a detector, that was used."""
 
@@ -272,7 +273,7 @@ class RecordingFinding:
         return self.severity == "loss"
 
 
-@dataclass(frozen=True)
+@frozen
 class Results:
     """All of it, in the order of the benchmark file."""
 

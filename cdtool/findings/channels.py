@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 from cdtool.plain_text import counted
 
 
@@ -15,7 +15,7 @@ def _of_joint(joint: str) -> str:
     return f" of joint {joint}" if joint else ""
 
 
-@dataclass(frozen=True)
+@frozen
 class AbsentTruth(Fact):
     """A column or topic of ground truth that is mapped and not in the log; `similar` is the nearest name in it."""
 
@@ -29,7 +29,7 @@ class AbsentTruth(Fact):
         return f"is not in this log: no {self.what} '{self.name}'{meant}"
 
 
-@dataclass(frozen=True)
+@frozen
 class MissingValues(Fact):
     """Values that are NaN."""
 
@@ -42,7 +42,7 @@ class MissingValues(Fact):
         return f"{self.count} of {counted(self.values, 'value')} {verb} missing (NaN)"
 
 
-@dataclass(frozen=True)
+@frozen
 class MaskedValues(Fact):
     """Values that are masked; `joint` is empty where there is but one."""
 
@@ -60,28 +60,28 @@ class MaskedValues(Fact):
         return f"{counted(self.count, 'value')}{_of_joint(self.joint)} {verb} {self.what}, masked"
 
 
-@dataclass(frozen=True)
+@frozen
 class InfiniteValues(MaskedValues):
     """Infinite values."""
 
     what = "infinite"
 
 
-@dataclass(frozen=True)
+@frozen
 class SaturatedValues(MaskedValues):
     """Values at the limits of the sensor's range."""
 
     what = "at the sensor's limit"
 
 
-@dataclass(frozen=True)
+@frozen
 class ImpossibleValues(MaskedValues):
     """Values outside of the range that the machine file states, or beyond what any machine reaches."""
 
     what = "outside the possible range"
 
 
-@dataclass(frozen=True)
+@frozen
 class ImplausibleValues(Fact):
     """Values far from all that was learned: the first one, where it is, and the usual range."""
 
@@ -102,7 +102,7 @@ class ImplausibleValues(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class Leap:
     """A step from `before` to `after` at `time` [s]; from `new_zero` [s] on values are valid again, NaN if never."""
 
@@ -112,7 +112,7 @@ class Leap:
     new_zero: float = math.nan
 
 
-@dataclass(frozen=True)
+@frozen
 class LeapingValues(Fact):
     """Values behind leaps that are faster than the machine moves."""
 
@@ -136,7 +136,7 @@ class LeapingValues(Fact):
         return text
 
 
-@dataclass(frozen=True)
+@frozen
 class LearnedInOtherUnit(TemplateFact):
     """A channel whose plausible range was learned in another unit."""
 
@@ -146,7 +146,7 @@ class LearnedInOtherUnit(TemplateFact):
     words = "logged in {logged}, learned in {learned}: not checked for implausible values"
 
 
-@dataclass(frozen=True)
+@frozen
 class StuckChannel(Fact):
     """A channel that never changes while the machine moves; `joint` is empty where there is but one."""
 
@@ -157,7 +157,7 @@ class StuckChannel(Fact):
         return f"the value{_of_joint(self.joint)} never changes while the machine moves: stuck?"
 
 
-@dataclass(frozen=True)
+@frozen
 class UnitContradicted(Fact):
     """The header of a column, and of `more` others, states another unit than the machine file.
 
@@ -184,7 +184,7 @@ class UnitContradicted(Fact):
         return f'{text}: write unit = "{self.header_unit}"{scale.get(self.advice, "")} if the header is right'
 
 
-@dataclass(frozen=True)
+@frozen
 class DerivedSpeed(TemplateFact):
     """The speed is the derivative of the position, through two low-passes at `low_pass` [Hz]."""
 
@@ -193,21 +193,21 @@ class DerivedSpeed(TemplateFact):
     words = "not in the log: derived causally from position (two first-order low-passes at {low_pass:g} Hz)"
 
 
-@dataclass(frozen=True)
+@frozen
 class IntegratedPosition(TemplateFact):
     """The position is the integral of the speed."""
 
     words = "not in the log: the speed, integrated from 0"
 
 
-@dataclass(frozen=True)
+@frozen
 class IntegratedReference(TemplateFact):
     """The reference position is the integral of the reference speed."""
 
     words = "not in the log: the reference speed, integrated from the first position"
 
 
-@dataclass(frozen=True)
+@frozen
 class LinkAccelerations(TemplateFact):
     """Specific forces on the links became their angular accelerations."""
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 from cdtool.plain_text import counted, first_of
 
 _OWN_CLOCKS = 'time = { column = "time", unit = "s" }'
 
 
-@dataclass(frozen=True)
+@frozen
 class TwoReadings:
     """A first stamp read as `years` in the stated unit, and as a `day` in the unit that is meant, since 1970."""
 
@@ -29,7 +29,7 @@ class TwoReadings:
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class ClockDifference:
     """In what two clocks differ in the same rows: their steps, their start, or how far they drift apart."""
 
@@ -45,7 +45,7 @@ class ClockDifference:
         return f"they drift apart by {self.other:.3g}"
 
 
-@dataclass(frozen=True)
+@frozen
 class DroppedStamps(Fact):
     """So many of `rows` stamps were dropped; `first` are the first of them, by number of `row_name` in the file."""
 
@@ -74,28 +74,28 @@ class DroppedStamps(Fact):
         return f"{stamps} ({self.row_name} {shown}), dropped ({percent} % of the rows){cause}"
 
 
-@dataclass(frozen=True)
+@frozen
 class RepeatedStamps(DroppedStamps):
     """Stamps equal to the one before."""
 
     verb = "repeat"
 
 
-@dataclass(frozen=True)
+@frozen
 class UnknownStamps(DroppedStamps):
     """Stamps that are no number."""
 
     verb = "are no number"
 
 
-@dataclass(frozen=True)
+@frozen
 class StrayStamps(DroppedStamps):
     """Stamps far off those around them."""
 
     verb = "lie far off those around them"
 
 
-@dataclass(frozen=True)
+@frozen
 class StuckStamps(DroppedStamps):
     """Stamps of a coarse clock that stand still for longer than its step."""
 
@@ -103,7 +103,7 @@ class StuckStamps(DroppedStamps):
     cause = "the clock was stuck"
 
 
-@dataclass(frozen=True)
+@frozen
 class ClockRestart:
     """Why stamps run backward: a counter of so many bits wraps, or (0) the clock starts again."""
 
@@ -118,7 +118,7 @@ class ClockRestart:
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class BackwardStamps(DroppedStamps):
     """Stamps below one before them; without a `restart` a few stray ones."""
 
@@ -132,7 +132,7 @@ class BackwardStamps(DroppedStamps):
         return str(self.restart or "")
 
 
-@dataclass(frozen=True)
+@frozen
 class CoarseClock(Fact):
     """So large a share of the stamps repeats that a straight line through them replaces them."""
 
@@ -147,7 +147,7 @@ class CoarseClock(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class Gap:
     """A gap begins behind the sample at `time` [s] and is `length` [s] long."""
 
@@ -158,7 +158,7 @@ class Gap:
         return f"{self.time:.3f} s ({self.length * 1e3:.0f} ms)"
 
 
-@dataclass(frozen=True)
+@frozen
 class SampleGaps(Fact):
     """So many gaps between samples, with the first of them."""
 
@@ -172,7 +172,7 @@ class SampleGaps(Fact):
         return f"{counted(self.count, 'gap')} after {', '.join(map(str, self.first))}{more}"
 
 
-@dataclass(frozen=True)
+@frozen
 class Jitter(Fact):
     """The standard deviation of the steps as a share of the `period` [s]."""
 
@@ -184,7 +184,7 @@ class Jitter(Fact):
         return f"the sample period varies by {100 * self.share:.0f} % (std) about {self.period * 1e3:.3g} ms"
 
 
-@dataclass(frozen=True)
+@frozen
 class OutOfOrder(Fact):
     """So many of `messages` are out of order, by up to `back` [s]; they are sorted.
 
@@ -206,7 +206,7 @@ class OutOfOrder(Fact):
         return f"{where}; {late}: sorted by time. Was the clock set or restarted?"
 
 
-@dataclass(frozen=True)
+@frozen
 class FileUnitImplausible(Fact):
     """The unit that a container states for its clock cannot be right."""
 
@@ -220,7 +220,7 @@ class FileUnitImplausible(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class HeaderUnitImplausible(Fact):
     """The unit that a table's header states for its clock cannot be right."""
 
@@ -234,7 +234,7 @@ class HeaderUnitImplausible(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class AssumedClock(Fact):
     """The column is taken to be the clock, in a unit that follows from its header, `start` or steps."""
 
@@ -254,7 +254,7 @@ class AssumedClock(Fact):
         return f"taken to be the clock, in {self.unit} ({why}); a machine file says it for sure"
 
 
-@dataclass(frozen=True)
+@frozen
 class StepsImplausible(Fact):
     """Steps [s] that no log has in the `stated` unit; in the `likely` one they are `rate` [Hz]."""
 
@@ -273,7 +273,7 @@ class StepsImplausible(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class ClockUnitContradicted(Fact):
     """The clock's header states another unit, by the factor `ratio` (0: not a time), than the machine file does.
 
@@ -294,7 +294,7 @@ class ClockUnitContradicted(Fact):
         return f"the header says '{self.header}', the machine file {stated}{ratio}: {advice}"
 
 
-@dataclass(frozen=True)
+@frozen
 class NoClock(TemplateFact):
     """No column of a table looks like its clock."""
 
@@ -308,7 +308,7 @@ def _named(doubt: str, is_named: bool) -> str:
     return f"named as a clock, but {doubt}" if is_named else doubt
 
 
-@dataclass(frozen=True)
+@frozen
 class StandingClock(Fact):
     """All stamps of a clock, or of a column that is `named` as one, are the same."""
 
@@ -320,7 +320,7 @@ class StandingClock(Fact):
         return _named(f"all of its {self.stamps} stamps are the same: the clock stands still", self.named)
 
 
-@dataclass(frozen=True)
+@frozen
 class CoarseStamps(Fact):
     """A share of the stamps of a clock, or of a column that is `named` as one, repeats."""
 
@@ -332,7 +332,7 @@ class CoarseStamps(Fact):
         return _named(f"{100.0 * self.share:.3g} % of its stamps repeat: a coarse clock", self.named)
 
 
-@dataclass(frozen=True)
+@frozen
 class EmptyClock(Fact):
     """A column that is named as a clock contains no time stamp."""
 
@@ -341,7 +341,7 @@ class EmptyClock(Fact):
         return _named("it contains no time stamp", True)
 
 
-@dataclass(frozen=True)
+@frozen
 class BackwardClock(Fact):
     """A column that is named as a clock runs backward at so many steps."""
 
@@ -352,7 +352,7 @@ class BackwardClock(Fact):
         return _named(f"it runs backward at {self.steps} of its steps", True)
 
 
-@dataclass(frozen=True)
+@frozen
 class OtherClock(Fact):
     """A second clock in a table, next to these columns, whose times are not those of the `first` one."""
 
@@ -368,7 +368,7 @@ class OtherClock(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class OwnClocks(Fact):
     """Each channel of a table is on the clock beside it."""
 
@@ -380,7 +380,7 @@ class OwnClocks(Fact):
         return f"each channel is on the clock beside it: {clocks}"
 
 
-@dataclass(frozen=True)
+@frozen
 class ValuesWithoutTime(Fact):
     """Values in rows in which their clock is empty."""
 
@@ -391,7 +391,7 @@ class ValuesWithoutTime(Fact):
         return f"{counted(self.count, 'value')} in rows in which its clock is empty: left out"
 
 
-@dataclass(frozen=True)
+@frozen
 class WrittenTimes(Fact):
     """How dates and times are written, what their seconds count from, and how often the clock wrapped.
 
@@ -414,7 +414,7 @@ class WrittenTimes(Fact):
         return f"{first}written as {self.pattern}; in s since {self.since}"
 
 
-@dataclass(frozen=True)
+@frozen
 class StampsAsSeconds(TemplateFact):
     """Time stamps are taken as seconds from the first one, an ISO date."""
 
@@ -423,7 +423,7 @@ class StampsAsSeconds(TemplateFact):
     words = "time stamps: taken as seconds from {start}"
 
 
-@dataclass(frozen=True)
+@frozen
 class UnusableClock(TemplateFact):
     """A dataset with a unit of time cannot be a clock."""
 
@@ -432,7 +432,7 @@ class UnusableClock(TemplateFact):
     words = "{reason}: it is not a clock"
 
 
-@dataclass(frozen=True)
+@frozen
 class ClocksWithoutUnit(Fact):
     """Datasets of several groups are named as clocks and have no unit of time."""
 
@@ -446,7 +446,7 @@ class ClocksWithoutUnit(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class NoStartTime(Fact):
     """Waveforms without a start time beside others that have one."""
 
@@ -457,7 +457,7 @@ class NoStartTime(Fact):
         return f"no start time (wf_start_time) in {first_of(self.channels)}: taken to begin with the first of them"
 
 
-@dataclass(frozen=True)
+@frozen
 class HeaderDelay(TemplateFact):
     """How much later messages were logged than stamped [ms]: the median, and 5 and 95 %."""
 
@@ -468,14 +468,14 @@ class HeaderDelay(TemplateFact):
     words = "logged {median:.3f} ms (median; 5 to 95 %: {low:.3f} to {high:.3f} ms) after the header's stamp"
 
 
-@dataclass(frozen=True)
+@frozen
 class HeaderUnset(TemplateFact):
     """The stamps in the messages' headers are all 0."""
 
     words = "the header's stamps are never set: use the log clock"
 
 
-@dataclass(frozen=True)
+@frozen
 class ClocksApart(TemplateFact):
     """The channel begins `distance` [s] after the channel `before` ends."""
 

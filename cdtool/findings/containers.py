@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 from cdtool.plain_text import counted
 
 
-@dataclass(frozen=True)
+@frozen
 class ColumnLeftOut(TemplateFact):
     """A column without numbers; `what` it is instead."""
 
@@ -21,7 +21,7 @@ class ColumnLeftOut(TemplateFact):
     words = "column '{column}' is {what}: left out"
 
 
-@dataclass(frozen=True)
+@frozen
 class VariableLeftOut(TemplateFact):
     """A MATLAB variable without real numbers; `what` it is instead."""
 
@@ -33,7 +33,7 @@ class VariableLeftOut(TemplateFact):
     words = "variable '{variable}' is {what}: left out"
 
 
-@dataclass(frozen=True)
+@frozen
 class RowsAsColumns(TemplateFact):
     """A matrix with more columns than rows is read across."""
 
@@ -46,7 +46,7 @@ class RowsAsColumns(TemplateFact):
     words = "{thing} '{name}' is {rows} x {columns}: its rows are taken as columns"
 
 
-@dataclass(frozen=True)
+@frozen
 class PackedValues(TemplateFact):
     """Values are packed by the CF conventions."""
 
@@ -56,7 +56,7 @@ class PackedValues(TemplateFact):
     words = "packed (CF): times {scale:g}, plus {offset:g}"
 
 
-@dataclass(frozen=True)
+@frozen
 class RoundedIntegers(Fact):
     """Integers of more digits than float64 has."""
 
@@ -69,14 +69,14 @@ class RoundedIntegers(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class RoundedColumn(TemplateFact):
     """A column of integers of which some have more digits than float64."""
 
     words = "integers beyond 2^53 are rounded to float64"
 
 
-@dataclass(frozen=True)
+@frozen
 class ValuesCutOff(TemplateFact):
     """A column ends before its declared length: `count` values are missing from number `first` on."""
 
@@ -86,21 +86,21 @@ class ValuesCutOff(TemplateFact):
     words = "{count} values from number {first} on are missing"
 
 
-@dataclass(frozen=True)
+@frozen
 class NeverFinalised(TemplateFact):
     """The recorder did not close the file."""
 
     words = "the recording was never finalised: its end may be missing"
 
 
-@dataclass(frozen=True)
+@frozen
 class LastSegmentIncomplete(TemplateFact):
     """The file ends within a segment."""
 
     words = "the last segment is not complete: the rest of it is lost"
 
 
-@dataclass(frozen=True)
+@frozen
 class CutBehindRow(TemplateFact):
     """The file is cut off or damaged behind a row."""
 
@@ -109,7 +109,7 @@ class CutBehindRow(TemplateFact):
     words = "the file is cut off or damaged behind row {row}: what came after is lost"
 
 
-@dataclass(frozen=True)
+@frozen
 class LibraryMessage(TemplateFact):
     """A line that a library wrote about the file."""
 
@@ -120,7 +120,7 @@ class LibraryMessage(TemplateFact):
     words = "{library} says: {text}"
 
 
-@dataclass(frozen=True)
+@frozen
 class BagDamaged(TemplateFact):
     """A ROS bag is damaged where the count of its messages does not show it; `reason` is its library's."""
 
@@ -129,7 +129,7 @@ class BagDamaged(TemplateFact):
     words = "the bag is damaged: {reason}"
 
 
-@dataclass(frozen=True)
+@frozen
 class MessagesUnreadable(Fact):
     """Of the messages of a topic so many cannot be read; `reason` is empty where the bag does not say why."""
 
@@ -143,7 +143,7 @@ class MessagesUnreadable(Fact):
         return f"{self.count} of {counted(self.messages, 'message')} cannot be read{why}"
 
 
-@dataclass(frozen=True)
+@frozen
 class LostBytes:
     """What is lost at a damaged place: bytes, perhaps a chunk, its messages and its time [s], where these are known."""
 
@@ -162,7 +162,7 @@ class LostBytes:
         return ", ".join(parts)
 
 
-@dataclass(frozen=True)
+@frozen
 class DamagedAt(Fact):
     """A damaged place of a file; `read_before`: nothing behind it, and so many messages before it, could be read."""
 
@@ -182,7 +182,7 @@ class DamagedAt(Fact):
         return f"{where}: only the part before it was read ({counted(self.read_before, 'message')}){behind}"
 
 
-@dataclass(frozen=True)
+@frozen
 class MoreDamage(Fact):
     """Damaged places that are not listed one by one."""
 
@@ -199,7 +199,7 @@ class MoreDamage(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class MessagesLost(Fact):
     """Single messages that are lost for one reason."""
 
@@ -213,7 +213,7 @@ class MessagesLost(Fact):
         return f"{self.reason}: {counted(self.count, 'message')} lost"
 
 
-@dataclass(frozen=True)
+@frozen
 class ChunksRefused(Fact):
     """Chunks that expand as only a bomb does, or images of a dark camera."""
 
@@ -227,7 +227,7 @@ class ChunksRefused(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class SummaryDamaged(Fact):
     """The file's summary is damaged, and so many messages were read without it."""
 
@@ -239,7 +239,7 @@ class SummaryDamaged(Fact):
         return f"the summary is damaged ({self.reason}): {counted(self.messages, 'message')} read without it"
 
 
-@dataclass(frozen=True)
+@frozen
 class MessageCountDiffers(TemplateFact):
     """The file's summary states another number of messages than were read."""
 
@@ -249,7 +249,7 @@ class MessageCountDiffers(TemplateFact):
     words = "the file's summary says {stated} messages, {read} were read"
 
 
-@dataclass(frozen=True)
+@frozen
 class Unverified(Fact):
     """Messages that no checksum covers."""
 
@@ -261,7 +261,7 @@ class Unverified(Fact):
         return f"{self.count} of {counted(self.messages, 'message')} without a checksum: unverified"
 
 
-@dataclass(frozen=True)
+@frozen
 class SeveralWriters(TemplateFact):
     """Several channels write to one topic."""
 
@@ -270,14 +270,14 @@ class SeveralWriters(TemplateFact):
     words = "{channels} channels write to it: their messages are one column, sorted by time"
 
 
-@dataclass(frozen=True)
+@frozen
 class NoMessage(TemplateFact):
     """A log without a message."""
 
     words = "contains no message"
 
 
-@dataclass(frozen=True)
+@frozen
 class IndexDisagrees(Fact):
     """Chunks that the summary's index does not have, has alone, or describes otherwise."""
 
@@ -296,7 +296,7 @@ class IndexDisagrees(Fact):
         return f"the summary disagrees with the data: {counted(self.count, 'chunk', verb)}"
 
 
-@dataclass(frozen=True)
+@frozen
 class ChunkTimesDiffer(Fact):
     """Chunks whose headers state other times than those of their messages."""
 
@@ -307,14 +307,14 @@ class ChunkTimesDiffer(Fact):
         return f"{counted(self.chunks, 'chunk', 'state')} other times than those of the messages"
 
 
-@dataclass(frozen=True)
+@frozen
 class ChannelCountsDiffer(TemplateFact):
     """The summary states other message counts by channel."""
 
     words = "the summary disagrees with the data: other message counts by channel"
 
 
-@dataclass(frozen=True)
+@frozen
 class DefinedOtherwise(TemplateFact):
     """The summary defines a topic's channel or schema otherwise than the data."""
 

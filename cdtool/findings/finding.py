@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, ClassVar, Literal
+
+from cdtool.frozen import frozen
 
 Severity = Literal["note", "warning", "loss"]
 
@@ -14,7 +16,7 @@ _SEVERITIES: tuple[Severity, ...] = ("loss", "warning", "note")
 _WORD = re.compile(r"(?<!^)(?=[A-Z])")
 
 
-@dataclass(frozen=True)
+@frozen
 class Fact(ABC):
     """One kind of fact: a frozen dataclass whose fields are the numbers and names in its sentence.
 
@@ -44,7 +46,7 @@ class Fact(ABC):
         """Return the fact in words, without the channel and the file that it is about."""
 
 
-@dataclass(frozen=True)
+@frozen
 class TemplateFact(Fact):
     """A fact whose sentence is `words`, with its fields in the places of their names in braces."""
 
@@ -58,7 +60,7 @@ class TemplateFact(Fact):
         return self.words.format(**vars(self))
 
 
-@dataclass(frozen=True)
+@frozen
 class Remark(Fact):
     """A sentence without numbers, for plug-ins that need no kind of their own.
 
@@ -75,7 +77,7 @@ class Remark(Fact):
         return self.text
 
 
-@dataclass(frozen=True)
+@frozen
 class Finding:
     """A fact about a file or a channel.
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from cdtool.findings.finding import Fact
+from cdtool.frozen import frozen
 from cdtool.plain_text import counted
 
 
-@dataclass(frozen=True)
+@frozen
 class MissingMessages(Fact):
     """The writer's numbers of a topic's messages, or of all together, jump; the first time behind `after` [s]."""
 
@@ -26,7 +25,7 @@ class MissingMessages(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class OtherJointsOnly(Fact):
     """Messages that name other joints than the mapped one."""
 
@@ -37,7 +36,7 @@ class OtherJointsOnly(Fact):
         return f"{counted(self.count, 'message', 'name')} other joints only: left out"
 
 
-@dataclass(frozen=True)
+@frozen
 class EmptyArrays(Fact):
     """Messages in which the array is empty."""
 
@@ -48,7 +47,7 @@ class EmptyArrays(Fact):
         return f"{counted(self.count, 'message', 'hold')} an empty array: NaN"
 
 
-@dataclass(frozen=True)
+@frozen
 class ArrayLengthsDiffer(Fact):
     """Arrays of one field whose length varies, so that it cannot be a column."""
 
@@ -59,7 +58,7 @@ class ArrayLengthsDiffer(Fact):
         return f"arrays of {' and '.join(map(str, self.lengths))} elements: left out"
 
 
-@dataclass(frozen=True)
+@frozen
 class UndecodableMessages(Fact):
     """Messages that cannot be decoded, with the first reason."""
 

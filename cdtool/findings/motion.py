@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 from cdtool.plain_text import counted
 
 
-@dataclass(frozen=True)
+@frozen
 class NoMotionMapped(TemplateFact):
     """Neither speed nor position is mapped."""
 
     words = "neither speed nor position is mapped: no operation can be cut or classed"
 
 
-@dataclass(frozen=True)
+@frozen
 class NoMotion(TemplateFact):
     """The axis stands still."""
 
     words = "the axis does not move"
 
 
-@dataclass(frozen=True)
+@frozen
 class Motion(Fact):
     """Strokes, nominal speed and main direction."""
 
@@ -40,7 +40,7 @@ class Motion(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class SpeedUnitDoubtful(Fact):
     """The integral of the speed and the position differ by a factor, as two units do that are named `as_between`.
 
@@ -66,7 +66,7 @@ class SpeedUnitDoubtful(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class SpeedSignOpposite(Fact):
     """The speed has the opposite sign of the position's derivative; `joint` is empty where there is but one."""
 
@@ -77,7 +77,7 @@ class SpeedSignOpposite(Fact):
         return f"{f'of {self.joint}: ' if self.joint else ''}has the opposite sign of the position's derivative"
 
 
-@dataclass(frozen=True)
+@frozen
 class JointsSwapped(TemplateFact):
     """The position of one joint follows the speed of another one."""
 
@@ -87,7 +87,7 @@ class JointsSwapped(TemplateFact):
     words = "that of {joint} follows the speed of {follows}: columns in another order?"
 
 
-@dataclass(frozen=True)
+@frozen
 class BelowMinimumSpeed(TemplateFact):
     """The nominal speed is below the detector's `minimum` one."""
 
@@ -96,7 +96,7 @@ class BelowMinimumSpeed(TemplateFact):
     words = "nominal speed below minimum_speed ({minimum:g}): not applicable"
 
 
-@dataclass(frozen=True)
+@frozen
 class Poles(TemplateFact):
     """The friction EKF's poles [rad/s] at the nominal speed."""
 
@@ -112,7 +112,7 @@ def _of(joint: str) -> str:
     return f" of {joint}" if joint else ""
 
 
-@dataclass(frozen=True)
+@frozen
 class AccelerometerUncheckable(Fact):
     """The accelerometer cannot be checked against the speed; `joint` is empty where there is but one.
 
@@ -135,7 +135,7 @@ class AccelerometerUncheckable(Fact):
         return f"accelerometer{_of(self.joint)} cannot be checked: {why}"
 
 
-@dataclass(frozen=True)
+@frozen
 class AccelerometerFit(Fact):
     """`slope` and `correlation` of the acceleration over the speed's derivative; the fit is good."""
 
@@ -153,7 +153,7 @@ class AccelerometerFit(Fact):
         return f"accelerometer{_of(self.joint)} fits the speed ({self.figures})"
 
 
-@dataclass(frozen=True)
+@frozen
 class AccelerometerTurned(AccelerometerFit):
     """The accelerometer is mounted the other way round."""
 
@@ -162,7 +162,7 @@ class AccelerometerTurned(AccelerometerFit):
         return f"accelerometer{_of(self.joint)} has the opposite sign ({self.figures}): give scale = -1"
 
 
-@dataclass(frozen=True)
+@frozen
 class AccelerometerScaleUncheckable(AccelerometerFit):
     """The sign is right, and the correlation too small to check the scale."""
 
@@ -171,7 +171,7 @@ class AccelerometerScaleUncheckable(AccelerometerFit):
         return f"accelerometer{_of(self.joint)}: its scale cannot be checked ({self.figures})"
 
 
-@dataclass(frozen=True)
+@frozen
 class AccelerometerScaleWrong(AccelerometerFit):
     """The scale is wrong; the log may contain another unit: m/s2 where g is stated, or g."""
 

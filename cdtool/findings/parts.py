@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 
 
-@dataclass(frozen=True)
+@frozen
 class PartMissing(TemplateFact):
     """A part that the metadata file names is not there."""
 
@@ -18,7 +17,7 @@ class PartMissing(TemplateFact):
     words = "part {part} of {metadata} is not in the folder"
 
 
-@dataclass(frozen=True)
+@frozen
 class PartCompressed(TemplateFact):
     """A part is compressed as a whole."""
 
@@ -29,7 +28,7 @@ class PartCompressed(TemplateFact):
     words = "part {part} of {metadata} is compressed as a whole: decompress it, e.g. with zstd -d"
 
 
-@dataclass(frozen=True)
+@frozen
 class PartOfOtherKind(TemplateFact):
     """A part is of another format than the others."""
 
@@ -40,7 +39,7 @@ class PartOfOtherKind(TemplateFact):
     words = "part {part} of {metadata} is left out: the folder also contains parts of another kind"
 
 
-@dataclass(frozen=True)
+@frozen
 class PartUnreadable(TemplateFact):
     """A part cannot be read."""
 
@@ -51,7 +50,7 @@ class PartUnreadable(TemplateFact):
     words = "part {part} is left out, it cannot be read: {reason}"
 
 
-@dataclass(frozen=True)
+@frozen
 class PartsOverlap(TemplateFact):
     """A part begins before the one before it ends; `column` shows it."""
 
@@ -62,7 +61,7 @@ class PartsOverlap(TemplateFact):
     words = "{part} begins before the part before it ends ({column}): put in the order of the times"
 
 
-@dataclass(frozen=True)
+@frozen
 class PartGap(Fact):
     """Between a part and the one before it nothing was logged for `gap` [s]; `channels`: only of these."""
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 from cdtool.plain_text import counted
 
 
-@dataclass(frozen=True)
+@frozen
 class OnsetUnseen(Fact):
     """Load-cell samples are missing for `hole` [s] where a contact may have begun that is first seen at `time` [s].
 
@@ -29,7 +28,7 @@ class OnsetUnseen(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class PeakUnseen(Fact):
     """Load-cell samples are missing for `hole` [s] during a contact."""
 
@@ -44,7 +43,7 @@ class PeakUnseen(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class NoForce(TemplateFact):
     """A contact's force cannot be computed."""
 
@@ -54,7 +53,7 @@ class NoForce(TemplateFact):
     words = "contact {contact}: no force: {reason}"
 
 
-@dataclass(frozen=True)
+@frozen
 class ForceUnassessable(TemplateFact):
     """A force profile cannot assess a contact, since load-cell samples are missing."""
 
@@ -65,7 +64,7 @@ class ForceUnassessable(TemplateFact):
     words = "contact {contact} is not assessable by {profile}: {reason}"
 
 
-@dataclass(frozen=True)
+@frozen
 class LogNotCut(Fact):
     """Of the strokes in one operation those with these numbers are not assessable."""
 
@@ -82,7 +81,7 @@ class LogNotCut(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class AssumedImpactFree(TemplateFact):
     """Whether a log is free of impacts cannot be checked; `absent` is the ground truth that is missing from it."""
 
@@ -91,14 +90,14 @@ class AssumedImpactFree(TemplateFact):
     words = "{absent}: assumed to be free of impacts"
 
 
-@dataclass(frozen=True)
+@frozen
 class LearnedFromIt(TemplateFact):
     """The signature was learned from the log."""
 
     words = "the signature was learned from this log: the absence of alarms is no evidence"
 
 
-@dataclass(frozen=True)
+@frozen
 class PlotsLeftOut(TemplateFact):
     """Operations with a miss or a false alarm for which no trigger plot is kept."""
 
@@ -107,7 +106,7 @@ class PlotsLeftOut(TemplateFact):
     words = "{count} more operations with a miss or a false alarm have no trigger plot"
 
 
-@dataclass(frozen=True)
+@frozen
 class LimitsUnchecked(TemplateFact):
     """Limits that are set for detectors that were not run."""
 
@@ -117,7 +116,7 @@ class LimitsUnchecked(TemplateFact):
     words = "{count} of {limits} limits are set for detectors that were not run: not checked"
 
 
-@dataclass(frozen=True)
+@frozen
 class DetectorLeftOut(TemplateFact):
     """A detector could not be run."""
 
@@ -126,7 +125,7 @@ class DetectorLeftOut(TemplateFact):
     words = "left out: {reason}"
 
 
-@dataclass(frozen=True)
+@frozen
 class DetectorUnassessable(TemplateFact):
     """A detector can assess none of the runs to learn from."""
 
@@ -135,7 +134,7 @@ class DetectorUnassessable(TemplateFact):
     words = "not assessable: {reason}"
 
 
-@dataclass(frozen=True)
+@frozen
 class RecordingsWithoutRow(Fact):
     """Recordings without a row for a detector in a trigger file: they are `left_out`, or count as without an alarm."""
 

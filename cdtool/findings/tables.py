@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, field
 from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 from cdtool.plain_text import counted_lines
 
 # Of a cell so many characters are shown, of lines so many numbers.
 _SHOWN, _FIRST = 40, 3
 
 
-@dataclass(frozen=True)
+@frozen
 class CellAdvice:
     """What to do about a cell that cannot be read: it looks like a date, a number, or a word.
 
@@ -32,7 +33,7 @@ class CellAdvice:
         return f"if it stands for a missing value, missing = [{self.text}] in [csv] of the machine file says so"
 
 
-@dataclass(frozen=True)
+@frozen
 class LinesFact(Fact):
     """A fact about lines of the file: how many they are, the first three and the last; a long log may have millions."""
 
@@ -53,7 +54,7 @@ class LinesFact(Fact):
         return counted_lines(self.count, self.first, self.last)
 
 
-@dataclass(frozen=True)
+@frozen
 class PinnedLinesSkipped(LinesFact):
     """Lines that [csv] says to skip."""
 
@@ -62,7 +63,7 @@ class PinnedLinesSkipped(LinesFact):
         return f"{self.shown_lines} skipped, as [csv] says"
 
 
-@dataclass(frozen=True)
+@frozen
 class OtherEncoding(TemplateFact):
     """The text is not UTF-8."""
 
@@ -71,7 +72,7 @@ class OtherEncoding(TemplateFact):
     words = "not valid UTF-8, read as {encoding}"
 
 
-@dataclass(frozen=True)
+@frozen
 class NamedSeparator(TemplateFact):
     """A line names the separator, as Excel writes it."""
 
@@ -81,7 +82,7 @@ class NamedSeparator(TemplateFact):
     words = "line {line} ({text}) names the separator"
 
 
-@dataclass(frozen=True)
+@frozen
 class NumbersAboveRows(LinesFact):
     """Lines with numbers above the rows were skipped."""
 
@@ -94,7 +95,7 @@ class NumbersAboveRows(LinesFact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class WordsAboveRows(LinesFact):
     """Lines of words above the rows were skipped."""
 
@@ -103,7 +104,7 @@ class WordsAboveRows(LinesFact):
         return f"{self.shown_lines} above the rows skipped: no names, no numbers"
 
 
-@dataclass(frozen=True)
+@frozen
 class NamesFromComment(TemplateFact):
     """The columns' names are given in a comment."""
 
@@ -112,7 +113,7 @@ class NamesFromComment(TemplateFact):
     words = "the names are those of the comment in line {line}"
 
 
-@dataclass(frozen=True)
+@frozen
 class FooterSkipped(LinesFact):
     """Lines below the rows that are no samples; `text` is the first of them."""
 
@@ -123,7 +124,7 @@ class FooterSkipped(LinesFact):
         return f"{self.shown_lines} skipped: a footer ({self.text[:_SHOWN]!r}), no sample"
 
 
-@dataclass(frozen=True)
+@frozen
 class DoubtfulPoint(Fact):
     """A number such as `1.234` is read with a decimal point, though the point might separate thousands."""
 
@@ -138,7 +139,7 @@ class DoubtfulPoint(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class NotNumeric(Fact):
     """A column that is left out for a cell that is not a number, with the advice on that cell."""
 
@@ -155,7 +156,7 @@ class NotNumeric(Fact):
         return f"column '{self.column}' is not numeric (line {self.line} is {self.cell[:_SHOWN]!r}): left out{advice}"
 
 
-@dataclass(frozen=True)
+@frozen
 class AmbiguousTimes(TemplateFact):
     """A column of dates that can be read in two ways."""
 
@@ -166,7 +167,7 @@ class AmbiguousTimes(TemplateFact):
     words = "column '{column}': {readings}: left out; pin time_format in [csv]"
 
 
-@dataclass(frozen=True)
+@frozen
 class UnreadCells(LinesFact):
     """Cells of a column that cannot be read; `cell` is the first of them."""
 
@@ -178,7 +179,7 @@ class UnreadCells(LinesFact):
         return f"{self.shown_lines}: {self.cell[:_SHOWN]!r} cannot be read, taken as missing; {self.advice}"
 
 
-@dataclass(frozen=True)
+@frozen
 class BlankRows(LinesFact):
     """Blank lines that are rows without values."""
 
@@ -187,7 +188,7 @@ class BlankRows(LinesFact):
         return f"{self.shown_lines} blank: taken as missing samples"
 
 
-@dataclass(frozen=True)
+@frozen
 class SkippedLines(LinesFact):
     """Lines between the rows that are no rows."""
 
@@ -201,56 +202,56 @@ class SkippedLines(LinesFact):
         return f"{self.shown_lines} skipped: {self.what}"
 
 
-@dataclass(frozen=True)
+@frozen
 class BlankLines(SkippedLines):
     """Lines without anything."""
 
     what = "blank"
 
 
-@dataclass(frozen=True)
+@frozen
 class BlankSamples(SkippedLines):
     """Lines without anything in a table of one column, where a missing sample looks the same."""
 
     what = "blank, perhaps missing samples"
 
 
-@dataclass(frozen=True)
+@frozen
 class CommentLines(SkippedLines):
     """Lines that begin with the comment mark."""
 
     what = "comments"
 
 
-@dataclass(frozen=True)
+@frozen
 class HeaderLines(SkippedLines):
     """Lines that repeat the header."""
 
     what = "the header again"
 
 
-@dataclass(frozen=True)
+@frozen
 class DrawnLines(SkippedLines):
     """Lines of dashes."""
 
     what = "drawn lines"
 
 
-@dataclass(frozen=True)
+@frozen
 class WordsBelowRows(SkippedLines):
     """Lines of words below the last row."""
 
     what = "words below the rows"
 
 
-@dataclass(frozen=True)
+@frozen
 class NulLines(SkippedLines):
     """Lines that contain NUL bytes."""
 
     what = "damaged, they contain NUL bytes"
 
 
-@dataclass(frozen=True)
+@frozen
 class LastLineCut(TemplateFact):
     """The last line is cut off."""
 
@@ -259,7 +260,7 @@ class LastLineCut(TemplateFact):
     words = "the last line ({line}) is cut off, dropped"
 
 
-@dataclass(frozen=True)
+@frozen
 class NulBytesAtEnd(TemplateFact):
     """The file ends in NUL bytes."""
 
@@ -268,7 +269,7 @@ class NulBytesAtEnd(TemplateFact):
     words = "the file ends in {count} NUL bytes: was the power lost?"
 
 
-@dataclass(frozen=True)
+@frozen
 class LastLineKept(TemplateFact):
     """The last line has no line end, and its last cell looks whole."""
 
@@ -278,7 +279,7 @@ class LastLineKept(TemplateFact):
     words = "the last line ({line}) has no line end: its last cell '{cell}' is taken to be whole"
 
 
-@dataclass(frozen=True)
+@frozen
 class LastLineDropped(TemplateFact):
     """The last line has no line end, and its last cell may be cut off."""
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from cdtool.findings.finding import Fact, TemplateFact
+from cdtool.frozen import frozen
 from cdtool.plain_text import digits
 
 
@@ -12,7 +11,7 @@ def _rounded(value: float, significant: int) -> str:
     return digits(float(f"{value:.{significant}g}"))
 
 
-@dataclass(frozen=True)
+@frozen
 class FollowsTorque(Fact):
     """The force follows the torque without lag, with the correlation `r`; `joint` is empty where there is but one."""
 
@@ -25,7 +24,7 @@ class FollowsTorque(Fact):
         return f"follows the torque{of} without lag (r = {self.r:.3f}): not an independent truth, if it is made from it"
 
 
-@dataclass(frozen=True)
+@frozen
 class NotTared(Fact):
     """The load cell rests off zero [N] before its first contact at `onset` [s]."""
 
@@ -40,7 +39,7 @@ class NotTared(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class ForceBeginsLate(Fact):
     """The load cell's record begins [s] shortly before its first contact at `onset` [s]."""
 
@@ -55,7 +54,7 @@ class ForceBeginsLate(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class ForceLeft(Fact):
     """A small force [N] is left at the end of the contact that began at `onset` [s]."""
 
@@ -70,7 +69,7 @@ class ForceLeft(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class RestLevelShifted(Fact):
     """The reading at rest shifted [N] before the contact at `onset` [s], at last by `drift` [N/s]."""
 
@@ -87,7 +86,7 @@ class RestLevelShifted(Fact):
         )
 
 
-@dataclass(frozen=True)
+@frozen
 class InProgress(TemplateFact):
     """A contact is in progress when the log begins, until `end` [s]."""
 

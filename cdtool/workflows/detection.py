@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,17 +20,17 @@ from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
-from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.limit import Limit
-from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
 from cdtool.workflows.contacts.matched_log import DetectedLog, match_log
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import absent_truth, check_joints, load_operations
-from cdtool.workflows.signature.normal_runs import normals_of, notes_on
+
+if TYPE_CHECKING:
+    from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,9 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     ranges: PlausibleRanges | None = None
     normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
     if signature is not None:
+        from cdtool.signature_store import read_signature
+        from cdtool.workflows.signature.normal_runs import normals_of, notes_on
+
         stored = read_signature(signature)
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)

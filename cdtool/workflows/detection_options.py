@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cdtool.activation import ActivationSettings
 from cdtool.errors import UsageError
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
+
+if TYPE_CHECKING:
+    from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
 
 
 @dataclass(frozen=True)
@@ -59,13 +62,15 @@ class DetectionOptions:
         by_hand = self.limit or self.joints or self.operations != "whole" or self.activation or self.rules
         if self.machine is not None or by_hand:
             raise UsageError("settings cannot be combined with a benchmark file", "set them in the benchmark file")
-        if isinstance(self.benchmark, PreparedBenchmark):
+        if not isinstance(self.benchmark, str | Path):
             return self.benchmark
+        from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
+
         return prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
 
     def machine_file(self) -> MachineFile:
         """Return the machine file, read; raises UsageError if none is given."""
-        if isinstance(self.benchmark, PreparedBenchmark):
+        if self.benchmark is not None and not isinstance(self.benchmark, str | Path):
             return self.benchmark.setup.machine_file
         if self.machine is None:
             raise UsageError("no machine file is given", "give --machine FILE or --benchmark FILE")

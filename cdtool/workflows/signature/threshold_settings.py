@@ -45,12 +45,13 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
     settings of the signature, also if another rule learns one, are in [signature]; so is the safety factor of any rule
     if [threshold] does not set it.
     """
-    names = THRESHOLDS.names(plugins=True)
-    if not isinstance(root.raw("threshold"), dict):
+    given = root.raw("threshold")
+    if not isinstance(given, dict):
+        names = THRESHOLDS.names_for(_DEFAULT if given is None else given)
         name, table = root.choice("threshold", names, _DEFAULT), Table({}, root.where, "threshold.")
     else:
         table = root.table("threshold")
-        name = table.choice("name", names, _DEFAULT)
+        name = table.choice("name", THRESHOLDS.names_for(given.get("name", _DEFAULT)), _DEFAULT)
     if name == _DEFAULT:
         for key in table.values:
             if key != "name":
@@ -75,7 +76,7 @@ def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], defau
 
     Raises UsageError for an unknown name, ConfigurationError for an unknown key or a wrong value.
     """
-    known = THRESHOLDS.names(plugins=True)
+    known = THRESHOLDS.names_for(name)
     if name not in known:
         raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
     settings = dict(_setting(text) for text in given)

@@ -1,0 +1,157 @@
+"""numba's cache of compiled kernels: what is in it, loading without the compiler, one process at a time that compiles.
+
+Before numba looks into its cache, it prepares its compiler: 130 modules and scipy.linalg, which take a quarter of the
+time of a short command. Machine code from the cache needs only numba's runtime: the compiler is prepared when a kernel
+must be compiled.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from cdtool.errors import OutputError
+from cdtool.file_locks import holding
+
+# A function as numba compiles it: `cdtool.kernels.named`.
+Function = Callable[..., Any]
+
+_logger = logging.getLogger(__name__)
+_reported = False
+
+
+@cache
+def imported_numba() -> Any:
+    """Return numba, imported without the package coverage: numba reports to it only while coverage runs."""
+    hidden = "coverage" not in sys.modules
+    if hidden:
+        sys.modules["coverage"] = None  # type: ignore[assignment]  # the import system's mark of an absent module
+    try:
+        import numba
+    finally:
+        if hidden:
+            del sys.modules["coverage"]
+    return numba
+
+
+def compile_cached(function: Function, signature: Any, options: dict[str, Any]) -> Function:
+    """Return the compiled function, from the cache or compiled and stored there.
+
+    Raises RuntimeError or OSError if no folder for the cache is writable.
+    """
+    compiled: Function = imported_numba().njit(cache=True, **options)(function)
+    if compiled is function:  # NUMBA_DISABLE_JIT
+        return function
+    dispatcher: Any = compiled
+    with ExitStack() as held:
+        dispatcher._cache = _SharedCache(dispatcher._cache, function, held)
+        dispatcher.compile(signature)
+    dispatcher.disable_compile()
+    return compiled
+
+
+def report_compilation(count: int = 0) -> None:
+    """Log, once per process, that kernels are compiled; `count`: how many, if known.
+
+    The first one takes more than a second: numba prepares its compiler for it.
+    """
+    global _reported
+    if not _reported:
+        _reported = True
+        kernels = f"{count} kernels" if count > 1 else "kernels"
+        _logger.info(
+            "first use: compiling %s, which can take a minute; later commands load them from the cache", kernels
+        )
+
+
+class _SharedCache:
+    """numba's cache of one function, where only one process at a time compiles what is missing.
+
+    Other processes wait for it, then load what it has compiled. The lock is entered into `held`, and ends with its
+    process; without locks on the file system, and after a minute, the function is compiled without it.
+    """
+
+    def __init__(self, cache: Any, function: Function, held: ExitStack) -> None:
+        self._cache = cache
+        self._function = function
+        self._held = held
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._cache, name)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return the compiled function from the cache; None if this process is to compile it."""
+        loaded = self._load(signature, context)
+        if loaded is None:
+            report_compilation()
+            folder = Path(self._cache.cache_path)
+            target = folder / _name(self._function)
+            with suppress(OSError, OutputError):
+                self._held.enter_context(holding(target, folder, target))
+                loaded = self._load(signature, context)
+        return loaded
+
+    def _load(self, signature: Any, context: Any) -> Any:
+        """Load without the compiler, except for a kernel of a plug-in, which may call what the compiler provides."""
+        if not self._function.__module__.startswith("cdtool."):
+            return self._cache.load_overload(signature, context)
+        from numba.core import runtime
+
+        vars(runtime)["rtsys"].initialize(context)
+        context.refresh = lambda: None  # in place of the method that prepares the compiler
+        try:
+            return self._cache.load_overload(signature, context)
+        finally:
+            del context.refresh
+
+
+def not_cached(functions: Iterable[Function]) -> list[Function]:
+    """Return the functions that are not in the cache; empty without a cache.
+
+    numba cannot query its cache without loading from it. This uses documented facts instead: the folder
+    (`stats.cache_path` of a function that is not compiled yet), and one index file `.nbi` per function, named after it.
+    An index older than the function's file or than numba is outdated. A wrong answer costs only time.
+    """
+    numba = imported_numba()
+    if numba.config.DISABLE_JIT:
+        return []
+    folders: dict[str, dict[str, float]] = {}
+    missing = []
+    for function in functions:
+        sources = os.path.dirname(_file(function))  # noqa: PTH120 - for every kernel
+        if sources not in folders:
+            try:
+                folders[sources] = _indices(Path(numba.njit(cache=True)(function).stats.cache_path))
+            except (RuntimeError, OSError):  # no writable folder
+                return []
+        changed = max(os.stat(file).st_mtime for file in (_file(function), numba.__file__))  # noqa: PTH116
+        if folders[sources].get(_name(function), 0.0) < changed:
+            missing.append(function)
+    return missing
+
+
+def _indices(folder: Path) -> dict[str, float]:
+    """Return when each index of a cache folder was written, by function: its name ends in line and Python version."""
+    written: dict[str, float] = {}
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".nbi"):
+                name = entry.name.rpartition("-")[0]
+                written[name] = max(written.get(name, 0.0), entry.stat().st_mtime)
+    return written
+
+
+def _name(function: Function) -> str:
+    # numba removes the signs < and > from file names.
+    return f"{Path(_file(function)).stem}.{function.__qualname__.translate({ord('<'): None, ord('>'): None})}"
+
+
+def _file(function: Function) -> str:
+    file: str = function.__code__.co_filename
+    return file

@@ -1,0 +1,141 @@
+"""The cache of compiled kernels: loading without the compiler, first starts at once or killed, the terminal's line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+_PROJECT = Path(__file__).parents[1]
+_RUN = (
+    "import numpy as np; from cdtool.thresholds.first_order import _recursion as run; "
+    "x = np.ones(3); run(x, x, x.copy())"
+)
+_HITS = f"{_RUN}; print(sum(run.compiled.stats.cache_hits.values()))"
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    return {**os.environ, "NUMBA_CACHE_DIR": str(folder), "PYTHONPATH": str(_PROJECT)}
+
+
+def _python(code: str, folder: Path, **settings) -> subprocess.Popen:
+    return subprocess.Popen([sys.executable, "-c", code], env=_environment(folder), text=True, **settings)
+
+
+def _output(process: subprocess.Popen) -> str:
+    told, _ = process.communicate()
+    assert process.returncode == 0
+    return told
+
+
+_ALL = """
+import importlib, pkgutil, sys
+import cdtool
+from cdtool.kernels import entries
+for item in pkgutil.walk_packages(cdtool.__path__, "cdtool."):
+    importlib.import_module(item.name)
+for item in entries():
+    item.compiled
+print(len(entries()), "numba.np.polynomial.polynomial_core" in sys.modules)
+"""
+
+
+def test_every_kernel_is_loaded_from_the_cache_without_the_compiler():
+    # Machine code that needs more than numba's runtime would end the process.
+    environment = {**os.environ, "PYTHONPATH": str(_PROJECT)}
+    for _ in range(2):
+        run = [sys.executable, "-c", _ALL]
+        done = subprocess.run(run, env=environment, capture_output=True, text=True, check=True)
+    count, compiler = done.stdout.split()
+    assert int(count) > 50
+    assert compiler == "False"
+
+
+def test_a_command_loads_neither_scipys_linear_algebra_nor_coverage_with_its_kernels(tmp_path):
+    code = f"{_RUN}; import sys; print(*({{'scipy.linalg', 'coverage'}} & set(sys.modules)))"
+    _output(_python(_RUN, tmp_path))
+    assert _output(_python(code, tmp_path, stdout=subprocess.PIPE)).split() == []
+
+
+_AT_ONCE = """
+import sys, time
+from pathlib import Path
+from cdtool.kernel_cache import imported_numba
+imported_numba()
+Path(sys.argv[1]).touch()
+while not all(Path(name).exists() for name in sys.argv[1:]):
+    time.sleep(0.001)
+"""
+
+
+def test_two_first_starts_at_once_compile_a_kernel_once(tmp_path):
+    ready = [str(tmp_path / "first"), str(tmp_path / "second")]
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", _AT_ONCE + _HITS, *names],
+            env=_environment(tmp_path / "cache"),
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for names in (ready, ready[::-1])
+    ]
+    assert sorted(map(_output, both)) == ["0\n", "1\n"]
+    assert list(tmp_path.rglob(".cdtool-*")) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_first_start_that_is_killed_does_not_block_the_next(tmp_path):
+    killed = _python(_RUN, tmp_path)
+    while not list(tmp_path.rglob(".cdtool-*.lock")):
+        assert killed.poll() is None
+        time.sleep(0.001)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    begin = time.monotonic()
+    assert _output(_python(_HITS, tmp_path, stdout=subprocess.PIPE)) == "0\n"
+    assert time.monotonic() - begin < 50.0  # it waits a minute for a process that compiles
+    assert list(tmp_path.rglob(".cdtool-*")) == []
+
+
+_SHOWN = f"""
+from cdtool.cli.first_use import compilation_shown
+with compilation_shown():
+    {_HITS}
+    from cdtool.clock import _differentiate as other
+    other.compiled
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminal")
+def test_a_terminal_says_once_that_kernels_are_compiled_and_nothing_when_they_are_in_the_cache(tmp_path):
+    told = []
+    for _ in range(2):
+        terminal, stderr = os.openpty()
+        process = _python(_SHOWN, tmp_path, stdout=subprocess.PIPE, stderr=stderr)
+        os.close(stderr)
+        hits = _output(process)
+        told.append((hits, _read(terminal)))
+    first, again = told
+    assert first[0] == "0\n"
+    assert first[1].startswith("first use: compiling kernels, which can take a minute")
+    assert first[1].count("\n") == 1
+    assert again == ("1\n", "")
+
+
+def _read(terminal: int) -> str:
+    try:
+        return os.read(terminal, 10_000).decode()
+    except OSError:  # nothing was written before the other end was closed
+        return ""
+    finally:
+        os.close(terminal)
+
+
+def test_without_a_terminal_nothing_is_said(tmp_path):
+    process = _python(_SHOWN, tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.communicate() == ("0\n", "")
