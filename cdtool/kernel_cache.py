@@ -2,7 +2,8 @@
 
 Before numba looks into its cache, it prepares its compiler: 130 modules and scipy.linalg, which take a quarter of the
 time of a short command. Machine code from the cache needs only numba's runtime: the compiler is prepared when a kernel
-must be compiled.
+must be compiled. This uses three names that numba does not document (a dispatcher's `_cache`, `runtime.rtsys`,
+`context.refresh`); a version of numba without them loads kernels in its own way.
 """
 
 from __future__ import annotations
@@ -50,7 +51,9 @@ def compile_cached(function: Function, signature: Any, options: dict[str, Any]) 
         return function
     dispatcher: Any = compiled
     with ExitStack() as held:
-        dispatcher._cache = _SharedCache(dispatcher._cache, function, held)
+        own = getattr(dispatcher, "_cache", None)
+        if hasattr(own, "load_overload"):
+            dispatcher._cache = _SharedCache(own, function, held)
         dispatcher.compile(signature)
     dispatcher.disable_compile()
     return compiled
@@ -99,11 +102,13 @@ class _SharedCache:
 
     def _load(self, signature: Any, context: Any) -> Any:
         """Load without the compiler, except for a kernel of a plug-in, which may call what the compiler provides."""
-        if not self._function.__module__.startswith("cdtool."):
-            return self._cache.load_overload(signature, context)
         from numba.core import runtime
 
-        vars(runtime)["rtsys"].initialize(context)
+        started = getattr(vars(runtime).get("rtsys"), "initialize", None)
+        is_own = self._function.__module__.startswith("cdtool.")
+        if not is_own or started is None or not hasattr(context, "refresh"):
+            return self._cache.load_overload(signature, context)
+        started(context)
         context.refresh = lambda: None  # in place of the method that prepares the compiler
         try:
             return self._cache.load_overload(signature, context)

@@ -7,9 +7,12 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+
+from cdtool.kernel_cache import _SharedCache
 
 _PROJECT = Path(__file__).parents[1]
 _RUN = (
@@ -60,6 +63,30 @@ def test_a_command_loads_neither_scipys_linear_algebra_nor_coverage_with_its_ker
     code = f"{_RUN}; import sys; print(*({{'scipy.linalg', 'coverage'}} & set(sys.modules)))"
     _output(_python(_RUN, tmp_path))
     assert _output(_python(code, tmp_path, stdout=subprocess.PIPE)).split() == []
+
+
+@pytest.mark.parametrize("missing", ["runtime", "refresh"])
+def test_a_numba_without_the_names_that_it_does_not_document_loads_kernels_in_its_own_way(missing):
+    context = type("Context", (), {} if missing == "refresh" else {"refresh": lambda _: None})()
+    asked = []
+
+    class Cache:
+        def load_overload(self, signature, given):
+            asked.append((signature, given, "refresh" in vars(given)))
+            return "loaded"
+
+    with pytest.MonkeyPatch.context() as patch:
+        if missing == "runtime":
+            patch.delattr("numba.core.runtime.rtsys")
+        shared = _SharedCache(Cache(), _function_of_cdtool(), ExitStack())
+        assert shared.load_overload("signature", context) == "loaded"
+    assert asked == [("signature", context, False)]
+
+
+def _function_of_cdtool():
+    from cdtool.clock import _differentiate
+
+    return _differentiate.function
 
 
 _AT_ONCE = """
