@@ -34,17 +34,33 @@ class MessageTemplate:
     pattern: Words
 
 
+@dataclass(frozen=True, eq=False)
+class TokenTemplate:
+    """The tokens of messages whose numbers are not at fixed bytes, in their order, and the texts that they refer to.
+
+    The numbers of such messages are read into `values` float64. `tagged`: protobuf (tag_row_kernel.py), else JSON
+    (json_kernel.py).
+    """
+
+    tokens: npt.NDArray[np.int64]
+    literals: npt.NDArray[np.uint8]
+    values: int
+    tagged: bool
+
+
 @dataclass(frozen=True)
 class FieldOffsets:
-    """The numbers of one field: their byte offsets in a message, in the order of the column, and their type.
+    """The numbers of one field: where they are in a message, in the order of the column, and their type.
 
-    `dtype` is numpy's code without byte order; `?` is one byte that is not 0. `single`: the field is one number, not an
-    array.
+    `at` are byte offsets in messages of a MessageTemplate, indices of values in those of a TokenTemplate. `dtype` is
+    numpy's code without byte order; `?` is one byte that is not 0. `single`: the field is one number, not an array.
+    `exact`: float64 represents every number of its type.
     """
 
     at: tuple[int, ...]
     dtype: str
     single: bool
+    exact: bool
 
 
 @dataclass(frozen=True)
@@ -55,13 +71,33 @@ class StampOffset:
     signed: bool
 
 
+@dataclass(frozen=True)
+class StampValues:
+    """A header's time stamp in messages of a TokenTemplate: the indices of its two values."""
+
+    seconds: int
+    nanoseconds: int
+
+
 @dataclass(frozen=True, eq=False)
-class RowLayout:
-    """How matching messages become rows: the wanted fields in order, and the `stamp` if the header's time is wanted."""
+class FixedLayout:
+    """How messages of a template become rows: the wanted fields in order, and the header's `stamp` if it is wanted."""
 
     template: MessageTemplate
     fields: tuple[FieldOffsets, ...]
     stamp: StampOffset | None
+
+
+@dataclass(frozen=True, eq=False)
+class TokenLayout:
+    """The same for messages whose numbers are not at fixed bytes."""
+
+    template: TokenTemplate
+    fields: tuple[FieldOffsets, ...]
+    stamp: StampValues | None
+
+
+RowLayout = FixedLayout | TokenLayout
 
 
 @dataclass(frozen=True, eq=False)

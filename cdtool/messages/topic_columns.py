@@ -149,7 +149,7 @@ class TopicColumns(Topic):
         stamps, tables = self._stamps.share(()), []
         for rows, numbers in zip(self._rows.values(), row_layout.fields, strict=True):
             tables.append(rows.rows.share(() if numbers.single else (len(numbers.at),)))
-            rows.exact = numbers.dtype not in ("i8", "u8")
+            rows.exact = numbers.exact
         shared = tuple(table for table in tables if table is not None)
         if stamps is None or len(shared) < len(tables) or any(each.elsewhere for each in self.fields.values()):
             return None

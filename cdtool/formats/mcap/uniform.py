@@ -8,26 +8,32 @@ which the layouts may change.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from cdtool.decimal_kernel import powers_of_five
 from cdtool.formats.mcap import uniform_kernel as kernel
-from cdtool.messages.columns.copy_kernel import WORD, words_of
+from cdtool.messages.columns.copy_kernel import WORD
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
+from cdtool.messages.columns.tag_row_kernel import AFTER, DEEPEST, LEVEL, LITERAL, TOKEN
 from cdtool.messages.fast_path import (
     Binding,
     ChunkRows,
     Destination,
+    FixedLayout,
     IsKnownDefinition,
     MessageTemplate,
     RowLayout,
+    TokenLayout,
     Words,
     WrittenRows,
 )
 
 # The fast path is given up when the chunks that did not match outnumber those that did by this number.
 _MOST_MISMATCHES = 16
+_TEXT_TOKEN, _TEXT_LITERAL = 4, 0  # the columns of tokens of JSON, and that of their first literal
 _KINDS = {"f": kernel.SINGLE, "i": kernel.SIGNED_INTEGER, "u": kernel.UNSIGNED_INTEGER, "?": kernel.TRUTH}
 
 
@@ -43,6 +49,16 @@ class _Tables:
     pattern: Words
     numbers: Words
     stamps: Words
+    tags: IntArray
+    texts: IntArray
+    literals: ByteArray
+    values: int
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """The arguments of the kernel that it only reads, in its order."""
+        layouts = (self.slots, self.bounds, self.compared, self.mask, self.pattern, self.numbers, self.stamps)
+        return (*layouts, self.tags, self.texts, self.literals, powers_of_five())
 
 
 class UniformChunkReader:
@@ -81,25 +97,12 @@ class UniformChunkReader:
         first, limits = claimed
         reached, last = first.copy(), np.zeros(len(first), np.uint64)
         times = np.array([kernel.NO_DATE, 0, 0], np.uint64)
+        values, levels = np.empty(tables.values), np.empty((DEEPEST, LEVEL), np.int64)
+        arguments = tables.arguments
         at, reason = 0, kernel.DEFINITION
         while reason == kernel.DEFINITION:
             at, reason = kernel.take_messages(
-                words_of(content),
-                np.ndarray((max(0, len(content) - 3),), np.float32, content, strides=(1,)),
-                at,
-                len(content),
-                tables.slots,
-                tables.bounds,
-                tables.compared,
-                tables.mask,
-                tables.pattern,
-                tables.numbers,
-                tables.stamps,
-                self._time,
-                limits,
-                reached,
-                last,
-                times,
+                content, at, len(content), *arguments, self._time, limits, values, levels, reached, last, times
             )
             if reason == kernel.DEFINITION:
                 begin = at + kernel.PREFIX
@@ -139,45 +142,96 @@ def _tables(bindings: Mapping[int, Binding]) -> _Tables:
     slots = np.full(max(bindings, default=-1) + 1, -1, np.int64)
     bounds = np.zeros((len(bindings), kernel.BOUNDS), np.int64)
     stamps = np.zeros(len(bindings), np.uint64)
-    templates: list[MessageTemplate] = []
-    numbers: list[Words] = []
-    compared = end = 0
+    lists = _Lists()
     for slot, (channel, binding) in enumerate(bindings.items()):
         slots[channel] = slot
-        if binding is None:
-            continue
-        layout, destination = binding
-        stamps[slot] = destination.stamps.ctypes.data
-        stamp = (-1, 0) if layout.stamp is None else (layout.stamp.at, layout.stamp.signed)
-        numbers.append(_numbers(layout, destination))
-        begin, others = end, end + int(np.count_nonzero(numbers[-1][:, kernel.KIND] == kernel.DOUBLE))
-        end += len(numbers[-1])
-        places = compared, compared + len(layout.template.compared), begin, others, end
-        bounds[slot] = layout.template.shortest, layout.template.longest, *places, *stamp
-        templates.append(layout.template)
-        compared = places[1]
+        if binding is not None:
+            stamps[slot] = binding[1].stamps.ctypes.data
+            bounds[slot] = lists.add(*binding)
+    empty = np.zeros(0, np.uint64)
+    compared = [(template.compared, template.mask, template.pattern) for template in lists.templates]
     return _Tables(
         dict(bindings),
         slots,
         bounds,
-        np.concatenate([template.compared for template in templates]),
-        np.concatenate([template.mask for template in templates]),
-        np.concatenate([template.pattern for template in templates]),
-        np.concatenate(numbers),
+        *(np.concatenate([empty, *parts]) for parts in zip(*compared, strict=True)) if compared else (empty,) * 3,
+        np.concatenate(lists.numbers),
         stamps,
+        np.concatenate([np.zeros((0, TOKEN), np.int64), *lists.tags]),
+        np.concatenate([np.zeros((0, _TEXT_TOKEN), np.int64), *lists.texts]),
+        np.concatenate([np.zeros(0, np.uint8), *lists.literals]),
+        lists.values,
     )
+
+
+@dataclass
+class _Lists:
+    """The parts of the tables, channel after channel; `values` is the largest number of values of a message."""
+
+    templates: list[MessageTemplate] = field(default_factory=list)
+    numbers: list[Words] = field(default_factory=list)
+    tags: list[IntArray] = field(default_factory=list)
+    texts: list[IntArray] = field(default_factory=list)
+    literals: list[ByteArray] = field(default_factory=list)
+    values: int = 1
+
+    def add(self, layout: RowLayout, destination: Destination) -> list[int]:
+        """Add a channel, and return its row of bounds."""
+        row = [0] * kernel.BOUNDS
+        row[kernel.STAMP] = -1
+        if isinstance(layout, FixedLayout):
+            self._add_fixed(layout, row)
+        else:
+            self._add_tokens(layout, row)
+        numbers = _numbers(layout, destination)
+        row[kernel.NUMBERS] = sum(map(len, self.numbers))
+        row[kernel.NUMBERS_END] = row[kernel.NUMBERS] + len(numbers)
+        row[kernel.OTHERS] = row[kernel.NUMBERS] + int(np.count_nonzero(numbers[:, kernel.KIND] == kernel.DOUBLE))
+        self.numbers.append(numbers)
+        return row
+
+    def _add_fixed(self, layout: FixedLayout, row: list[int]) -> None:
+        template = layout.template
+        row[kernel.FORM] = kernel.FIXED
+        row[kernel.SHORTEST], row[kernel.LONGEST] = template.shortest, template.longest
+        row[kernel.COMPARED] = sum(len(each.compared) for each in self.templates)
+        row[kernel.COMPARED_END] = row[kernel.COMPARED] + len(template.compared)
+        if layout.stamp is not None:
+            row[kernel.STAMP], row[kernel.NANOSECONDS] = layout.stamp.at, int(layout.stamp.signed)
+        self.templates.append(template)
+
+    def _add_tokens(self, layout: TokenLayout, row: list[int]) -> None:
+        template = layout.template
+        row[kernel.FORM] = kernel.TAGGED if template.tagged else kernel.TEXT
+        tables, literal = (self.tags, LITERAL) if template.tagged else (self.texts, _TEXT_LITERAL)
+        row[kernel.TOKENS] = sum(map(len, tables))
+        row[kernel.TOKENS_END] = row[kernel.TOKENS] + len(template.tokens)
+        if layout.stamp is not None:
+            row[kernel.STAMP], row[kernel.NANOSECONDS] = layout.stamp.seconds, layout.stamp.nanoseconds
+        tokens = template.tokens.copy()
+        tokens[:, literal] += sum(map(len, self.literals))
+        if template.tagged:
+            tokens[:, AFTER] += row[kernel.TOKENS]
+        tables.append(tokens)
+        self.literals.append(template.literals)
+        self.values = max(self.values, template.values)
 
 
 def _numbers(layout: RowLayout, destination: Destination) -> Words:
     """Return the table of numbers (k, kernel.NUMBER), with float64 values first."""
-    rows = []
+    rows: list[list[int]] = []
     for numbers, table in zip(layout.fields, destination.tables, strict=True):
         size = np.dtype(numbers.dtype).itemsize
         kind = kernel.DOUBLE if numbers.dtype == "f8" else _KINDS[numbers.dtype[0]]
-        for element, at in enumerate(numbers.at):
-            word = min(at, layout.template.shortest - WORD)  # the last word must also be within the message
-            bits = 8 * (WORD - size)
+        for element, place in enumerate(numbers.at):
+            at, word = place * WORD, 0
+            if isinstance(layout, FixedLayout):
+                at, word = place, min(place, layout.template.shortest - WORD)  # a whole word within the message
             address = table.ctypes.data + element * WORD
-            rows.append((address, table.strides[0], at, kind, word, bits - 8 * (at - word), bits))
+            if element and kind == kernel.DOUBLE and at == rows[-1][kernel.BYTE] + rows[-1][kernel.COUNT] * WORD:
+                rows[-1][kernel.COUNT] += 1
+                continue
+            bits = 8 * (WORD - size)
+            rows.append([address, table.strides[0], at, 1, kind, word, bits - 8 * (at - word), bits])
     rows.sort(key=lambda row: row[kernel.KIND] != kernel.DOUBLE)
-    return np.array(rows, np.uint64).reshape(-1, kernel.NUMBER)
+    return np.array([[each % 2**64 for each in row] for row in rows], np.uint64).reshape(-1, kernel.NUMBER)

@@ -7,18 +7,21 @@ Other representations (parameter lists, encoding version 2) align differently an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns.decoded_batch import UndecodableError
+from cdtool.messages.columns.field_values import FieldPlan
 from cdtool.messages.columns.member_locations import MemberLocations, MemberPath
-from cdtool.messages.columns.schema_decoder import SchemaDecoder
+from cdtool.messages.columns.schema_decoder import SchemaDecoder, StampPaths
 from cdtool.messages.columns.sequential_walk import locate_all
-from cdtool.messages.columns.uniform_layout import UniformLayout, learn_layout
+from cdtool.messages.columns.uniform_layout import UniformLayout, learn_layout, row_layout_of
 from cdtool.messages.columns.walk_kernel import LONG, OTHER_KIND
 from cdtool.messages.columns.walk_program import Program, compile_program
+from cdtool.messages.fast_path import RowLayout
 from cdtool.messages.layouts.layout import Schema, Text
 
 _ENCAPSULATION = 4
@@ -56,9 +59,12 @@ class SequentialLocator:
             locations = layout.locate(batch) if layout is not None else None
         return self.locate_singly(batch, paths) if locations is None else locations
 
-    def layout(self, paths: tuple[MemberPath, ...]) -> UniformLayout | None:
-        """Return the layout that the last messages had in common; None if they differed."""
-        return self._layouts.get(paths)
+    def row_layout(
+        self, paths: tuple[MemberPath, ...], plans: Sequence[FieldPlan], joints: Sequence[str], stamp: StampPaths
+    ) -> RowLayout | None:
+        """Return the row layout of the plans' fields; None if the last messages differed."""
+        layout = self._layouts.get(paths)
+        return None if layout is None else row_layout_of(layout, plans, joints, stamp)
 
     def locate_singly(self, batch: Batch, paths: tuple[MemberPath, ...]) -> MemberLocations:
         """Return the members of all messages, located message by message."""

@@ -30,11 +30,13 @@ from cdtool.messages.columns.decoded_batch import (
     IntArray,
 )
 from cdtool.messages.columns.json_shape import JsonShape, Resolved, learn_shape
+from cdtool.messages.fast_path import FieldOffsets, RowLayout, StampValues, TokenLayout, TokenTemplate
 from cdtool.messages.fields import Field, FieldMissingError, header_stamp, numeric_fields
 from cdtool.recording import FloatArray
 
 _MOST_SHAPES = 64
 _NEW_SHAPES = 8  # learned from one batch; messages of further shapes are decoded singly
+_MOST_TOKENS = 2000  # of a message on the fast path
 _ENDS = np.isin(np.arange(256), list(b"}\0 \t\n\r"))
 _LATEST = 9_223_372_035  # s: the largest time stamp in ns that fits an int64
 
@@ -155,8 +157,25 @@ class JsonDecoder:
             _stamp_message(row, message, times, has_stamp)
         return DecodedBatch(field_values, status, reason, times, has_stamp)
 
-    def row_layout(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> None:
-        """Return None: the length of a written number varies."""
+    def row_layout(self, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False) -> RowLayout | None:
+        """Return the row layout of messages of the most frequent shape; None if a wanted number is missing in it."""
+        if not self._shapes:
+            return None
+        shape = self._shapes[0]
+        resolved = [shape.resolve(each, joints) for each in wanted]
+        stamp = shape.stamp() if stamps else None
+        if (stamps and stamp is None) or not all(each.indices and min(each.indices) >= 0 for each in resolved):
+            return None
+        indices = _wanted_indices(shape, wanted, joints, stamps)
+        tokens = shape.tokens_with(indices)
+        if len(tokens) > _MOST_TOKENS:
+            return None
+        fields = []
+        for each, of_field in zip(wanted, resolved, strict=True):
+            columns = tuple(np.searchsorted(indices, of_field.indices).tolist())
+            fields.append(FieldOffsets(columns, "f8", single=not each.whole, exact=False))
+        pair = None if stamp is None else StampValues(*np.searchsorted(indices, stamp).tolist())
+        return TokenLayout(TokenTemplate(tokens, shape.literals, len(indices), tagged=False), tuple(fields), pair)
 
     def names(self, batch: Batch, field: Field) -> list[str]:
         """Return the element names of the field's array in the first ten messages, sorted."""

@@ -80,14 +80,18 @@ class JsonShape:
         self, data: ByteArray, start: IntArray, length: IntArray, indices: IntArray
     ) -> tuple[ByteArray, npt.NDArray[np.float64]]:
         """Return which messages match (n,), as codes of the kernel, and their values with `indices` (n, k)."""
+        tokens = self.tokens_with(indices)
+        bits = np.empty((len(start), len(indices)), dtype=np.uint64)
+        matches = np.empty(len(start), dtype=np.uint8)
+        kernel.read_matching(data, start, length, self.literals, tokens, powers_of_five(), bits, matches)
+        return matches, bits.view(np.float64)
+
+    def tokens_with(self, indices: IntArray) -> IntArray:
+        """Return the tokens with columns for the values with these indices."""
         tokens = self.tokens.copy()
         values = np.flatnonzero(tokens[:, 2] == kernel.VALUE)
         tokens[values[indices], 3] = np.arange(len(indices))
-        bits = np.empty((len(start), len(indices)), dtype=np.uint64)
-        matches = np.empty(len(start), dtype=np.uint8)
-        words = np.ndarray((max(0, len(data) - 7),), np.uint64, data, strides=(1,))
-        kernel.read_matching(data, words, start, length, self.literals, tokens, powers_of_five(), bits, matches)
-        return matches, bits.view(np.float64)
+        return tokens
 
 
 def learn_shape(content: bytes) -> JsonShape | None:
@@ -131,7 +135,8 @@ def learn_shape(content: bytes) -> JsonShape | None:
     except (ValueError, RecursionError):
         return None
     tokens = np.array(rows, dtype=np.int64).reshape(-1, 4)
-    return JsonShape(np.frombuffer(bytes(literals), dtype=np.uint8).copy(), tokens, shape)
+    # The kernel reads whole words.
+    return JsonShape(np.frombuffer(bytes(literals) + bytes(8), dtype=np.uint8).copy(), tokens, shape)
 
 
 def _not_a_number(name: str) -> float:

@@ -9,6 +9,7 @@ nearest float64.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,9 +18,12 @@ import numpy.typing as npt
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import protobuf_kernel as kernel
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray, UndecodableError
+from cdtool.messages.columns.field_values import FieldPlan
 from cdtool.messages.columns.member_locations import MemberLocations, MemberPath
-from cdtool.messages.columns.schema_decoder import SchemaDecoder
+from cdtool.messages.columns.schema_decoder import SchemaDecoder, StampPaths
+from cdtool.messages.columns.tag_layout import ExampleMessage, tag_layout
 from cdtool.messages.columns.walk_kernel import all_match, fetch
+from cdtool.messages.fast_path import RowLayout
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
 from cdtool.recording import FloatArray
 
@@ -232,12 +236,15 @@ class TagLocator:
     schema: Schema
     _trees: dict[tuple[MemberPath, ...], TagTree] = field(default_factory=dict)
     _pool_entries: int = 8  # per message, at first
+    _example: bytes = b""  # the first message of the last batch
 
     def locate(self, batch: Batch, paths: tuple[MemberPath, ...]) -> MemberLocations:
         """Return the members of all messages; raises UndecodableError for a schema that is too large."""
         if paths not in self._trees:
             self._trees[paths] = build_tag_tree(self.schema, paths)
         tree, n = self._trees[paths], len(batch)
+        if n:
+            self._example = batch.data[batch.start[0] : batch.start[0] + batch.length[0]].tobytes()
         begin, count = (np.zeros((n, len(paths)), dtype=np.int64) for _ in range(2))
         seen, status = np.empty((n, len(tree.nodes)), dtype=np.uint8), np.empty(n, dtype=np.uint8)
         scratch = np.zeros((6, kernel.SCRATCH + len(paths) + len(tree.tags) + tree.oneofs), dtype=np.int64)
@@ -276,8 +283,18 @@ class TagLocator:
         reason = _reason(batch, status) if damaged.any() else ""
         return MemberLocations(damaged.astype(np.uint8), reason, slots, names, intact=not damaged.any())
 
-    def layout(self, paths: tuple[MemberPath, ...]) -> None:
-        """Return None: the offset of a field depends on the numbers before it."""
+    def row_layout(
+        self, paths: tuple[MemberPath, ...], plans: Sequence[FieldPlan], joints: Sequence[str], stamp: StampPaths
+    ) -> RowLayout | None:
+        """Return the row layout of the plans' fields in messages like the first one of the last batch."""
+        content = np.frombuffer(self._example, np.uint8)
+        zero = np.zeros(1, np.int64)
+        locations = self.locate(Batch(content, zero, zero + len(content), zero.view(np.uint64)), paths)
+        if not self._example or not locations.intact:
+            return None
+        counts = {path: int(slot.count[0]) for path, slot in locations.slots.items()}
+        names = {path: each.of(0) for path, each in locations.names.items()}
+        return tag_layout(self.schema, ExampleMessage(counts, names), plans, joints, stamp)
 
 
 def _reason(batch: Batch, status: ByteArray) -> str:

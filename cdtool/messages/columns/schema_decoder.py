@@ -15,7 +15,6 @@ from cdtool.messages.batch import Batch
 from cdtool.messages.columns.decoded_batch import ABSENT, PRESENT, ByteArray, DecodedBatch, FieldValues, IntArray
 from cdtool.messages.columns.field_values import WHOLE, FieldPlan, absent_field, find_named_elements, read_field
 from cdtool.messages.columns.member_locations import MemberLocations, MemberPath
-from cdtool.messages.columns.uniform_layout import UniformLayout, row_layout_of
 from cdtool.messages.fast_path import RowLayout
 from cdtool.messages.fields import LONGEST_ARRAY, STAMPS, Field, FieldMissingError, is_element_number
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
@@ -25,6 +24,8 @@ from cdtool.recording import FloatArray
 DecodeRows = Callable[[IntArray, Field], DecodedBatch]
 _MOST_FIELDS = 4096
 _LATEST = 9_223_372_035  # s: the largest time stamp in ns that fits an int64
+# The paths to seconds and nanoseconds of the header's stamp; empty if the stamp is not wanted.
+StampPaths = tuple[MemberPath, ...]
 _NO_MEMBERS = Layout("", ())  # of a number or string
 
 
@@ -126,8 +127,10 @@ class Locator(Protocol):
         """Return the members at `paths`, which are all different."""
         ...
 
-    def layout(self, paths: tuple[MemberPath, ...]) -> UniformLayout | None:
-        """Return the layout that the last messages had in common; None if they differed."""
+    def row_layout(
+        self, paths: tuple[MemberPath, ...], plans: Sequence[FieldPlan], joints: Sequence[str], stamp: StampPaths
+    ) -> RowLayout | None:
+        """Return the row layout of further messages, in which `paths` were located; None if there is none."""
         ...
 
 
@@ -164,8 +167,7 @@ class SchemaDecoder:
         stamp = self.stamp_paths() if stamps else ()
         if len(plans) < len(wanted) or (stamps and not stamp):
             return None
-        layout = self.locator.layout(_all_paths(plans, stamp))
-        return None if layout is None else row_layout_of(layout, plans, joints, stamp)
+        return self.locator.row_layout(_all_paths(plans, stamp), plans, joints, stamp)
 
     def _decode_field(
         self, plan: AnyPlan | FieldMissingError, locations: MemberLocations, batch: Batch, joints: Sequence[str]

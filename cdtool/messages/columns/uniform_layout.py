@@ -22,7 +22,7 @@ from cdtool.messages.columns.field_values import FieldPlan, select_elements
 from cdtool.messages.columns.member_locations import FixedElementNames, MemberLocations, MemberPath, Slot
 from cdtool.messages.columns.sequential_walk import SequentialSlot, SequentialWalk
 from cdtool.messages.columns.walk_program import Program
-from cdtool.messages.fast_path import FieldOffsets, MessageTemplate, RowLayout, StampOffset, Words
+from cdtool.messages.fast_path import FieldOffsets, FixedLayout, MessageTemplate, StampOffset, Words
 from cdtool.messages.layouts.layout import Number
 from cdtool.recording import FloatArray
 
@@ -155,7 +155,7 @@ def learn_layout(program: Program, batch: Batch, header: int) -> UniformLayout |
 
 def row_layout_of(
     layout: UniformLayout, plans: Sequence[FieldPlan], joints: Sequence[str], stamp: tuple[MemberPath, ...]
-) -> RowLayout | None:
+) -> FixedLayout | None:
     """Return the row layout of the plans' fields and of a header stamp at the paths `stamp`, for the fast path.
 
     None if the layout alone does not determine all of them.
@@ -165,7 +165,7 @@ def row_layout_of(
     stamp_offset = _stamp_offset(layout, stamp) if stamp else None
     if len(known) < len(fields) or (stamp and stamp_offset is None):
         return None
-    return RowLayout(layout.template, tuple(known), stamp_offset)
+    return FixedLayout(layout.template, tuple(known), stamp_offset)
 
 
 def _field_offsets(layout: UniformLayout, plan: FieldPlan, joints: Sequence[str]) -> FieldOffsets | None:
@@ -178,7 +178,7 @@ def _field_offsets(layout: UniformLayout, plan: FieldPlan, joints: Sequence[str]
         return None
     chosen = np.arange(count)[elements]
     at = tuple((offset + kind.size * chosen).ravel().tolist())
-    return FieldOffsets(at, dtype_of(kind), single=chosen.ndim == 0)
+    return FieldOffsets(at, dtype_of(kind), single=chosen.ndim == 0, exact=kind.dtype not in ("i8", "u8"))
 
 
 def _stamp_offset(layout: UniformLayout, stamp: tuple[MemberPath, ...]) -> StampOffset | None:

@@ -1,0 +1,182 @@
+"""Read the wanted numbers of a protobuf message whose tags are in ascending order, as serialisers write them.
+
+Any other message does not match and is decoded by protobuf_kernel.py: one with a wanted tag twice or out of order, with
+groups, with another number of elements, or with another type than the schema's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.instructions import load
+from cdtool.kernels import kernel
+from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
+from cdtool.messages.columns.protobuf_kernel import varint
+
+# A row of tokens, depth first and by ascending number: number and wire type as written; what it contains; the first of
+# its values, and the type of a number; the size of its content [bytes]; its first byte in `literals`; the token after
+# it and after those nested in it; whether an absent number is 0.
+KEY, CONTENT, VALUE, TYPE, SIZE, LITERAL, AFTER, OPTIONAL, TOKEN = range(9)
+NUMBER, ARRAY, STRING, MESSAGE = range(4)
+DOUBLE, SINGLE, UINT64, INT64, UINT32, INT32, BOOL, SINT64, SINT32 = range(9)
+# A row of `levels` for each level of nesting: the message's end, its first and last token, and the next one.
+DEEPEST, LEVEL = 32, 4
+
+_1, _7, _8 = map(np.uint64, (1, 7, 8))
+_LOW = np.uint64(0xFFFFFFFF)
+_Words = npt.NDArray[np.uint64]
+_BYTES = "Array(uint8, 1, 'C', readonly=True)"
+_TOKENS = "Array(int64, 2, 'C', readonly=True)"
+
+
+@kernel("uint64(int64, uint64)", inline=True)
+def _float_bits(kind: int, word: np.uint64) -> np.uint64:
+    """Return the bits of a number as float64; `word` is a varint, or the bytes of a number of fixed width."""
+    if kind == DOUBLE:
+        return word
+    if kind == SINGLE:
+        number = np.float64(np.uint32(word).view(np.float32))
+    elif kind == UINT64:
+        number = np.float64(word)
+    elif kind == INT64:
+        number = np.float64(np.int64(word))
+    elif kind == UINT32:
+        number = np.float64(np.uint32(word))
+    elif kind == INT32:
+        number = np.float64(np.int32(word))
+    elif kind == BOOL:
+        number = np.float64(word != np.uint64(0))
+    else:
+        if kind == SINT32:
+            word &= _LOW
+        word = (word >> _1) ^ (~(word & _1) + _1)
+        number = np.float64(np.int64(word)) if kind == SINT64 else np.float64(np.int32(word))
+    return np.float64(number).view(np.uint64)
+
+
+@kernel(f"int64({_BYTES}, int64, int64, int64)", inline=True)
+def _after_value(data: ByteArray, p: int, end: int, wire: int) -> int:
+    """Return the byte after a value of this wire type; -1 if there is none, or if it is a group."""
+    if wire == 0:
+        _, p = varint(data, p, end)
+        return p
+    size = 8 if wire == 1 else 4
+    if wire == 2:
+        count, p = varint(data, p, end)
+        size = np.int64(count)  # type: ignore[assignment]
+        if p < 0 or size < 0:
+            return -1
+    elif wire != 1 and wire != 5:
+        return -1
+    return p + size if size <= end - p else -1
+
+
+@kernel(
+    f"b1({_BYTES}, int64, int64, {_TOKENS}, int64, int64, {_BYTES}, int64[:, ::1], uint64[::1])",
+)
+def read_tagged(
+    data: ByteArray,
+    p: int,
+    end: int,
+    tokens: IntArray,
+    token: int,
+    last: int,
+    literals: ByteArray,
+    levels: IntArray,
+    values: _Words,
+) -> bool:
+    """Read the message of the bytes [p, end) into `values`; return False if it does not match tokens [token, last).
+
+    The values are bits of float64. `levels` (DEEPEST, LEVEL) is overwritten.
+    """
+    depth, first = 0, token
+    while True:
+        if p >= end:
+            while token < last:  # the absent ones
+                if tokens[token, OPTIONAL] == 0:
+                    return False
+                values[tokens[token, VALUE]] = np.uint64(0)
+                token = tokens[token, AFTER]
+            if depth == 0:
+                return True
+            depth -= 1
+            end, first, last, token = levels[depth, 0], levels[depth, 1], levels[depth, 2], levels[depth, 3]
+            continue
+        key = np.int64(data[np.uint64(p)])
+        p += 1
+        if key >= 0x80:
+            long_key, p = varint(data, p - 1, end)
+            if p < 0 or long_key > _LOW:
+                return False
+            key = np.int64(long_key)
+        if key < 8:
+            return False
+        present = token
+        while present < last and tokens[present, KEY] != key:
+            present = tokens[present, AFTER]
+        if present == last:
+            other = first
+            while other < last:
+                if tokens[other, KEY] >> 3 == key >> 3:
+                    return False
+                other = tokens[other, AFTER]
+            p = _after_value(data, p, end, key & 7)
+            if p < 0:
+                return False
+            continue
+        while token != present:
+            if tokens[token, OPTIONAL] == 0:
+                return False
+            values[tokens[token, VALUE]] = np.uint64(0)
+            token = tokens[token, AFTER]
+        content, value, kind = tokens[present, CONTENT], tokens[present, VALUE], tokens[present, TYPE]
+        token = tokens[present, AFTER]
+        wire = key & 7
+        if content == NUMBER:
+            word = np.uint64(0)
+            if wire == 0:
+                word, p = varint(data, p, end)
+                if p < 0:
+                    return False
+            else:
+                size = 8 if wire == 1 else 4
+                if size > end - p:
+                    return False
+                if size == 8:
+                    word = load(data, p)
+                else:
+                    for i in range(4):
+                        word |= np.uint64(data[p + i]) << np.uint64(8 * i)
+                p += size
+            values[value] = _float_bits(kind, word)
+            continue
+        length, p = varint(data, p, end)
+        if p < 0 or length > np.uint64(end - p):
+            return False
+        size = np.int64(length)
+        if content == MESSAGE:
+            levels[depth, 0], levels[depth, 1], levels[depth, 2], levels[depth, 3] = end, first, last, token
+            depth += 1
+            end, first, token, last = p + size, present + 1, present + 1, token
+            continue
+        if size != tokens[present, SIZE]:
+            return False
+        if content == STRING:
+            differing = np.uint8(0)
+            begin, literal = np.uint64(p), np.uint64(tokens[present, LITERAL])
+            for i in range(np.uint64(size)):
+                differing = np.uint8(differing | np.uint8(data[begin + i] ^ literals[literal + i]))
+            if differing:
+                return False
+        elif kind == DOUBLE:
+            for i in range(size >> 3):
+                values[value + i] = load(data, p + 8 * i)
+        else:
+            width = 4 if kind in (SINGLE, UINT32, INT32) else 8
+            for i in range(size // width):
+                word = np.uint64(0)
+                for j in range(width):
+                    word |= np.uint64(data[p + i * width + j]) << np.uint64(8 * j)
+                values[value + i] = _float_bits(kind, word)
+        p += size
