@@ -16,7 +16,9 @@ from cdtool.columns import Column
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
 from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
+from cdtool.kernels import kernel
 from cdtool.messages.batch import Batch
+from cdtool.messages.column_memory import ColumnMemory
 from cdtool.messages.columns import FieldValues
 from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS
 from cdtool.messages.decoders import Decoders
@@ -194,14 +196,34 @@ def count_values(counts: npt.NDArray[np.int64]) -> Counter[int]:
     return Counter(counts.tolist())
 
 
-def sort_times(stamps: Stamps, origin: int) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
+def sort_times(
+    stamps: Stamps, origin: int, memory: ColumnMemory | None = None
+) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
     """Return times [s] after `origin` [ns] in ascending order, and the order; None if they are already ascending."""
-    # The difference is between integers, as an epoch in ns has more digits than a float64. It may need all 64 bits.
-    later: npt.NDArray[np.uint64] = stamps.view(np.uint64) - np.uint64(origin % 2**64)
-    time = later / 1e9
-    if len(stamps) and (before := stamps < origin).any():
-        time[before] = -((~later[before] + np.uint64(1)) / 1e9)
-    if np.all(time[1:] >= time[:-1]):
+    time = np.empty(len(stamps)) if memory is None else memory.empty((len(stamps),))
+    earliest = min(max(origin, int(np.iinfo(stamps.dtype).min)), int(np.iinfo(stamps.dtype).max))
+    words = np.ascontiguousarray(stamps).view(np.uint64)
+    zero = np.uint64(earliest % 2**64)
+    if _seconds_after(words, np.uint64(origin % 2**64), zero, stamps.dtype.kind == "i", time):
         return time, None
     order = np.argsort(time, kind="stable")
     return time[order], order
+
+
+@kernel("b1(Array(uint64, 1, 'C', readonly=True), uint64, uint64, b1, float64[::1])")
+def _seconds_after(stamps: npt.NDArray[np.uint64], origin: int, earliest: int, signed: bool, time: FloatArray) -> bool:
+    """Write the times [s] of `stamps` [ns] after `origin` to `time` (n,); return whether they are ascending.
+
+    The difference is between integers, as an epoch in ns has more digits than a float64; it may need all 64 bits.
+    Stamps below `earliest` are before the origin. `signed`: the words are int64.
+    """
+    ascending, before = True, -np.inf
+    for i in range(stamps.size):
+        later = stamps[i] - origin
+        seconds = np.float64(later) / 1e9
+        if np.int64(stamps[i]) < np.int64(earliest) if signed else stamps[i] < earliest:
+            seconds = -(np.float64(~later + np.uint64(1)) / 1e9)
+        time[i] = seconds
+        ascending = ascending and seconds >= before
+        before = seconds
+    return ascending

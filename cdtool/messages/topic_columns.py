@@ -18,6 +18,7 @@ from cdtool.columns import Column
 from cdtool.findings import Finding
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
+from cdtool.messages.column_memory import ColumnMemory
 from cdtool.messages.fast_path import Binding, Destination, WrittenRows
 from cdtool.messages.stream import Stream
 from cdtool.messages.topic import Topic, Values, sort_times
@@ -36,8 +37,11 @@ class Rows:
     and `confirm` adds the rows written. As a thread may still be writing, the array is copied before the next `append`.
     """
 
-    def __init__(self, expected: int, dtype: npt.DTypeLike = np.float64) -> None:
+    def __init__(
+        self, expected: int, dtype: npt.DTypeLike = np.float64, memory: ColumnMemory | None = None
+    ) -> None:
         self._expected = expected
+        self._memory = memory or ColumnMemory()
         self._table: npt.NDArray[Any] | None = None
         self._dtype = dtype
         self._shared = False
@@ -49,11 +53,11 @@ class Rows:
         if self._table is None:
             width = int(np.prod(values.shape[1:])) * values.itemsize  # bytes of a row
             rows = min(self._expected, _MOST_RESERVED // max(1, width))
-            self._table = np.empty((rows, *values.shape[1:]), self._dtype)
+            self._table = self._memory.empty((rows, *values.shape[1:]), self._dtype)
         end = self.count + len(values)
         if end > len(self._table) or self._shared:
             rows = max(end, 2 * len(self._table)) if end > len(self._table) else len(self._table)
-            grown = np.empty((rows, *self._table.shape[1:]), self._dtype)
+            grown = self._memory.empty((rows, *self._table.shape[1:]), self._dtype)
             grown[: self.count] = self._table[: self.count]
             self._replaced += self._shared
             self._table, self._shared = grown, False
@@ -92,8 +96,8 @@ class Rows:
 class _FieldRows:
     """One field's values of all decoded messages; `elsewhere` marks messages that name other joints only."""
 
-    def __init__(self, expected: int) -> None:
-        self.rows = Rows(expected)
+    def __init__(self, expected: int, memory: ColumnMemory) -> None:
+        self.rows = Rows(expected, memory=memory)
         self.elsewhere: Rows | None = None
         self.exact = False  # float64 represents every number of its type
 
@@ -115,7 +119,7 @@ class _FieldRows:
 
 
 class TopicColumns(Topic):
-    """A topic whose columns are in memory; `expected` is an estimate of the number of messages by topic."""
+    """A topic whose columns are in `memory`; `expected` is an estimate of the number of messages by topic."""
 
     def __init__(
         self,
@@ -125,9 +129,11 @@ class TopicColumns(Topic):
         clock: str,
         joints: Sequence[str],
         expected: Mapping[str, int],
+        memory: ColumnMemory | None = None,
     ) -> None:
         super().__init__(path, topic, texts, clock, joints)
-        self._rows = {text: _FieldRows(expected.get(topic, 0)) for text in self.fields}
+        self._memory = memory or ColumnMemory()
+        self._rows = {text: _FieldRows(expected.get(topic, 0), self._memory) for text in self.fields}
         # A header's stamp may be before 1970.
         self._stamps = Rows(expected.get(topic, 0), np.int64 if self.clock == "header" else np.uint64)
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
@@ -179,7 +185,7 @@ class TopicColumns(Topic):
             values, (time, order) = values[present], sort_times(self._stamps.values[present], self.origin)
         else:
             if self._clock is None:
-                self._clock = sort_times(self._stamps.values, self.origin)
+                self._clock = sort_times(self._stamps.values, self.origin, self._memory)
             time, order = self._clock
         column = replace(column, values=values if order is None else values[order], time=time)
         return column, [*findings, *rounding_finding(column.name, rounded)]

@@ -24,6 +24,7 @@ from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.mcap.uniform import UniformChunkReader
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
+from cdtool.messages.column_memory import ColumnMemory
 from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fast_path import Binding
@@ -100,9 +101,8 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
     names = {source.topic for source in wanted.sources}
     chunk_reader = UniformChunkReader(publish=wanted.time.clock == "publish")
     log = Log(path, names.__contains__, chunk_reader=chunk_reader)
-    topics = wanted_topics(
-        path, wanted, partial(TopicColumns, expected={topic: log.expected(topic) for topic in names})
-    )
+    expected = {topic: log.expected(topic) for topic in names}
+    topics = wanted_topics(path, wanted, partial(TopicColumns, expected=expected, memory=ColumnMemory()))
     pieces = log.pieces()
     # The chunk reader must learn from the first piece before the second one is read.
     for piece in chain(islice(pieces, 1), read_ahead(pieces)):

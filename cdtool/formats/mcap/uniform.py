@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,13 @@ class _Tables:
     literals: ByteArray
     values: int
 
-    @property
+    @cached_property
+    def free(self) -> dict[int, tuple[int, range]]:
+        """The number of each channel with a layout, and the rows of its columns that may be written."""
+        channels = enumerate(self.bindings.items())
+        return {channel: (slot, binding[1].free) for slot, (channel, binding) in channels if binding is not None}
+
+    @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """The arguments of the kernel that it only reads, in its order."""
         layouts = (self.slots, self.bounds, self.compared, self.mask, self.pattern, self.numbers, self.stamps)
@@ -91,7 +98,7 @@ class UniformChunkReader:
     def _read(
         self, tables: _Tables, content: ByteArray, rows: Mapping[int, range], is_known: IsKnownDefinition
     ) -> ChunkRows | None:
-        claimed = _claimed_rows(tables.bindings, rows)
+        claimed = _claimed_rows(tables, rows)
         if claimed is None:
             return None
         first, limits = claimed
@@ -126,16 +133,16 @@ class UniformChunkReader:
         return ChunkRows(counts, parts, (earliest, latest), first_time)
 
 
-def _claimed_rows(bindings: Mapping[int, Binding], rows: Mapping[int, range]) -> tuple[Words, Words] | None:
+def _claimed_rows(tables: _Tables, rows: Mapping[int, range]) -> tuple[Words, Words] | None:
     """Return first row and end of each channel's messages; None if its columns do not have as many free rows."""
-    first, limits = np.zeros(len(bindings), np.uint64), np.zeros(len(bindings), np.uint64)
-    for slot, (channel, binding) in enumerate(bindings.items()):
-        if binding is not None and channel in rows:
-            free = binding[1].free
-            if rows[channel].start < free.start or rows[channel].stop > free.stop:
+    first, limits = [0] * len(tables.bindings), [0] * len(tables.bindings)
+    for channel, (slot, free) in tables.free.items():
+        if channel in rows:
+            wanted = rows[channel]
+            if wanted.start < free.start or wanted.stop > free.stop:
                 return None
-            first[slot], limits[slot] = rows[channel].start, rows[channel].stop
-    return first, limits
+            first[slot], limits[slot] = wanted.start, wanted.stop
+    return np.array(first, np.uint64), np.array(limits, np.uint64)
 
 
 def _tables(bindings: Mapping[int, Binding]) -> _Tables:

@@ -217,12 +217,11 @@ class ChunkReadAhead:
             if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
                 reader.decompressor.read(reader.file, header, content)
                 return _CheckedChunk(header, content.ctypes.data)
-            buffer = reader.buffer(len(content))
-            reader.decompressor.read(reader.file, header, buffer)
-            taken = self._chunk_reader.read(buffer, self._rows[at], self._is_known)
+            checked = reader.decompressor.content(reader.file, header, reader.buffer(len(content)))
+            taken = self._chunk_reader.read(checked, self._rows[at], self._is_known)
             if taken is not None:
                 return _CheckedChunk(header, taken=taken)
-            content[:] = buffer
+            content[:] = checked
             return _CheckedChunk(header, content.ctypes.data)
         except (DamageError, OSError):
             return None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import cache
 from typing import Any, ClassVar, Self
 
 from cdtool.formats.mcap.container.serialisation import (
@@ -42,10 +43,15 @@ class Record:
     def read(cls, body: memoryview) -> Self:
         """Return the record with the content `body`; raises DamageError."""
         values, at = [], 0
-        for each in fields(cls):  # type: ignore[arg-type]
-            value, at = each.metadata["read"](body, at)
+        for read in _readers(cls):
+            value, at = read(body, at)
             values.append(value)
         return cls(*values)
+
+
+@cache
+def _readers(kind: type[Record]) -> tuple[Read, ...]:
+    return tuple(each.metadata["read"] for each in fields(kind))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

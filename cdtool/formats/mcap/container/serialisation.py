@@ -19,9 +19,10 @@ def _integer(code: str) -> Read:
     unpack, size = struct.Struct(f"<{code}").unpack_from, struct.calcsize(f"<{code}")
 
     def read(body: memoryview, at: int) -> tuple[int, int]:
-        if at + size > len(body):
-            raise DamageError(f"a record of {len(body)} bytes ends within a number")
-        return unpack(body, at)[0], at + size
+        try:
+            return unpack(body, at)[0], at + size
+        except struct.error as fault:
+            raise DamageError(f"a record of {len(body)} bytes ends within a number") from fault
 
     return read
 
