@@ -1,4 +1,6 @@
-"""The files for timing MCAP reading: four topics at 1 kHz like a robot's log, in each encoding.
+"""The files for timing MCAP reading: topics at 1 kHz like a robot's log, in each encoding.
+
+Their contents are four topics of the usual types, or one topic whose numbers are in messages within messages.
 
 Written with the `mcap` package, its usual chunks of 1 MiB. CDR messages are a template of `mcap-ros2-support` with the
 numbers put into their places.
@@ -9,6 +11,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -18,43 +21,104 @@ import numpy.typing as npt
 from mcap.writer import CompressionType, Writer
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.messages.schemas import DEFINITIONS
+from cdtool.messages.schemas import DEFINITIONS, Definition
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 10**9
 STEP_NS = 10**6
-# Topic -> type and fields; a field with numbers is an array of so many.
-TOPICS: Mapping[str, tuple[str, Mapping[str, int]]] = {
-    "/joint_states": ("sensor_msgs/msg/JointState", {"position": 6, "velocity": 6, "effort": 6}),
-    "/imu": (
-        "sensor_msgs/msg/Imu",
-        {f"{name}.{axis}": 0 for name in ("angular_velocity", "linear_acceleration") for axis in "xyz"},
+
+
+@dataclass(frozen=True)
+class Content:
+    """The topics of a log, each with its type and its fields, and the fields that are read from them.
+
+    A field with numbers is an array of so many.
+    """
+
+    topics: Mapping[str, tuple[str, Mapping[str, int]]]
+    wanted: tuple[tuple[str, str], ...]
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers are written each millisecond."""
+        return sum(size or 1 for _, fields in self.topics.values() for size in fields.values())
+
+
+def _axes(*names: str) -> dict[str, int]:
+    return {f"{name}.{axis}": 0 for name in names for axis in "xyz"}
+
+
+FLAT = Content(
+    {
+        "/joint_states": ("sensor_msgs/msg/JointState", {"position": 6, "velocity": 6, "effort": 6}),
+        "/imu": ("sensor_msgs/msg/Imu", _axes("angular_velocity", "linear_acceleration")),
+        "/wrench": ("geometry_msgs/msg/WrenchStamped", _axes("wrench.force", "wrench.torque")),
+        "/force": ("std_msgs/msg/Float64", {"data": 0}),
+    },
+    (
+        *(("/joint_states", f"{name}[:]") for name in ("position", "velocity", "effort")),
+        ("/imu", "linear_acceleration.x"),
+        ("/imu", "angular_velocity.z"),
+        ("/wrench", "wrench.force.z"),
+        ("/force", "data"),
     ),
-    "/wrench": (
-        "geometry_msgs/msg/WrenchStamped",
-        {f"wrench.{name}.{axis}": 0 for name in ("force", "torque") for axis in "xyz"},
-    ),
-    "/force": ("std_msgs/msg/Float64", {"data": 0}),
-}
-_FIELDS = dict(TOPICS.values())  # by type
-# The fields read from each topic.
-WANTED = (
-    *(("/joint_states", f"{name}[:]") for name in ("position", "velocity", "effort")),
-    ("/imu", "linear_acceleration.x"),
-    ("/imu", "angular_velocity.z"),
-    ("/wrench", "wrench.force.z"),
-    ("/force", "data"),
 )
+NESTED = Content(
+    {
+        "/robot": (
+            "robot_msgs/msg/RobotState",
+            {
+                "arm.joints.position": 6,
+                "arm.joints.velocity": 6,
+                **_axes("arm.base.twist.linear", "arm.base.twist.angular"),
+                **_axes("arm.tool.wrench.force", "arm.tool.wrench.torque"),
+            },
+        )
+    },
+    (
+        ("/robot", "arm.joints.position[:]"),
+        ("/robot", "arm.joints.velocity[:]"),
+        ("/robot", "arm.base.twist.linear.x"),
+        ("/robot", "arm.tool.wrench.force.z"),
+    ),
+)
+_SEPARATOR = "=" * 80
+_ROBOT_STATE = f"""std_msgs/Header header
+robot_msgs/Arm arm
+{_SEPARATOR}
+MSG: robot_msgs/Arm
+robot_msgs/Joints joints
+robot_msgs/Base base
+geometry_msgs/WrenchStamped tool
+{_SEPARATOR}
+MSG: robot_msgs/Joints
+std_msgs/Header header
+float64[] position
+float64[] velocity
+{_SEPARATOR}
+MSG: robot_msgs/Base
+std_msgs/Header header
+string child_frame_id
+geometry_msgs/Twist twist
+{_SEPARATOR}
+MSG: geometry_msgs/Twist
+geometry_msgs/Vector3 linear
+geometry_msgs/Vector3 angular
+{_SEPARATOR}
+MSG: geometry_msgs/WrenchStamped
+{DEFINITIONS["geometry_msgs/msg/WrenchStamped"].text}"""
+_DEFINITIONS = DEFINITIONS | {"robot_msgs/msg/RobotState": Definition(_ROBOT_STATE, ())}
+_FIELDS = dict((*FLAT.topics.values(), *NESTED.topics.values()))  # by type
 Array = npt.NDArray[np.float64]
 
 
-def channel_map() -> ChannelMap:
+def channel_map(content: Content = FLAT) -> ChannelMap:
     """The wanted fields as a machine file would name them."""
-    sources = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in WANTED)
+    sources = tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in content.wanted)
     return ChannelMap(TimeSource(clock="log"), sources, JOINTS, topics=True)
 
 
-def write_log(path: Path, seconds: float, encoding: str, compression: str) -> None:
+def write_log(path: Path, seconds: float, encoding: str, compression: str, content: Content = FLAT) -> None:
     """Write a log of so many seconds; `encoding` is cdr, json or protobuf."""
     count = round(1000 * seconds)
     rng = np.random.default_rng(0)
@@ -63,7 +127,7 @@ def write_log(path: Path, seconds: float, encoding: str, compression: str) -> No
         writer = Writer(file, compression=CompressionType[compression.upper()])
         writer.start(profile="ros2" if encoding == "cdr" else "")
         streams = []
-        for topic, (kind, fields) in TOPICS.items():
+        for topic, (kind, fields) in content.topics.items():
             values = {name: _signal(rng, count, size) for name, size in fields.items()}
             schema, payloads = makers[encoding](kind, values, count)
             number = writer.register_schema(kind if encoding != "protobuf" else _message_name(kind), *schema)
@@ -82,14 +146,14 @@ def _signal(rng: np.random.Generator, count: int, size: int) -> Array:
 
 
 def _cdr(kind: str, values: Mapping[str, Array], count: int) -> tuple[tuple[str, bytes], Iterator[bytes]]:
-    text = DEFINITIONS[kind].text
+    text = _DEFINITIONS[kind].text
     # Unique numbers show the position of each field.
     places = {name: np.arange(array[0].size) + 1e6 * (k + 1) + 0.5 for k, (name, array) in enumerate(values.items())}
     message = _nested(
         {name: place.tolist() if values[name].ndim == 2 else float(place[0]) for name, place in places.items()}
     )
     stamp = {"sec": 0x01020304, "nanosec": 0x05060708}
-    if DEFINITIONS[kind].header:
+    if _DEFINITIONS[kind].header:
         message["header"] = {"stamp": stamp, "frame_id": "base_link"}
     if "position" in values:
         message["name"] = list(JOINTS)
@@ -99,7 +163,7 @@ def _cdr(kind: str, values: Mapping[str, Array], count: int) -> tuple[tuple[str,
         at = template.index(places[name].astype("<f8").tobytes())
         raw = np.ascontiguousarray(array.reshape(count, -1), "<f8").view(np.uint8).reshape(count, -1)
         table[:, at : at + raw.shape[1]] = raw
-    if DEFINITIONS[kind].header:
+    if _DEFINITIONS[kind].header:
         at = template.index(struct.pack("<iI", *stamp.values()))
         times = START_NS + np.arange(count) * STEP_NS
         parts = np.column_stack((times // 10**9, times % 10**9)).astype("<u4")
@@ -134,7 +198,7 @@ def _messages(kind: str, values: Mapping[str, Array], count: int) -> Iterator[di
     columns = {name: array.tolist() for name, array in values.items()}
     for i in range(count):
         message = _nested({name: column[i] for name, column in columns.items()})
-        if DEFINITIONS[kind].header:
+        if _DEFINITIONS[kind].header:
             sec, nanosec = divmod(START_NS + i * STEP_NS, 10**9)
             message["header"] = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": "base_link"}
         if "position" in values:
@@ -185,7 +249,7 @@ def protobuf_message(kind: str) -> tuple[bytes, Callable[[], Any]]:
                 made_field.type_name = kind_name
 
     root = file.message_type.add(name=name)
-    if DEFINITIONS[kind].header:
+    if _DEFINITIONS[kind].header:
         stamp = file.message_type.add(name="Stamp")
         add(stamp, "sec", field.TYPE_INT64)
         add(stamp, "nanosec", field.TYPE_UINT32)

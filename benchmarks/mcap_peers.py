@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
-from mcap_logs import TOPICS, WANTED, Array, protobuf_message
+from mcap_logs import Array, Content, protobuf_message
 
 Columns = dict[str, Array]
 
 
-def gathered(messages: Iterator[tuple[str, Any]], member: Callable[[Any, str], Any]) -> Columns:
+def gathered(content: Content, messages: Iterator[tuple[str, Any]], member: Callable[[Any, str], Any]) -> Columns:
     """Columns of the wanted fields of (topic, decoded message); `member` gets a field of one."""
-    fields: dict[str, list[tuple[list[str], list[Any]]]] = {topic: [] for topic in TOPICS}
-    for topic, field in WANTED:
+    fields: dict[str, list[tuple[list[str], list[Any]]]] = {topic: [] for topic in content.topics}
+    for topic, field in content.wanted:
         fields[topic].append((field.removesuffix("[:]").split("."), []))
     for topic, message in messages:
         for steps, values in fields[topic]:
@@ -25,40 +25,46 @@ def gathered(messages: Iterator[tuple[str, Any]], member: Callable[[Any, str], A
                 value = member(value, step)
             values.append(value)
     found = {topic: iter(columns) for topic, columns in fields.items()}
-    return {f"{topic} {field}": np.array(next(found[topic])[1], dtype=np.float64) for topic, field in WANTED}
+    return {f"{topic} {field}": np.array(next(found[topic])[1], dtype=np.float64) for topic, field in content.wanted}
 
 
-def by_mcap_ros2_support(path: Path) -> Columns:
+def by_mcap_ros2_support(path: Path, content: Content) -> Columns:
     from mcap_ros2.decoder import DecoderFactory
 
     with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         rows = reader.iter_decoded_messages(log_time_order=False)
-        return gathered(((channel.topic, message) for _, channel, _, message in rows), getattr)
+        return gathered(content, ((channel.topic, message) for _, channel, _, message in rows), getattr)
 
 
-def by_rosbags(path: Path) -> Columns:
+def by_rosbags(path: Path, content: Content) -> Columns:
     from rosbags.highlevel import AnyReader
 
     with AnyReader([path]) as reader:
         rows = reader.messages()
-        return gathered(((each.topic, reader.deserialize(raw, each.msgtype)) for each, _, raw in rows), getattr)
+        return gathered(
+            content, ((each.topic, reader.deserialize(raw, each.msgtype)) for each, _, raw in rows), getattr
+        )
 
 
-def by_orjson(path: Path) -> Columns:
+def by_orjson(path: Path, content: Content) -> Columns:
     import orjson
 
     with path.open("rb") as file:
         rows = make_reader(file).iter_messages(log_time_order=False)
-        return gathered(((channel.topic, orjson.loads(row.data)) for _, channel, row in rows), dict.__getitem__)
+        return gathered(
+            content, ((channel.topic, orjson.loads(row.data)) for _, channel, row in rows), dict.__getitem__
+        )
 
 
-def by_protobuf(path: Path) -> Columns:
-    made = {topic: protobuf_message(kind)[1] for topic, (kind, _) in TOPICS.items()}
+def by_protobuf(path: Path, content: Content) -> Columns:
+    made = {topic: protobuf_message(kind)[1] for topic, (kind, _) in content.topics.items()}
     with path.open("rb") as file:
         rows = make_reader(file).iter_messages(log_time_order=False)
         return gathered(
-            ((channel.topic, made[channel.topic].FromString(row.data)) for _, channel, row in rows), getattr
+            content,
+            ((channel.topic, made[channel.topic].FromString(row.data)) for _, channel, row in rows),
+            getattr,
         )
 
 

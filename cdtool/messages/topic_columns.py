@@ -37,9 +37,7 @@ class Rows:
     and `confirm` adds the rows written. As a thread may still be writing, the array is copied before the next `append`.
     """
 
-    def __init__(
-        self, expected: int, dtype: npt.DTypeLike = np.float64, memory: ColumnMemory | None = None
-    ) -> None:
+    def __init__(self, expected: int, dtype: npt.DTypeLike = np.float64, memory: ColumnMemory | None = None) -> None:
         self._expected = expected
         self._memory = memory or ColumnMemory()
         self._table: npt.NDArray[Any] | None = None

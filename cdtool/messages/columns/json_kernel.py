@@ -20,9 +20,7 @@ VALUE, TEXT, END = 0, 1, 2
 OTHER, MATCHES, UNCLEAR = 0, 1, 2
 
 # Unsigned constants: a signed and an unsigned operand would both be converted to float.
-_0, _1, _3, _4, _5, _8, _9, _10, _16, _32, _48, _63, _64 = map(
-    np.uint64, (0, 1, 3, 4, 5, 8, 9, 10, 16, 32, 48, 63, 64)
-)
+_0, _1, _3, _4, _5, _8, _9, _10, _16, _32, _48, _63, _64 = map(np.uint64, (0, 1, 3, 4, 5, 8, 9, 10, 16, 32, 48, 63, 64))
 _ZEROS, _SIXES, _HIGH = np.uint64(0x3030303030303030), np.uint64(0x4646464646464646), np.uint64(0x8080808080808080)
 _QUOTES, _SLASHES = np.uint64(0x2222222222222222), np.uint64(0x5C5C5C5C5C5C5C5C)
 _ONES, _SPACES = np.uint64(0x0101010101010101), np.uint64(0x2020202020202020)
@@ -204,6 +202,4 @@ def read_matching(
     """
     for i in range(start.size):
         begin = start[i]
-        matches[i] = read_message(
-            data, begin, begin + length[i], literals, tokens, 0, tokens.shape[0], powers, bits[i]
-        )
+        matches[i] = read_message(data, begin, begin + length[i], literals, tokens, 0, tokens.shape[0], powers, bits[i])

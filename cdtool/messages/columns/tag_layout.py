@@ -125,9 +125,7 @@ class _Tokens:
             for member in sorted(members, key=lambda member: member.tag.number if member.tag is not None else 0)
         )
 
-    def _add(
-        self, schema: Schema, member: Member, path: MemberPath, paths: tuple[MemberPath, ...], depth: int
-    ) -> bool:
+    def _add(self, schema: Schema, member: Member, path: MemberPath, paths: tuple[MemberPath, ...], depth: int) -> bool:
         within = tuple(each for each in paths if each[: len(path)] == path)
         if member.tag is None or member.tag.oneof >= 0:
             return False

@@ -13,13 +13,10 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType
 from mcap_ros2.writer import Writer as Ros2Writer
 
-from cdtool.channels import ChannelMap, ChannelSource, TimeSource
-from cdtool.errors import RecordingError
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.container import chunk_read_ahead
 from cdtool.formats.mcap.container.log import Log
-from cdtool.formats.mcap.uniform import UniformChunkReader
 from cdtool.messages.schemas import DEFINITIONS
+from tests.formats.mcap.fast_path import same
 from tests.formats.mcap_damage.assembly import Ending, assemble, blocks_of, with_false_header
 from tests.formats.mcap_damage.messages import DEFINITIONS as TOPICS
 from tests.formats.mcap_damage.messages import START as START_S
@@ -29,56 +26,6 @@ from tests.messages.ros_messages import definitions, numeric_texts
 
 NAME, TOPIC = "test_msgs/msg/Thing", "/thing"
 START = 1_700_000_000 * 10**9
-JOINTS = ("c", "a", "b")
-
-
-@pytest.fixture(scope="module")
-def fast_path_chunks():
-    """Yield the numbers of chunks that the fast path has read (True) and has not read (False)."""
-    counts = {True: 0, False: 0}
-    read_chunk = UniformChunkReader.read
-
-    def counting(self, content, rows, is_known):
-        result = read_chunk(self, content, rows, is_known)
-        counts[result is not None] += 1
-        return result
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(UniformChunkReader, "read", counting)
-        yield counts
-
-
-def read(path, wanted, cores):
-    """Return the columns as bytes, the origin and the findings, or the error."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chunk_read_ahead, "usable_cores", lambda: cores)
-        try:
-            source = Mcap().columns(path, wanted)
-        except RecordingError as fault:
-            return str(fault)
-    columns = {
-        name: (column.values.shape, bits(column.values), column.time.tobytes())
-        for name, column in source.columns.items()
-    }
-    return columns, source.origin, [str(finding) for finding in source.findings]
-
-
-def bits(values):
-    """Return float64 numbers as bytes; all NaN are equal."""
-    return np.where(np.isnan(values), np.nan, np.ascontiguousarray(values, dtype=np.float64)).tobytes()
-
-
-def same(path, fields, clock="log", joints=JOINTS):
-    """Check that reading ahead with several threads gives the same as reading without; return the result."""
-    wanted = ChannelMap(
-        TimeSource(clock=clock),
-        tuple(ChannelSource("speed", topic=topic, field=field) for topic, field in fields),
-        joints,
-        topics=True,
-    )
-    one_core = read(path, wanted, cores=1)
-    assert read(path, wanted, cores=3) == one_core
-    return one_core
 
 
 @st.composite

@@ -5,6 +5,7 @@ If the file shrinks or the drive fails, this raises an error; with a memory-mapp
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -16,6 +17,7 @@ from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 
 _PIECE, _SMALL = 1 << 20, 1 << 12
+_POSITIONED = hasattr(os, "preadv")  # reading from a position without moving to it first; not on Windows
 
 
 class FileBytes:
@@ -45,8 +47,7 @@ class FileBytes:
             return self.array(at, length).data
         # Several record prefixes are read per chunk; this is ten times faster than an array for each.
         available = max(0, min(length, self.size - at))
-        self._file.seek(at)
-        content = self._file.read(available)
+        content = self._read_small(available, at)
         return memoryview(content) if len(content) == available else self.array(at, length).data
 
     def array(self, at: int, length: int) -> Bytes:
@@ -64,13 +65,24 @@ class FileBytes:
 
     def read_into(self, at: int, target: Bytes) -> None:
         """Fill `target` with the bytes from `at`; raises DamageError if the file ends before."""
-        self._file.seek(at)
         view, filled = target.data, 0
         while filled < len(view):
-            count = self._file.readinto(view[filled:])
+            count = self._fill(view[filled:], at + filled)
             if not count:
                 raise DamageError("the file became shorter while it was read")
             filled += count
+
+    def _read_small(self, length: int, at: int) -> bytes:
+        if _POSITIONED:
+            return os.pread(self._file.fileno(), length, at)
+        self._file.seek(at)
+        return self._file.read(length)
+
+    def _fill(self, view: memoryview, at: int) -> int:
+        if _POSITIONED:
+            return os.preadv(self._file.fileno(), [view], at)
+        self._file.seek(at)
+        return self._file.readinto(view)
 
     def crc(self, at: int, end: int) -> int:
         """Return the CRC-32 of the bytes from `at` to before `end`."""

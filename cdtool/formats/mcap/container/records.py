@@ -17,6 +17,7 @@ from cdtool.formats.mcap.container.serialisation import (
     index_entries,
     long_block,
     mapping,
+    numbers_by_channel,
     rest,
     string,
     uint8,
@@ -139,7 +140,7 @@ class ChunkIndex(Record):
     message_end_time: int = wire(uint64)
     chunk_start_offset: int = wire(uint64)
     chunk_length: int = wire(uint64)
-    message_index_offsets: Mapping[int, int] = wire(mapping(uint16, uint64))
+    message_index_offsets: Mapping[int, int] = wire(numbers_by_channel)
     message_index_length: int = wire(uint64)
     compression: str = wire(string)
     compressed_size: int = wire(uint64)
@@ -186,7 +187,7 @@ class Statistics(Record):
     chunk_count: int = wire(uint32)
     message_start_time: int = wire(uint64)
     message_end_time: int = wire(uint64)
-    channel_message_counts: Mapping[int, int] = wire(mapping(uint16, uint64))
+    channel_message_counts: Mapping[int, int] = wire(numbers_by_channel)
 
 
 @dataclass(frozen=True)

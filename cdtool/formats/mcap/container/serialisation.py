@@ -12,6 +12,8 @@ from typing import Any
 
 from cdtool.formats.mcap.container.damage import DamageError
 
+_CHANNEL_NUMBER = struct.Struct("<HQ")
+
 Read = Callable[[memoryview, int], tuple[Any, int]]
 
 
@@ -72,6 +74,14 @@ def mapping(key: Read, value: Read) -> Read:
         return entries, at
 
     return read
+
+
+def numbers_by_channel(body: memoryview, at: int) -> tuple[dict[int, int], int]:
+    """Read Map<uint16, uint64>."""
+    content, at_end = block(body, at)
+    if len(content) % _CHANNEL_NUMBER.size:  # cut off within an entry
+        return mapping(uint16, uint64)(body, at)
+    return dict(_CHANNEL_NUMBER.iter_unpack(content)), at_end
 
 
 def index_entries(body: memoryview, at: int) -> tuple[tuple[tuple[int, int], ...], int]:
