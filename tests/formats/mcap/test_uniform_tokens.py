@@ -153,8 +153,9 @@ def test_any_protobuf_messages_are_read_like_one_by_one(case, data):
 def other_numbers(value):
     """Return a strategy for a JSON value with other numbers."""
     if isinstance(value, dict):
-        stamp = {"header": STAMPS}
-        return st.fixed_dictionaries({name: stamp.get(name) or other_numbers(each) for name, each in value.items()})
+        return st.fixed_dictionaries(
+            {name: STAMPS if name == "header" else other_numbers(each) for name, each in value.items()}
+        )
     if isinstance(value, list):
         return st.tuples(*map(other_numbers, value)).map(list)
     if isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool)):

@@ -121,12 +121,15 @@ class Arena:
     def _blocks(self) -> Iterator[MessageBlock]:
         if self._taken:
             taken, self._taken = tuple(self._taken), []
-            if self.first_time is None or self.first_time >= NO_DATE:
-                self.first_time = taken[0].first_time
+            self._note_first_time(taken[0].first_time)
             yield MessageBlock(self._data, (), self._covered, {}, taken)
         if not self._table.count:
             return
-        if self.first_time is None or self.first_time >= NO_DATE:
-            self.first_time = self._table.first_time()
+        self._note_first_time(self._table.first_time())
         cuts = {channel: self._cuts.get(channel, 0) for channel in self._definitions.ambiguous}
         yield MessageBlock(self._data, tuple(self._table.by_channel(self._data)), self._covered, cuts)
+
+    def _note_first_time(self, time: int) -> None:
+        """Set the first time; a valid one replaces an invalid one, so that the sizes of blocks do not matter."""
+        if self.first_time is None or (self.first_time >= NO_DATE and time < NO_DATE):
+            self.first_time = time
