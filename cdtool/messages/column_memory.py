@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import mmap
 import sys
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +27,7 @@ class ColumnMemory:
         self._region = np.empty(0, np.uint8)
         self._used = 0
 
-    def empty(self, shape: tuple[int, ...], dtype: npt.DTypeLike = np.float64) -> npt.NDArray[np.generic]:
+    def empty(self, shape: tuple[int, ...], dtype: npt.DTypeLike = np.float64) -> npt.NDArray[Any]:
         """Return an uninitialised array."""
         size = math.prod(shape) * np.dtype(dtype).itemsize
         if size < _SMALLEST or not hasattr(mmap, "MADV_HUGEPAGE"):  # Linux has it

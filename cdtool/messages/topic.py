@@ -200,7 +200,7 @@ def sort_times(
     stamps: Stamps, origin: int, memory: ColumnMemory | None = None
 ) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
     """Return times [s] after `origin` [ns] in ascending order, and the order; None if they are already ascending."""
-    time = np.empty(len(stamps)) if memory is None else memory.empty((len(stamps),))
+    time: FloatArray = np.empty(len(stamps)) if memory is None else memory.empty((len(stamps),))
     earliest = min(max(origin, int(np.iinfo(stamps.dtype).min)), int(np.iinfo(stamps.dtype).max))
     words = np.ascontiguousarray(stamps).view(np.uint64)
     zero = np.uint64(earliest % 2**64)
@@ -224,6 +224,6 @@ def _seconds_after(stamps: npt.NDArray[np.uint64], origin: int, earliest: int, s
         if np.int64(stamps[i]) < np.int64(earliest) if signed else stamps[i] < earliest:
             seconds = -(np.float64(~later + np.uint64(1)) / 1e9)
         time[i] = seconds
-        ascending = ascending and seconds >= before
+        ascending = ascending and bool(seconds >= before)
         before = seconds
     return ascending

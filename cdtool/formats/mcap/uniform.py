@@ -35,6 +35,7 @@ from cdtool.messages.fast_path import (
 # The fast path is given up when the chunks that did not match outnumber those that did by this number.
 _MOST_MISMATCHES = 16
 _TEXT_TOKEN, _TEXT_LITERAL = 4, 0  # the columns of tokens of JSON, and that of their first literal
+_NONE = np.zeros(0, np.uint64)
 _KINDS = {"f": kernel.SINGLE, "i": kernel.SIGNED_INTEGER, "u": kernel.UNSIGNED_INTEGER, "?": kernel.TRUTH}
 
 
@@ -155,13 +156,13 @@ def _tables(bindings: Mapping[int, Binding]) -> _Tables:
         if binding is not None:
             stamps[slot] = binding[1].stamps.ctypes.data
             bounds[slot] = lists.add(*binding)
-    empty = np.zeros(0, np.uint64)
-    compared = [(template.compared, template.mask, template.pattern) for template in lists.templates]
     return _Tables(
         dict(bindings),
         slots,
         bounds,
-        *(np.concatenate([empty, *parts]) for parts in zip(*compared, strict=True)) if compared else (empty,) * 3,
+        np.concatenate([_NONE, *(template.compared for template in lists.templates)]),
+        np.concatenate([_NONE, *(template.mask for template in lists.templates)]),
+        np.concatenate([_NONE, *(template.pattern for template in lists.templates)]),
         np.concatenate(lists.numbers),
         stamps,
         np.concatenate([np.zeros((0, TOKEN), np.int64), *lists.tags]),

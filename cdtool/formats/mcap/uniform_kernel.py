@@ -67,7 +67,7 @@ def _matches(
     for i in range(first, last):
         k = np.uint64(i)
         differing |= (load(data, begin + compared[k]) ^ pattern[k]) & mask[k]
-    return differing == np.uint64(0)
+    return not differing
 
 
 @kernel(f"void({_BYTES}, uint64, int64, int64, {_ROWS}, uint64)", inline=True)

@@ -140,15 +140,15 @@ def read_tagged(
                 if p < 0:
                     return False
             else:
-                size = 8 if wire == 1 else 4
-                if size > end - p:
+                width = 8 if wire == 1 else 4
+                if width > end - p:
                     return False
-                if size == 8:
+                if width == 8:
                     word = load(data, p)
                 else:
                     for i in range(4):
                         word |= np.uint64(data[p + i]) << np.uint64(8 * i)
-                p += size
+                p += width
             values[value] = _float_bits(kind, word)
             continue
         length, p = varint(data, p, end)
@@ -158,7 +158,7 @@ def read_tagged(
         if content == MESSAGE:
             levels[depth, 0], levels[depth, 1], levels[depth, 2], levels[depth, 3] = end, first, last, token
             depth += 1
-            end, first, token, last = p + size, present + 1, present + 1, token
+            end, first, token, last = p + size, present + 1, present + 1, token  # type: ignore[assignment]
             continue
         if size != tokens[present, SIZE]:
             return False
@@ -179,4 +179,4 @@ def read_tagged(
                 for j in range(width):
                     word |= np.uint64(data[p + i * width + j]) << np.uint64(8 * j)
                 values[value + i] = _float_bits(kind, word)
-        p += size
+        p += size  # type: ignore[assignment]

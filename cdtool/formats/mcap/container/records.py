@@ -44,7 +44,7 @@ class Record:
     def read(cls, body: memoryview) -> Self:
         """Return the record with the content `body`; raises DamageError."""
         values, at = [], 0
-        for read in _readers(cls):
+        for read in _readers(cls):  # type: ignore[arg-type]
             value, at = read(body, at)
             values.append(value)
         return cls(*values)
