@@ -55,7 +55,7 @@ class Rows:
         end = self.count + len(values)
         if end > len(self._table) or self._shared:
             rows = max(end, 2 * len(self._table)) if end > len(self._table) else len(self._table)
-            grown = self._memory.empty((rows, *self._table.shape[1:]), self._dtype)
+            grown = np.empty((rows, *self._table.shape[1:]), self._dtype)  # the old array is released at once
             grown[: self.count] = self._table[: self.count]
             self._replaced += self._shared
             self._table, self._shared = grown, False

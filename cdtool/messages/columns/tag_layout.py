@@ -79,7 +79,7 @@ def tag_layout(
     joints: Sequence[str],
     stamp: tuple[MemberPath, ...],
 ) -> TokenLayout | None:
-    """Return the row layout of the plans' fields and of a header stamp at the paths `stamp`; None if there is none."""
+    """Return the row layout of the fields and of a header stamp at the paths `stamp`; None if one has no tokens."""
     if any(plan.arrays for plan in plans):
         return None
     paths = dict.fromkeys((*(path for plan in plans for path in plan.paths), *stamp))

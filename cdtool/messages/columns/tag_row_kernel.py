@@ -57,7 +57,7 @@ def _float_bits(kind: int, word: np.uint64) -> np.uint64:
 
 @kernel(f"int64({_BYTES}, int64, int64, int64)", inline=True)
 def _after_value(data: ByteArray, p: int, end: int, wire: int) -> int:
-    """Return the byte after a value of this wire type; -1 if there is none, or if it is a group."""
+    """Return the byte after a value of this wire type; -1 if it is missing, or a group."""
     if wire == 0:
         _, p = varint(data, p, end)
         return p
