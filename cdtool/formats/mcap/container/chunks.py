@@ -27,7 +27,6 @@ LARGEST_SHARE, _SMALL = 250, 16 << 20
 _LONG, _LONG_SHARE = 1 << 30, 100
 # lz4's decompressor copies input and output: they are processed in pieces of these sizes [bytes].
 _LZ4_IN, _LZ4_OUT = 1 << 20, 8 << 20
-_OUTPUTS = 4  # blocks of the size of an output that are kept: lz4 uses two
 _LZ4_FRAMES = 1000  # the largest number in a chunk; writers make one
 
 _FIXED = struct.Struct("<BQQQQII")  # opcode, content length, three sizes, CRC, length of the compression's name
@@ -159,10 +158,7 @@ class _Lz4Frame:
             return None
         import lz4.frame  # type: ignore[import-untyped]
 
-        context, self._context = self._context, None
-        if context is None:
-            context = lz4.frame.create_decompression_context()
-            _keep_released_memory(_OUTPUTS * size)
+        context, self._context = self._context or lz4.frame.create_decompression_context(), None
         try:
             content, used, complete = lz4.frame.decompress_chunk(context, packed, max_length=size + 1)
         except RuntimeError:
@@ -171,15 +167,6 @@ class _Lz4Frame:
             return None
         self._context = context
         return np.frombuffer(content, np.uint8)
-
-
-def _keep_released_memory(size: int) -> None:
-    """Let the allocator keep released blocks of up to `size` bytes in all.
-
-    glibc returns the memory of a large block to the system when it is released, and maps it again for the next one. For
-    the output of lz4, this takes longer than decompressing. It stops once a larger block was released.
-    """
-    np.empty(size, np.uint8)
 
 
 def _zstd() -> Callable[[Bytes, Bytes], int]:
