@@ -12,6 +12,24 @@ from cdtool.recording import FloatArray
 
 # Fewer values than this are sorted by insertion.
 _FEW = 16
+# Among more values than this the pivot is the median of three at random places: at fixed ones, a motion there and back
+# takes n^2 steps. The random numbers are those of Park and Miller (1988) with the factor of 1993.
+_MANY = 64
+_FACTOR, _MODULUS = 48271, 2147483647
+
+
+@kernel("float64(float64[::1], int64, int64, int64)", exact=True, inline=True)
+def _pivot(values: FloatArray, low: int, high: int, random: int) -> float:
+    """Return the median of three of the values from `low` to `high`."""
+    first = low
+    middle = (low + high) // 2
+    last = high
+    if high - low >= _MANY:
+        count = high - low + 1
+        first = low + random % count
+        middle = low + random * _FACTOR % _MODULUS % count
+        last = low + random // count % count
+    return float(max(min(values[first], values[middle]), min(max(values[first], values[middle]), values[last])))
 
 
 @kernel("float64(float64[::1], int64, int64)", exact=True)
@@ -22,9 +40,10 @@ def kth_smallest(values: FloatArray, count: int, k: int) -> float:
     """
     low = 0
     high = count - 1
+    random = _FACTOR
     while high - low >= _FEW:
-        middle = (low + high) // 2
-        pivot = max(min(values[low], values[middle]), min(max(values[low], values[middle]), values[high]))
+        random = random * _FACTOR % _MODULUS
+        pivot = _pivot(values, low, high, random)
         # Without a branch per value: which values are smaller is not predictable.
         smaller = low
         for i in range(low, high + 1):
