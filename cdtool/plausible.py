@@ -239,7 +239,7 @@ def _has_suspects(series: Series, known: ChannelRange, far: float, factors: Sequ
 def has_implausible(values: FloatArray, centre: FloatArray, beyond: float, ends: FloatArray, far: float) -> bool:
     """Return whether a value (n, J) is `beyond` this distance from `centre` (J,), or an end of the integer range.
 
-    `ends` (J, e) are these ends by joint; they count if they are `far` from the centre. Without rows there are none.
+    `ends` (J, e) are these ends by joint; they count if they are `far` from the centre. Without rows, no value is one.
     """
     for j in range(values.shape[1]):
         for k in range(values.shape[0]):
