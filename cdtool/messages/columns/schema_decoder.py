@@ -130,7 +130,7 @@ class Locator(Protocol):
     def row_layout(
         self, paths: tuple[MemberPath, ...], plans: Sequence[FieldPlan], joints: Sequence[str], stamp: StampPaths
     ) -> RowLayout | None:
-        """Return the row layout of further messages, in which `paths` were located; None if there is none."""
+        """Return the row layout of further messages, in which `paths` were located; None if they have no common one."""
         ...
 
 
