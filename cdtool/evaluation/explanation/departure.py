@@ -257,8 +257,7 @@ def _track(channel: str, joint: str, j: int, compared: Comparison, first: int, b
     reach = math.inf if channel in POSITIONS else _OFFSET
     past = slice(first, min(begin, after))
     own, own_level = own_distances(column.raw[past], column.raw_level[past], reach, np.empty(begin - first), _ENOUGH)
-    shift, rest = (own, 0.0) if channel in POSITIONS else (0.0, own)
-    return Track(column, first, after, shift, rest, own_level)
+    return Track(column, first, after, own if channel in POSITIONS else 0.0, own, own_level)
 
 
 def _own_past(series: Series, start: float, begin: float, end: float) -> Comparison:

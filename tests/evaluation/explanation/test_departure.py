@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.evaluation.explanation.departure import (
     Departure,
     Limits,
-    _track,
     fill_evenly,
     find_departure,
     prepare_bend,
     steepest_bend,
 )
-from cdtool.thresholds.normal_motion import Comparison
 
 
 def _first_beyond(values, sign):
@@ -135,16 +130,3 @@ def test_the_bend_is_searched_among_the_samples_that_whole_arrays_have(rows, out
     assert known[:count].tolist() == shares[samples].tolist()
     assert candidates[:tried].tolist() == expected.tolist()
     assert bends[:tried].tolist() == (time - time[begin])[expected].tolist()
-
-
-@pytest.mark.parametrize(("channel", "offset"), [("position", 50.0), ("speed", 2.0)])
-def test_a_constant_distance_of_a_run_is_no_departure_and_a_change_of_it_is_one(channel, offset):
-    time = np.arange(1000) * 1e-3
-    value = np.full((1000, 1), offset) + np.where(np.arange(1000) < 800, 0.01, 30.0)[:, np.newaxis]
-    normal, reach = (np.zeros((1000, 1)), np.ones((1000, 1))), np.ones((2, 1))
-    running = np.ones(1000, dtype=np.bool_)
-    compared = Comparison("rad", time, value, *normal, value, *normal, running, reach, reach)
-    track = _track(channel, "elbow", 0, compared, 0, 500, 1000)
-    assert math.isnan(track.movement(0.5, 0.79).time)
-    moved = track.movement(0.5, 0.99)
-    assert (moved.direction, moved.time) == ("up", pytest.approx(0.8, abs=0.02))
