@@ -130,7 +130,7 @@ def test_a_first_start_that_is_killed_does_not_block_the_next(tmp_path):
 
 
 _SHOWN = f"""
-from cdtool.cli.first_use import compilation_shown
+from cdtool.cli.app import compilation_shown
 with compilation_shown():
     {_HITS}
     from cdtool.clock import _differentiate as other

@@ -19,7 +19,6 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from cdtool.cli.first_use import compilation_shown
 from cdtool.cli.streams import lost_output, open_standard_streams
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
@@ -46,6 +45,8 @@ COMMANDS: Mapping[str, str] = {
 """Every command in the order of the help: the function that defines its options, or the app with its subcommands."""
 
 # In typer's default mode the help drops text in brackets, such as units.
+# The logger on which `cdtool.kernel_cache` reports that it compiles.
+_LOGGER = logging.getLogger("cdtool.kernel_cache")
 _LOOK: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": "markdown"}
 
 
@@ -159,6 +160,30 @@ def _ending_as_if_interrupted() -> Iterator[list[int]]:
 
 def _end_of(number: int) -> BaseException:
     return KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
+
+
+class _Line(logging.Handler):
+    """Print each message as a line on stderr; above a progress bar if there is one."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the message of a record."""
+        typer.echo(one_line(record.getMessage()), err=True)
+
+
+@contextmanager
+def compilation_shown() -> Iterator[None]:
+    """Show in the block that kernels are being compiled; nothing is shown if stderr is not a terminal."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    before, handler = _LOGGER.level, _Line()
+    _LOGGER.addHandler(handler)
+    _LOGGER.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        _LOGGER.setLevel(before)
+        _LOGGER.removeHandler(handler)
 
 
 def main() -> None:

@@ -38,7 +38,7 @@ class MessageTemplate:
 class TokenTemplate:
     """The tokens of messages whose numbers are not at fixed bytes, in their order, and the texts that they refer to.
 
-    The numbers of such messages are read into `values` float64. `tagged`: protobuf (tag_row_kernel.py), else JSON
+    The numbers of such messages are read into `values` float64. `tagged`: protobuf (tag_rows.py), else JSON
     (json_kernel.py).
     """
 

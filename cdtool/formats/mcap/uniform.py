@@ -18,7 +18,7 @@ from cdtool.decimal_kernel import powers_of_five
 from cdtool.formats.mcap import uniform_kernel as kernel
 from cdtool.messages.columns.copy_kernel import WORD
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
-from cdtool.messages.columns.tag_row_kernel import AFTER, DEEPEST, LEVEL, LITERAL, TOKEN
+from cdtool.messages.columns.tag_rows import AFTER, DEEPEST, LEVEL, LITERAL, TOKEN
 from cdtool.messages.fast_path import (
     Binding,
     ChunkRows,

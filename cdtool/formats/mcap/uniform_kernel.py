@@ -12,7 +12,7 @@ from cdtool.instructions import load, store
 from cdtool.kernels import kernel
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
 from cdtool.messages.columns.json_kernel import MATCHES, read_message
-from cdtool.messages.columns.tag_row_kernel import read_tagged
+from cdtool.messages.columns.tag_rows import read_tagged
 
 # Reason of the end: the chunk's end, a definition, or any other record that does not match.
 DONE, DEFINITION, OTHER = range(3)

@@ -21,7 +21,7 @@ from cdtool.messages.columns.decoded_batch import ByteArray, IntArray, Undecodab
 from cdtool.messages.columns.field_values import FieldPlan
 from cdtool.messages.columns.member_locations import MemberLocations, MemberPath
 from cdtool.messages.columns.schema_decoder import SchemaDecoder, StampPaths
-from cdtool.messages.columns.tag_layout import ExampleMessage, tag_layout
+from cdtool.messages.columns.tag_rows import ExampleMessage, tag_layout
 from cdtool.messages.columns.walk_kernel import all_match, fetch
 from cdtool.messages.fast_path import RowLayout
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
