@@ -15,7 +15,6 @@ from cdtool.messages.columns import DecodedBatch, Decoder, UndecodableError, dec
 from cdtool.messages.columns.decoded_batch import DECODED
 from cdtool.messages.fast_path import RowLayout
 from cdtool.messages.fields import Field, FieldMissingError, missing_field
-from cdtool.messages.stamp_order import Stamps
 from cdtool.messages.stream import Stream
 
 
@@ -54,24 +53,24 @@ class Decoders:
         return decoder.row_layout(wanted, joints, stamps)
 
     def decode(
-        self, where: str, stream: Stream, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], clock: str
-    ) -> tuple[Decoder, DecodedBatch, Stamps] | None:
-        """Return the decoder, the decoded batch, and its time stamps [ns] by `clock` ("log", "publish" or "header").
+        self, where: str, stream: Stream, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool
+    ) -> tuple[Decoder, DecodedBatch] | None:
+        """Return the decoder and the decoded batch, with the time stamps of the headers if `stamps`.
 
         If the batch cannot be decoded, its messages are counted as failed and the result is None. Raises
-        RecordingError, with `where` as its subject, if a field or the header's time stamp is missing.
+        RecordingError, with `where` as its subject, if the message definition does not have a field.
         """
         decoder = self.of(stream, batch)
         if decoder is None:
             return None
         try:
-            decoded = decoder.decode(batch, wanted, joints, stamps=clock == "header")
+            decoded = decoder.decode(batch, wanted, joints, stamps)
         except FieldMissingError as fault:
             raise missing_field(where, _absent(decoder, batch, wanted, joints), fault) from fault
         except UndecodableError as fault:
             self.give_up(stream, batch, fault)
             return None
-        return decoder, decoded, _stamps(where, batch, decoded, clock)
+        return decoder, decoded
 
     def give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
         """Mark a channel as undecodable, for a reason that only the wanted fields reveal, and count its batch."""
@@ -104,17 +103,6 @@ class Decoders:
                 "record the topic as JSON, ROS 2 CDR, ROS 1 or protobuf, with its message definition",
             )
         return self.failure(topic)
-
-
-def _stamps(where: str, batch: Batch, decoded: DecodedBatch, clock: str) -> Stamps:
-    if clock != "header":
-        return batch.log_time if clock == "log" else batch.publish_time
-    whole = decoded.status == DECODED
-    if decoded.stamps is None or decoded.has_stamp is None or not decoded.has_stamp[whole].all():
-        raise RecordingError(
-            f"{where}: a message has no header.stamp", "use time = { clock = 'log' } in [channels.mcap]"
-        )
-    return decoded.stamps
 
 
 def _absent(decoder: Decoder, batch: Batch, wanted: Sequence[Field], joints: Sequence[str]) -> str:

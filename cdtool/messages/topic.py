@@ -20,7 +20,7 @@ from cdtool.kernels import kernel
 from cdtool.messages.batch import Batch
 from cdtool.messages.column_memory import ColumnMemory
 from cdtool.messages.columns import FieldValues
-from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS
+from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import FieldMissingError, missing_field, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps
@@ -92,11 +92,16 @@ class Topic:
 
         Raises RecordingError if a field or the header's time stamp is missing.
         """
-        outcome = self.decoders.decode(self.where, stream, batch, self.wanted, self.joints, self.clock)
+        by_header = self.clock == "header"
+        outcome = self.decoders.decode(self.where, stream, batch, self.wanted, self.joints, stamps=by_header)
         if outcome is None:
             return None
-        decoder, decoded, stamps = outcome
+        decoder, decoded = outcome
         whole = self.decoders.keep(decoded)
+        self._check(decoded, whole)
+        stamps: Stamps = batch.log_time if self.clock == "log" else batch.publish_time
+        if by_header and decoded.stamps is not None:
+            stamps = decoded.stamps
         all_whole = bool(whole.all())
         stamps = stamps if all_whole else stamps[whole]
         self.orders.add(stream.id, stamps)
@@ -104,12 +109,30 @@ class Topic:
             self.first_stamp = int(stamps[0])
         values: dict[str, Values] = {}
         for (text, each), field_values in zip(self.fields.items(), decoded.fields, strict=True):
-            if field_values.fault is not None and bool(np.any(whole & (field_values.state == ABSENT))):
-                raise missing_field(self.where, text, field_values.fault)
             values[text] = each.add(field_values, whole, all_whole)
             if each.elsewhere and not each.names:
                 each.names = decoder.names(batch, each.field)
         return stamps, values
+
+    def _check(self, decoded: DecodedBatch, whole: BoolArray) -> None:
+        """Raise RecordingError for the first message that lacks a field or the header's time stamp.
+
+        The first message, not the first field: otherwise the error would depend on where the batches end.
+        """
+        faults: list[tuple[int, RecordingError]] = []
+        if self.clock == "header":
+            unstamped = whole if decoded.has_stamp is None else whole & ~decoded.has_stamp
+            if unstamped.any():
+                fault = f"{self.where}: a message has no header.stamp"
+                advice = "use time = { clock = 'log' } in [channels.mcap]"
+                faults.append((int(unstamped.argmax()), RecordingError(fault, advice)))
+        for text, field_values in zip(self.fields, decoded.fields, strict=True):
+            if field_values.fault is not None:
+                absent = whole & (field_values.state == ABSENT)
+                if absent.any():
+                    faults.append((int(absent.argmax()), missing_field(self.where, text, field_values.fault)))
+        if faults:
+            raise min(faults, key=lambda fault: fault[0])[1]
 
     def column(self, text: str) -> tuple[Column, list[Finding]]:
         """Return a field as a column without rows, and its findings; raises RecordingError."""

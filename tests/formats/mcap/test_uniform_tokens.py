@@ -249,3 +249,14 @@ def test_odd_times_of_protobuf_and_json_messages(tmp_path, encoding, times):
     path = write(tmp_path / "log.mcap", encoding, schema, payloads, 1500, times=times)
     for clock in ("log", "header"):
         same(path, [(TOPIC, field) for field in USUAL_FIELDS], clock)
+
+
+@pytest.mark.parametrize("chunk_size", [50, 100, 10**5])
+def test_the_error_is_that_of_the_first_faulty_message_wherever_chunks_end(tmp_path, chunk_size):
+    good = {"header": {"stamp": {"sec": 1, "nanosec": 0}}, "f": 1.0, "g": 2.0}
+    messages = [good, {**good, "header": {}}, {"header": good["header"], "f": 1.0}, {**good, "f": [1.0]}]
+    for order, fault in (((0, 1, 2, 3), "header.stamp"), ((0, 2, 1, 3), "'g'"), ((0, 3, 2, 1), "'f'")):
+        path = tmp_path / "log.mcap"
+        payloads = [json.dumps(messages[i]).encode() for i in order]
+        write(path, "json", ("", "", b""), payloads, chunk_size)
+        assert fault in same(path, [(TOPIC, "g"), (TOPIC, "f")], "header")
