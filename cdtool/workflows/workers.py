@@ -18,6 +18,8 @@ from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from cdtool.errors import WorkerError
 
 if TYPE_CHECKING:
@@ -28,6 +30,9 @@ Item = TypeVar("Item")
 Made = TypeVar("Made")
 # Called after each piece of work with the amount done and the total.
 Progress = Callable[[int, int], None]
+
+# The arrays of a log are smaller [bytes].
+_KEPT = 4 << 20
 
 # In a worker: what is done with each item.
 _work: Callable[[Any], Any] | None = None
@@ -69,11 +74,22 @@ def in_order(
     >>> list(in_order(abs, [-1, 2, -3], total=3))
     [1, 2, 3]
     """
+    if total > 1:
+        _keep_freed_memory()
     made = map(work, items) if min(jobs, total - 1) <= 1 else _by_processes(work, items, min(jobs, total - 1))
     for number, result in enumerate(made, 1):
         yield result
         if progress:
             progress(number, total)
+
+
+def _keep_freed_memory() -> None:
+    """Let the C library keep the memory of one item for the next.
+
+    glibc returns freed blocks of more than 128 KiB to the system, so that each item pays for their pages again: 430
+    page faults for 7 s of a gate, 5 % of the CPU time. The limit rises to the size of a larger block that is freed.
+    """
+    np.empty(_KEPT, np.uint8)
 
 
 def _by_processes(work: Callable[[Item], Made], items: Iterable[Item], jobs: int) -> Iterator[Made]:
@@ -108,6 +124,7 @@ def _begin(work: Callable[[Any], Any]) -> None:
     """Prepare a worker: it leaves Ctrl-C to the first process, and ends with it even if that is killed."""
     global _work
     _work = work
+    _keep_freed_memory()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_end_with_parent, daemon=True).start()
