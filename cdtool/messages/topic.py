@@ -115,7 +115,7 @@ class Topic:
         return stamps, values
 
     def _check(self, decoded: DecodedBatch, whole: BoolArray) -> None:
-        """Raise RecordingError for the first message that lacks a field or the header's time stamp.
+        """Raise RecordingError for the first message without a field or without the header's time stamp.
 
         The first message, not the first field: otherwise the error would depend on where the batches end.
         """

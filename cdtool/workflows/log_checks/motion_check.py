@@ -68,23 +68,21 @@ def _consistency(recording: Recording) -> list[Finding]:
     found = []
     speed, position = recording["speed"], recording["position"]
     moved = [_moved(position.values[:, j]) for j in range(speed.joint_count)]
+    integrals = previous_value(integrate(speed, position.unit), position.time)
     for j in range(speed.joint_count):
         if moved[j] <= _HARDLY * max(moved):
             continue
         joint = recording.joints[j] if len(recording.joints) > 1 else ""
-        integrated, travelled = _without_gaps(speed, position, j)
-        if not len(travelled):
-            continue
-        expected, spanned = float(np.ptp(integrated)), float(np.ptp(travelled))
+        expected, gained, spanned, travelled = _travel(integrals, speed, position, j)
         if expected <= 0.0 or spanned <= 0.0:
             continue
         if not 0.8 < expected / spanned < 1.25:
             between = _as_between(max(expected / spanned, spanned / expected))
             fact = SpeedUnitDoubtful(joint, expected, spanned, position.unit, speed.unit, between)
             found.append(Finding(fact, "speed"))
-        elif abs(travelled[-1]) > 0.5 * spanned and np.sign(travelled[-1]) != np.sign(integrated[-1]):
+        elif abs(travelled) > 0.5 * spanned and np.sign(travelled) != np.sign(gained):
             found.append(Finding(SpeedSignOpposite(joint), "speed"))
-    return [*found, *_swapped(recording)]
+    return [*found, *_swapped(recording, integrals)]
 
 
 def _moved(values: FloatArray) -> float:
@@ -93,7 +91,8 @@ def _moved(values: FloatArray) -> float:
     It is the range of the medians of fifty parts of the log, if it exceeds ten times the noise of single samples and
     ten steps of the encoder.
     """
-    known = values[np.isfinite(values)]
+    present = np.isfinite(values)
+    known = np.ascontiguousarray(values) if present.all() else values[present]
     if len(known) < 3:
         return 0.0
     travel: tuple[float, float, float] = travel_of(known, min(_PARTS, len(known)))
@@ -116,12 +115,11 @@ def _as_between(ratio: float) -> str:
     return ""
 
 
-def _swapped(recording: Recording) -> list[Finding]:
+def _swapped(recording: Recording, integrals: FloatArray) -> list[Finding]:
     """Return joints whose position follows the speed of another joint: columns in the wrong order."""
     speed, position = recording["speed"], recording["position"]
     if speed.joint_count < 2 or len(speed) < 3 or len(position) < 3:
         return []
-    integrals = previous_value(integrate(speed, position.unit), position.time)
     known = np.isfinite(position.values).all(axis=1) & np.isfinite(integrals).all(axis=1)
     integrals, positions = integrals[known], position.values[known]
     if len(positions) < 3:
@@ -137,26 +135,17 @@ def _swapped(recording: Recording) -> list[Finding]:
     return found
 
 
-def _without_gaps(speed: Series, position: Series, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return the integral of a joint's speed and its position, both from 0 and without changes in gaps of a clock.
-
-    The speed in a gap is unknown and cannot be integrated.
-    """
-    integrated = previous_value(integrate(speed, position.unit), position.time)[:, joint]
-    travelled, time = position.values[:, joint], position.time
-    known = np.isfinite(travelled) & np.isfinite(integrated)
-    integrated, travelled, time = integrated[known], travelled[known], time[known]
-    if len(time) < 2:
-        return np.empty(0), np.empty(0)
-    logged = np.diff(time) <= GAP_PERIODS * position.period
-    is_pause = np.diff(speed.time) > GAP_PERIODS * speed.period
-    if is_pause.any():
-        pauses = np.concatenate(([0], np.cumsum(is_pause)))
-        at = np.searchsorted(speed.time, time, side="right") - 1
-        after = np.minimum(at + 1, len(speed.time) - 1)
-        logged &= pauses[after[1:]] - pauses[at[:-1]] == 0
-    steps = (np.where(logged, np.diff(values), 0.0) for values in (integrated, travelled))
-    return tuple(np.concatenate(([0.0], np.cumsum(step))) for step in steps)  # type: ignore[return-value]
+def _travel(integrals: FloatArray, speed: Series, position: Series, joint: int) -> tuple[float, float, float, float]:
+    """Return range and last value of the integral of a joint's speed, then of its position, without gaps of a clock."""
+    travel: tuple[float, float, float, float] = travel_without_gaps(
+        position.time,
+        np.ascontiguousarray(integrals[:, joint]),
+        np.ascontiguousarray(position.values[:, joint]),
+        GAP_PERIODS * position.period,
+        speed.time,
+        GAP_PERIODS * speed.period,
+    )
+    return travel
 
 
 def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[Finding]:
@@ -212,3 +201,43 @@ def travel_of(position: FloatArray, parts: int) -> tuple[float, float, float]:
             smallest = step
             is_any = True
     return float(highest - lowest), float(smallest), float(largest)
+
+
+@kernel(f"UniTuple(float64, 4)({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, float64, {READ_ONLY}, float64)", exact=True)
+def travel_without_gaps(
+    time: FloatArray,
+    integrated: FloatArray,
+    position: FloatArray,
+    longest_step: float,
+    speed_time: FloatArray,
+    longest_speed_step: float,
+) -> tuple[float, float, float, float]:
+    """Return the range and the last value of the integral of a speed, then those of the position, (n,) each, from 0.
+
+    Changes in gaps of a clock are left out, as the speed there is unknown; also missing samples. A gap is longer than
+    the longest step [s]; the speed's times (m,) [s] are its own. All are 0 with fewer than two samples.
+    """
+    before = -1
+    at = -1
+    pauses = 0  # gaps of the speed up to sample `at`
+    pauses_before = 0
+    low, high, gained = 0.0, 0.0, 0.0
+    lowest, highest, travelled = 0.0, 0.0, 0.0
+    for k in range(len(time)):
+        if not (math.isfinite(position[k]) and math.isfinite(integrated[k])):
+            continue
+        while at + 1 < len(speed_time) and speed_time[at + 1] <= time[k]:
+            at += 1
+            if at > 0 and speed_time[at] - speed_time[at - 1] > longest_speed_step:
+                pauses += 1
+        after = pauses
+        if 0 <= at < len(speed_time) - 1 and speed_time[at + 1] - speed_time[at] > longest_speed_step:
+            after += 1
+        if before >= 0 and time[k] - time[before] <= longest_step and after == pauses_before:
+            gained += integrated[k] - integrated[before]
+            travelled += position[k] - position[before]
+            low, high = min(low, gained), max(high, gained)
+            lowest, highest = min(lowest, travelled), max(highest, travelled)
+        before = k
+        pauses_before = pauses
+    return high - low, gained, highest - lowest, travelled

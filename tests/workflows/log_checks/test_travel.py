@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cdtool.clock import GAP_PERIODS, integrate, previous_value
 from cdtool.recording import Series
 from cdtool.workflows.log_checks.log_findings import _pairs
-from cdtool.workflows.log_checks.motion_check import _moved
+from cdtool.workflows.log_checks.motion_check import _moved, travel_without_gaps
 from tests.bits import VALUES, assert_same_bits, clocks
 
 
@@ -85,3 +86,40 @@ def _windows(speed, acceleration, joint):
         means[i] = part.mean() if len(part) else np.nan
     good = np.isfinite(means) & np.isfinite(gained)
     return gained[good], means[good]
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_travel_without_gaps_is_that_of_the_steps_between_known_samples(data):
+    made = []
+    for _ in range(2):
+        time = data.draw(st.sampled_from([1, 2, 3, 30, 400]).flatmap(clocks))
+        random = np.random.default_rng(data.draw(st.integers(0, 2**31)))
+        if data.draw(st.booleans()):
+            time = time + np.cumsum(random.choice([0.0, 0.5], size=len(time), p=[0.95, 0.05]))
+        values = np.cumsum(random.normal(size=(len(time), 1)), axis=0)
+        values[random.uniform(size=values.shape) < data.draw(st.sampled_from([0.0, 0.3]))] = np.nan
+        made.append(Series(time, values, "m"))
+    speed, position = made
+    if data.draw(st.booleans()):
+        position = Series(speed.time, data.draw(st.sampled_from([1.0, -1.0])) * speed.values, "m")
+    integrals = previous_value(integrate(speed, "m"), position.time)[:, 0].copy()
+    longest = GAP_PERIODS * position.period, speed.time, GAP_PERIODS * speed.period
+    found = travel_without_gaps(position.time, integrals, position.values[:, 0].copy(), *longest)
+    assert_same_bits(np.array(found) + 0.0, np.array(_steps_added(integrals, speed, position)) + 0.0)
+
+
+def _steps_added(integrated, speed, position):
+    travelled, time = position.values[:, 0], position.time
+    known = np.isfinite(travelled) & np.isfinite(integrated)
+    integrated, travelled, time = integrated[known], travelled[known], time[known]
+    if len(time) < 2:
+        return 0.0, 0.0, 0.0, 0.0
+    logged = np.diff(time) <= GAP_PERIODS * position.period
+    pauses = np.concatenate(([0], np.cumsum(np.diff(speed.time) > GAP_PERIODS * speed.period)))
+    at = np.searchsorted(speed.time, time, side="right") - 1
+    after = np.minimum(at + 1, len(speed.time) - 1)
+    logged &= pauses[after[1:]] == pauses[at[:-1]]
+    sums = [np.cumsum(np.where(logged, np.diff(values), 0.0)) for values in (integrated, travelled)]
+    sums = [np.concatenate(([0.0], each)) for each in sums]
+    return tuple(number for each in sums for number in (float(np.ptp(each)), float(each[-1])))
