@@ -7,17 +7,23 @@ from earlier samples only (`motion.strokes`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.errors import RecordingError, UsageError, nearest
+from cdtool.kernels import READ_ONLY, kernel
+from cdtool.median_kernel import quantile_of
 from cdtool.motion import MotionClass, leading_joint, motion_class
-from cdtool.recording import BoolArray, Recording
+from cdtool.recording import BoolArray, FloatArray, Recording
 
 HOW_TO_CUT = ("whole", "motion", "trigger")
 
+# A larger speed counts as this one, so that the quantile is finite.
+_LARGEST = float(np.finfo(np.float64).max)
 # Share of the peak speed below which the axis counts as at rest.
 _REST_SHARE = 0.05
 # A rest shorter than this [s] is a pause in a stroke; a motion shorter than this is not a stroke.
@@ -80,11 +86,11 @@ def motion_spans(recording: Recording) -> tuple[tuple[float, float], ...]:
 def _motion_spans(recording: Recording) -> list[tuple[float, float]]:
     series = recording["reference_speed" if "reference_speed" in recording else "speed"]
     joint = leading_joint(series)
-    speed = np.nan_to_num(series.values[:, joint])
+    speed = np.ascontiguousarray(series.values[:, joint])
     if not len(speed):
         return []
-    rest = _REST_SHARE * float(np.percentile(np.abs(speed), 99.0))
-    sign = np.where(np.abs(speed) <= rest, 0, np.sign(speed)).astype(int)
+    sign = np.empty(len(speed), dtype=np.int8)
+    find_directions(speed, sign)
     strokes: list[list[float]] = []
     direction = 0
     for first, last in _runs(sign):
@@ -103,11 +109,11 @@ def _motion_spans(recording: Recording) -> list[tuple[float, float]]:
 def _trigger_spans(recording: Recording) -> list[tuple[float, float]]:
     series = recording["trigger"]
     high: BoolArray = np.nan_to_num(series.values[:, 0]) > 0.5
-    return [(float(series.time[a]), float(series.time[b])) for a, b in _runs(high.astype(int)) if high[a]]
+    return [(float(series.time[a]), float(series.time[b])) for a, b in _runs(high) if high[a]]
 
 
-def _runs(values: np.ndarray[tuple[int], np.dtype[np.int_]]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(values)) + 1
+def _runs(values: npt.NDArray[np.int8 | np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(values[1:] != values[:-1]) + 1
     starts = [0, *edges.tolist()]
     ends = [*(edges - 1).tolist(), len(values) - 1]
     return list(zip(starts, ends, strict=True))
@@ -120,3 +126,17 @@ def _with_margins(strokes: list[list[float]], recording: Recording) -> list[tupl
         after = recording.end if i == len(strokes) - 1 else 0.5 * (end + strokes[i + 1][0])
         spans.append((max(before, start - _MARGIN), min(after, end + _MARGIN)))
     return spans
+
+
+@kernel(f"void({READ_ONLY}, int8[::1])", exact=True)
+def find_directions(speed: FloatArray, direction: npt.NDArray[np.int8]) -> None:
+    """Fill the direction (n,) in which a speed moves: 1, -1, or 0 at rest, also where it is missing.
+
+    It is at rest up to a share of the magnitude that 99 % of the samples do not exceed.
+    """
+    size = np.empty(len(speed))
+    for k in range(len(speed)):
+        size[k] = 0.0 if math.isnan(speed[k]) else min(abs(speed[k]), _LARGEST)
+    rest = _REST_SHARE * quantile_of(size, len(size), 0.99)
+    for k in range(len(speed)):
+        direction[k] = 1 if speed[k] > rest else (-1 if -speed[k] > rest else 0)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cdtool.evaluation.statistics.correlation import correlation
 from cdtool.evaluation.truth.missing_samples import cell_samples, longest_step
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.findings import Finding
@@ -140,16 +141,19 @@ def _near(time: FloatArray, contacts: Sequence[Contact]) -> np.ndarray:
 
 
 def _at(series: Series, joint: int, time: FloatArray) -> FloatArray:
-    present = np.isfinite(series.values[:, joint])
-    if np.count_nonzero(present) < 2:
+    values, stamps = series.values[:, joint], series.time
+    present = np.isfinite(values)
+    if not present.all():
+        values, stamps = values[present], stamps[present]
+    if len(values) < 2:
         return np.full(len(time), np.nan)
-    return np.asarray(np.interp(time, series.time[present], series.values[present, joint]))
+    return np.asarray(np.interp(time, stamps, values))
 
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:
     if not np.all(np.isfinite(b)) or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
         return float("nan")
-    return float(np.corrcoef(a, b)[0, 1])
+    return correlation(a, b)
 
 
 def _has_drifted(contact: Contact, rule: OnsetRule) -> bool:

@@ -5,12 +5,14 @@ The sign and scale of the accelerometer are checked against the derivative of th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from cdtool.evaluation.results import RecordingFinding
+from cdtool.evaluation.statistics.correlation import correlation
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Fact, Finding, worst_first
@@ -82,23 +84,23 @@ def _before_contact(series: Series, contacts: Sequence[Contact]) -> Series:
 
 
 def _compare(expected: FloatArray, measured: FloatArray, joint: str) -> Fact:
-    if len(expected) < 5 or np.std(expected) == 0.0 or np.std(measured) == 0.0:
+    r = correlation(expected, measured)
+    if len(expected) < 5 or math.isnan(r):
         return AccelerometerUncheckable(joint, "speed hardly changes")
-    correlation = float(np.corrcoef(expected, measured)[0, 1])
     slope = float(np.polyfit(expected, measured, 1)[0])
-    if abs(correlation) < _LEAST_FOR_SIGN:
-        return AccelerometerUncheckable(joint, "correlation", correlation)
+    if abs(r) < _LEAST_FOR_SIGN:
+        return AccelerometerUncheckable(joint, "correlation", r)
     if slope < 0.0:
-        return AccelerometerTurned(joint, slope, correlation)
+        return AccelerometerTurned(joint, slope, r)
     if _fits(slope):
-        return AccelerometerFit(joint, slope, correlation)
-    if correlation < _LEAST_FOR_SCALE:
-        return AccelerometerScaleUncheckable(joint, slope, correlation)
+        return AccelerometerFit(joint, slope, r)
+    if r < _LEAST_FOR_SCALE:
+        return AccelerometerScaleUncheckable(joint, slope, r)
     if _fits(slope / _STANDARD_GRAVITY):
-        return AccelerometerScaleWrong(joint, slope, correlation, "m/s2")
+        return AccelerometerScaleWrong(joint, slope, r, "m/s2")
     if _fits(slope * _STANDARD_GRAVITY):
-        return AccelerometerScaleWrong(joint, slope, correlation, "g")
-    return AccelerometerScaleWrong(joint, slope, correlation)
+        return AccelerometerScaleWrong(joint, slope, r, "g")
+    return AccelerometerScaleWrong(joint, slope, r)
 
 
 def _fits(slope: float) -> bool:
