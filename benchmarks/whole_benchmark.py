@@ -2,7 +2,8 @@
 
 CPU time from the first scored log to the last, per log: start-up, learning, final statistics and reports are not in it.
 The peer is `bare_script.py`; the limit of 12 ms is for a machine on which it takes 3.3 ms, so the two are compared. 200
-and 2,000 recordings, with one job and with two, at least five rounds; every run is a new process.
+and 2,000 recordings, with one job and with two, at least five rounds; every run is a new process. Two bare scripts at
+once show how much two jobs can gain on this machine: its cores may share parts.
 
 python benchmarks/whole_benchmark.py            # some minutes; 1 GB in the temporary folder
 python benchmarks/whole_benchmark.py --guard    # 50 recordings in one process, half a minute
@@ -17,6 +18,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -84,7 +87,7 @@ def measure() -> bool:
         write_gate_recordings(few, COUNTS, SEED, file_format="csv")
         _multiply(few, many)
         found: dict[str, list[dict[str, float]]] = {"200, 1 job": [], "2000, 1 job": [], "2000, 2 jobs": []}
-        peers = []
+        peers, together = [], []
         for number in range(-1, ROUNDS):
             made = {
                 "200, 1 job": _in_process(_RUN, few, 1),
@@ -92,11 +95,16 @@ def measure() -> bool:
                 "2000, 2 jobs": _in_process(_RUN, many, 2),
             }
             peer = float(_in_process(_BARE, few))
+            with ThreadPoolExecutor(2) as pool:
+                pair = [float(text) for text in pool.map(partial(_in_process, _BARE), [few, few])]
             if number >= 0:
                 peers.append(peer)
+                together.append(sum(pair) / 2.0)
                 for key, text in made.items():
                     found[key].append(json.loads(text))
             print(f"round {number + 1} of {ROUNDS}", file=sys.stderr, flush=True)
+    faster = ratio([2.0 * peer for peer in peers], together)
+    print(f"the machine: two bare scripts at once do {faster} times the work of one")
     return _judged(found, peers)
 
 
