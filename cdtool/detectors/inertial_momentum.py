@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -165,9 +166,15 @@ class InertialMomentum:
         lost = np.zeros(len(time), dtype=bool) if lost is None else lost
         inputs = (speed, acceleration, missing, lost, usual_steps(time))
         arrays = (np.ascontiguousarray(item) for item in inputs)
-        settle = 3.0 / float(np.min(np.abs(np.roots([1.0, k1, k2]).real)))
+        settle = _settling_time(k1, k2)
         rest = (standstill_speed, _STANDSTILL_WINDOW, _STANDSTILL_AT_LEAST)
         return fused, float(_fuse(time, *arrays, k1, k2, settle, *rest, fused))
+
+
+@lru_cache(maxsize=64)
+def _settling_time(k1: float, k2: float) -> float:
+    """Return three time constants [s] of the slowest pole of the complementary filter, s^2 + k1 s + k2 = 0."""
+    return 3.0 / float(np.min(np.abs(np.roots([1.0, k1, k2]).real)))
 
 
 @kernel(
