@@ -1,6 +1,7 @@
 """Processor instructions for kernels that numba does not provide.
 
-`prefetch`, `store`, `load`, two on bits, and `add_products` on several numbers at once.
+`prefetch`, `store`, `load`, two on bits, `add_products` on several numbers at once, `part_of` an array, and
+`widest_vectors`.
 """
 
 from __future__ import annotations
@@ -201,9 +202,64 @@ def _emit_add_products() -> Callable[..., Any]:
     return made
 
 
+def _part_of(data: Any, at: Any, size: Any) -> Any:
+    """Return `size` elements of the contiguous array `data` from element `at` on, in the order of the memory (size,).
+
+    All must be in the array, which must live longer than its part. A slice takes longer: its limits are compared with
+    the length, and its array is counted as in use, by an instruction that locks the memory.
+    """
+
+
+def _emit_part_of() -> Callable[..., Any]:
+    from numba import types
+    from numba.extending import intrinsic
+    from numba.np import arrayobj
+
+    populate: Any = arrayobj.populate_array
+
+    def emit(_: Any, data: Any, at: Any, size: Any) -> Any:  # noqa: ARG001 - numba requires the instruction's own
+        def lines(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            whole = context.make_array(signature.args[0])(context, builder, arguments[0])
+            part = context.make_array(signature.return_type)(context, builder)
+            place, width = builder.gep(whole.data, [arguments[1]]), context.get_constant(types.intp, 8)
+            populate(part, data=place, shape=[arguments[2]], strides=[width], itemsize=width, meminfo=None)
+            return part._getvalue()
+
+        return types.Array(data.dtype, 1, "C", readonly=not data.mutable)(data, types.intp, types.intp), lines
+
+    made: Callable[..., Any] = intrinsic(emit)
+    return made
+
+
+def _widest_vectors() -> None:
+    """Let the loops of the kernel that contains it use the widest vectors of the processor.
+
+    The compiler uses half of a width of 512 bits by default, because the first processors that had it slowed down. The
+    numbers have the same bits.
+    """
+
+
+def _emit_widest_vectors() -> Callable[..., Any]:
+    from numba import types
+    from numba.extending import intrinsic
+
+    def emit(_: Any) -> Any:
+        def lines(context: Any, builder: Any, _: Any, __: Any) -> Any:
+            # llvmlite's own `add` accepts only attributes without a value.
+            set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+            return context.get_dummy_value()
+
+        return types.void(), lines
+
+    made: Callable[..., Any] = intrinsic(emit)
+    return made
+
+
 prefetch = _Instruction(_prefetch, _emit_prefetch)
 store = _Instruction(_store, _emit_store)
 load = _Instruction(_load, _emit_load)
 equal_bytes = _Instruction(_equal_bytes, _emit_equal_bytes)
 trailing_zeros = _Instruction(_trailing_zeros, _emit_trailing_zeros)
 add_products = _Instruction(_add_products, _emit_add_products)
+part_of = _Instruction(_part_of, _emit_part_of)
+widest_vectors = _Instruction(_widest_vectors, _emit_widest_vectors)

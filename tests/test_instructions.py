@@ -1,7 +1,7 @@
 """Instructions in kernels: prefetch changes nothing at any address; store writes a value only at its address.
 
 load reads eight bytes at any address; equal_bytes, trailing_zeros and add_products agree with the same operation in
-Python.
+Python. A part is the memory of its array; wider vectors change no number.
 """
 
 from __future__ import annotations
@@ -10,7 +10,18 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.instructions import LANES, STRIDE, add_products, equal_bytes, load, prefetch, store, trailing_zeros
+from cdtool.instructions import (
+    LANES,
+    STRIDE,
+    add_products,
+    equal_bytes,
+    load,
+    part_of,
+    prefetch,
+    store,
+    trailing_zeros,
+    widest_vectors,
+)
 from cdtool.kernels import kernel
 
 
@@ -116,3 +127,45 @@ def test_products_are_added_to_their_own_numbers_only(count, at, first_at, secon
     beside = np.ones(len(sums), dtype=bool)
     beside[at : at + LANES] = False
     np.testing.assert_array_equal(sums[beside], before[beside])
+
+
+@kernel("int64(float64[:, ::1], int64, int64)")
+def double_part(table, at, size):
+    part = part_of(table, at, size)
+    for i in range(len(part)):
+        part[i] *= 2.0
+    return len(part)
+
+
+@given(st.integers(0, 12), st.integers(0, 12))
+def test_a_part_is_the_memory_of_its_array_in_its_order(first, second):
+    at, end = sorted((first, second))
+    table = np.arange(1.0, 13.0).reshape(3, 4)
+    expected = table.ravel().copy()
+    expected[at:end] *= 2.0
+    assert double_part(table, at, end - at) == end - at
+    assert table.ravel().tolist() == expected.tolist()
+
+
+def cubed(values, results):
+    for i in range(len(values)):
+        results[i] = values[i] * values[i] * values[i] + 0.1
+
+
+def test_with_the_widest_vectors_the_numbers_are_the_same():
+    from numba import njit
+
+    namespace = {"widest_vectors": widest_vectors.compiled}
+    exec(
+        "def cubed(values, results):\n    widest_vectors()\n    for i in range(len(values)):\n"
+        "        results[i] = values[i] * values[i] * values[i] + 0.1\n",
+        namespace,
+    )
+    signature = "void(float64[::1], float64[::1])"
+    wide, usual = njit(signature)(namespace["cubed"]), njit(signature)(cubed)
+    values, results = np.linspace(-3.0, 3.0, 101), np.zeros((2, 101))
+    wide(values, results[0])
+    usual(values, results[1])
+    assert results[0].tobytes() == results[1].tobytes()
+    assert '"prefer-vector-width"="512"' in next(iter(wide.inspect_llvm().values()))
+    assert '"prefer-vector-width"="512"' not in next(iter(usual.inspect_llvm().values()))

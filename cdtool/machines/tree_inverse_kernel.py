@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from cdtool.instructions import widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.machines.tree_angles import fill_sine_cosine
 from cdtool.machines.tree_rows import (
@@ -43,6 +42,7 @@ from cdtool.machines.tree_rows import (
     W,
     about_z,
     add,
+    body_of,
     clear,
     copy_motion,
     cross,
@@ -50,6 +50,7 @@ from cdtool.machines.tree_rows import (
     give_column,
     inertia_of,
     inverse_rotation_of,
+    pair_of,
     put_vector,
     return_load,
     rotation_of,
@@ -69,6 +70,7 @@ def _carry_acceleration(body: FloatArray, pair: FloatArray) -> None:
     dw = E dw_p + w x z qd + z qdd, dv = E (dv_p + dw_p x t) + v x z qd for a joint that turns; one that slides has
     dv + w x z qd + z qdd. f = m dv + dw x s + w x l, n = I dw + s x dv + w x k + v x l.
     """
+    widest_vectors()
     inverse, inertia = inverse_rotation_of(body), inertia_of(body)
     mass, moment, (tx, ty, tz) = body[MASS], vector_of(body, MOMENT), vector_of(body, TRANSLATION)
     slides = body[SLIDES]
@@ -106,6 +108,7 @@ def _joint_torque(body: FloatArray, pair: FloatArray) -> None:
 
     Force and torque, in place of l and k, are added to the parent's: l_p += R l, k_p += R (k + t x l).
     """
+    widest_vectors()
     slides, drive = body[SLIDES], body[DRIVE]
     turns = 1.0 - slides
     rotation, (tx, ty, tz) = rotation_of(body), vector_of(body, TRANSLATION)
@@ -130,10 +133,10 @@ def sweep_inverse_dynamics(
     torque: FloatArray,
 ) -> None:
     """M qdd + C qd + g of every sample: recursive Newton-Euler, gravity as an acceleration of the base."""
-    _sweep(bodies, route, position, speed, acceleration, work_space(route, DV, -gravity_vector)[0], torque)
+    _sweep(bodies, route, position, speed, acceleration, *work_space(route, DV, -gravity_vector), torque)
 
 
-@kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_TABLE}, {READ_TABLE}, {READ_TABLE}, {ROW}, {TABLE})")
+@kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_TABLE}, {READ_TABLE}, {READ_TABLE}, {ROW}, {ROW}, {TABLE})")
 def _sweep(
     bodies: FloatArray,
     route: IndexArray,
@@ -141,10 +144,11 @@ def _sweep(
     speed: FloatArray,
     acceleration: FloatArray,
     slots: FloatArray,
+    fault: FloatArray,
     torque: FloatArray,
 ) -> None:
     """As `sweep_inverse_dynamics`, with the work space, whose base has its acceleration."""
-    fault = np.empty(BLOCK)
+    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)
@@ -152,20 +156,20 @@ def _sweep(
             before, origin, column = route[i, BEFORE], route[i, COPY_OF], route[i, COLUMN]
             if origin >= 0:
                 copy_motion(slots, origin, before)
-            pair = slots[before * SLOT : (before + 2) * SLOT]
+            pair = pair_of(slots, before)
             take_column(position, column, begin, count, pair, OFFSET, fault)
             take_column(speed, column, begin, count, pair, RATE, fault)
             take_column(acceleration, column, begin, count, pair, RATE_CHANGE, fault)
             fill_sine_cosine(pair, bodies[i, SLIDES])
-            _carry_acceleration(bodies[i], pair)
+            _carry_acceleration(body_of(bodies, i), pair)
         for i in range(len(bodies) - 1, -1, -1):
             before, origin = route[i, BEFORE], route[i, COPY_OF]
-            pair = slots[before * SLOT : (before + 2) * SLOT]
-            _joint_torque(bodies[i], pair)
+            pair = pair_of(slots, before)
+            _joint_torque(body_of(bodies, i), pair)
             if origin >= 0:
                 return_load(slots, origin, before)
         for i in range(len(bodies)):
-            give_column(slots, route[i, BEFORE] + 1, TERMS, torque, route[i, COLUMN], begin, count, fault)
+            give_column(pair_of(slots, route[i, BEFORE]), TERMS, torque, route[i, COLUMN], begin, count, fault)
 
 
 @kernel(f"{MATRIX}({MATRIX}, {MATRIX})")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdtool.instructions import part_of, widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.machines.tree_angles import fill_sine_cosine
 from cdtool.machines.tree_rows import (
@@ -45,6 +46,7 @@ from cdtool.machines.tree_rows import (
     W,
     about_z,
     add,
+    body_of,
     carry_load,
     clear,
     copy_motion,
@@ -53,6 +55,7 @@ from cdtool.machines.tree_rows import (
     give_column,
     inertia_of,
     inverse_rotation_of,
+    pair_of,
     put_vector,
     return_load,
     rotation_of,
@@ -74,6 +77,7 @@ def _carry_motion(body: FloatArray, pair: FloatArray) -> None:
     w = E w_p + z qd, v = E (v_p + w_p x t), g = E g_p; l = m v + w x s, k = I w + s x v. A joint that slides adds z qd
     to v instead.
     """
+    widest_vectors()
     inverse, inertia = inverse_rotation_of(body), inertia_of(body)
     mass, moment, (tx, ty, tz) = body[MASS], vector_of(body, MOMENT), vector_of(body, TRANSLATION)
     slides = body[SLIDES]
@@ -96,6 +100,7 @@ def _carry_motion(body: FloatArray, pair: FloatArray) -> None:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _carry_twist(body: FloatArray, pair: FloatArray) -> None:
     """As `_carry_motion` without gravity and first moment: what the momentum alone needs."""
+    widest_vectors()
     inverse, inertia = inverse_rotation_of(body), inertia_of(body)
     mass, moment, (tx, ty, tz) = body[MASS], vector_of(body, MOMENT), vector_of(body, TRANSLATION)
     slides = body[SLIDES]
@@ -116,6 +121,7 @@ def _carry_twist(body: FloatArray, pair: FloatArray) -> None:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _joint_momentum(body: FloatArray, pair: FloatArray) -> None:
     """p of a joint as in `_joint_terms`, and l and k added to its parent's as in `carry_load`."""
+    widest_vectors()
     slides, drive = body[SLIDES], body[DRIVE]
     turns = 1.0 - slides
     rotation, (tx, ty, tz) = rotation_of(body), vector_of(body, TRANSLATION)
@@ -136,6 +142,7 @@ def _joint_terms(body: FloatArray, pair: FloatArray) -> None:
 
     Turning: p = z.k, C^T qd = z.(l x v + k x w), g = -z.(s x g_vec); sliding: z.l, z.(l x w), -m z.g_vec.
     """
+    widest_vectors()
     slides, drive, mass = body[SLIDES], body[DRIVE], body[MOVED_MASS]
     turns = 1.0 - slides
     for j in range(BLOCK):
@@ -196,6 +203,7 @@ def _sweep_momentum_alone(
     fault: FloatArray,
     momentum: FloatArray,
 ) -> None:
+    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)
@@ -203,17 +211,18 @@ def _sweep_momentum_alone(
             before, origin, column = route[i, BEFORE], route[i, COPY_OF], route[i, COLUMN]
             if origin >= 0:
                 copy_motion(slots, origin, before)
-            pair = slots[before * SLOT : (before + 2) * SLOT]
+            pair = pair_of(slots, before)
             take_column(position, column, begin, count, pair, OFFSET, fault)
             take_column(speed, column, begin, count, pair, RATE, fault)
             fill_sine_cosine(pair, bodies[i, SLIDES])
-            _carry_twist(bodies[i], pair)
+            _carry_twist(body_of(bodies, i), pair)
         for i in range(len(bodies) - 1, -1, -1):
             before, origin = route[i, BEFORE], route[i, COPY_OF]
-            _joint_momentum(bodies[i], slots[before * SLOT : (before + 2) * SLOT])
+            pair = pair_of(slots, before)
+            _joint_momentum(body_of(bodies, i), pair)
             if origin >= 0:
                 return_load(slots, origin, before)
-            give_column(slots, before + 1, TERMS, momentum, route[i, COLUMN], begin, count, fault)
+            give_column(pair, TERMS, momentum, route[i, COLUMN], begin, count, fault)
 
 
 @kernel(
@@ -235,6 +244,7 @@ def _sweep(
     potential: FloatArray,
 ) -> None:
     """Momentum, velocity force and gravity, or else the energies: of the results those that are not empty."""
+    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)
@@ -242,24 +252,24 @@ def _sweep(
             before, origin, column = route[i, BEFORE], route[i, COPY_OF], route[i, COLUMN]
             if origin >= 0:
                 copy_motion(slots, origin, before)
-            pair = slots[before * SLOT : (before + 2) * SLOT]
+            pair = pair_of(slots, before)
             take_column(position, column, begin, count, pair, OFFSET, fault)
             take_column(speed, column, begin, count, pair, RATE, fault)
             fill_sine_cosine(pair, bodies[i, SLIDES])
-            _carry_motion(bodies[i], pair)
+            _carry_motion(body_of(bodies, i), pair)
         for i in range(len(bodies) - 1, -1, -1):
             before, origin = route[i, BEFORE], route[i, COPY_OF]
-            pair = slots[before * SLOT : (before + 2) * SLOT]
-            _joint_terms(bodies[i], pair)
-            carry_load(bodies[i], pair)
+            pair = pair_of(slots, before)
+            _joint_terms(body_of(bodies, i), pair)
+            carry_load(body_of(bodies, i), pair)
             if origin >= 0:
                 return_load(slots, origin, before)
         if len(momentum) > 0:
             for i in range(len(bodies)):
-                own, column = route[i, BEFORE] + 1, route[i, COLUMN]
-                give_column(slots, own, TERMS, momentum, column, begin, count, fault)
-                give_column(slots, own, TERMS + BLOCK, velocity_force, column, begin, count, fault)
-                give_column(slots, own, TERMS + 2 * BLOCK, gravity, column, begin, count, fault)
+                pair, column = pair_of(slots, route[i, BEFORE]), route[i, COLUMN]
+                give_column(pair, TERMS, momentum, column, begin, count, fault)
+                give_column(pair, TERMS + BLOCK, velocity_force, column, begin, count, fault)
+                give_column(pair, TERMS + 2 * BLOCK, gravity, column, begin, count, fault)
         if len(kinetic) > 0:
             for j in range(count):
                 twice = fault[j]
@@ -291,6 +301,7 @@ def _times_transposed(r: Matrix, s: Matrix) -> Matrix:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _put_body(body: FloatArray, pair: FloatArray) -> None:
     """The joint's own body, added to what its children gave it."""
+    widest_vectors()
     moment = vector_of(body, MOMENT)
     upper, lower = vector_of(body, INERTIA), vector_of(body, INERTIA + 3)
     for j in range(BLOCK):
@@ -305,6 +316,7 @@ def _unit_momentum(body: FloatArray, pair: FloatArray) -> None:
 
     Turning: l = z x s, k = I z; sliding: l = m z, k = s x z.
     """
+    widest_vectors()
     slides, drive, mass = body[SLIDES], body[DRIVE], body[MOVED_MASS]
     turns = 1.0 - slides
     for j in range(BLOCK):
@@ -321,6 +333,7 @@ def _carry_body(body: FloatArray, pair: FloatArray) -> None:
 
     Turned about z and moved by d: s + m d, and I + 2 (s.d) E - s d' - d s' + m (d.d E - d d'); then turned by R.
     """
+    widest_vectors()
     rotation = rotation_of(body)
     mass, (tx, ty, tz) = body[MOVED_MASS], vector_of(body, TRANSLATION)
     for j in range(BLOCK):
@@ -351,6 +364,7 @@ def _carry_body(body: FloatArray, pair: FloatArray) -> None:
 @kernel(f"void({READ_ONLY}, {ROW})")
 def _carry_momentum(body: FloatArray, pair: FloatArray) -> None:
     """The momentum of one column of M, from a joint's frame into its parent's: R l, R (k + t x l)."""
+    widest_vectors()
     rotation = rotation_of(body)
     tx, ty, tz = vector_of(body, TRANSLATION)
     for j in range(BLOCK):
@@ -362,11 +376,10 @@ def _carry_momentum(body: FloatArray, pair: FloatArray) -> None:
         put_vector(pair, V + j, times(rotation, angular))
 
 
-@kernel(f"void({ROW}, int64, float64, {_MATRICES}, int64, int64, int64, int64, {ROW})")
-def _give_pair(
-    slots: FloatArray,
-    own: int,
-    slides: float,
+@kernel(f"void({ROW}, int64, {_MATRICES}, int64, int64, int64, int64, {ROW})", inline=True)
+def _give_element(
+    rows: FloatArray,
+    first: int,
     matrix: FloatArray,
     row: int,
     column: int,
@@ -374,12 +387,21 @@ def _give_pair(
     count: int,
     fault: FloatArray,
 ) -> None:
-    """M of two joints, from the momentum of the one in the frame of the other, whose slot is `own`."""
-    first = own * SLOT + (W if slides else V) + 2 * BLOCK
-    for j in range(count):
-        value = slots[first + j] + fault[j]
-        matrix[begin + j, row, column] = value
-        matrix[begin + j, column, row] = value
+    """An element of M and its mirror image, NaN where the sample has a fault."""
+    size = matrix.shape[1]
+    elements = size * size
+    samples = part_of(matrix, begin * elements, count * elements)
+    own, mirrored = row * size + column, column * size + row
+    if count == BLOCK:
+        for j in range(BLOCK):
+            value = rows[first + j] + fault[j]
+            samples[j * elements + own] = value
+            samples[j * elements + mirrored] = value
+    else:
+        for j in range(count):
+            value = rows[first + j] + fault[j]
+            samples[j * elements + own] = value
+            samples[j * elements + mirrored] = value
 
 
 @kernel(f"void({READ_TABLE}, {READ_ROUTE}, {READ_TABLE}, {ROW}, {ROW}, {TABLE}, {_MATRICES})")
@@ -392,6 +414,7 @@ def _sweep_bodies(
     diagonal: FloatArray,
     matrix: FloatArray,
 ) -> None:
+    widest_vectors()
     for begin in range(0, len(position), BLOCK):
         count = min(BLOCK, len(position) - begin)
         clear(slots, fault)
@@ -399,39 +422,40 @@ def _sweep_bodies(
             before, origin, column = route[i, BEFORE], route[i, COPY_OF], route[i, COLUMN]
             if origin >= 0:
                 copy_motion(slots, origin, before)
-            pair = slots[before * SLOT : (before + 2) * SLOT]
-            pair[SLOT + L : SLOT + TERMS] = 0.0
+            pair = pair_of(slots, before)
+            for j in range(TERMS - L):
+                pair[SLOT + L + j] = 0.0
             take_column(position, column, begin, count, pair, OFFSET, fault)
             fill_sine_cosine(pair, bodies[i, SLIDES])
         for i in range(len(bodies) - 1, -1, -1):
             before, origin = route[i, BEFORE], route[i, COPY_OF]
-            pair = slots[before * SLOT : (before + 2) * SLOT]
-            _put_body(bodies[i], pair)
-            _unit_momentum(bodies[i], pair)
+            pair = pair_of(slots, before)
+            _put_body(body_of(bodies, i), pair)
+            _unit_momentum(body_of(bodies, i), pair)
             if route[i, PARENT] >= 0:
-                _carry_body(bodies[i], pair)
+                _carry_body(body_of(bodies, i), pair)
                 if origin >= 0:
                     return_load(slots, origin, before)
-            give_column(slots, before + 1, TERMS, diagonal, route[i, COLUMN], begin, count, fault)
+            give_column(pair, TERMS, diagonal, route[i, COLUMN], begin, count, fault)
         if len(matrix) == 0:
             continue
+        elements = matrix.shape[1] * matrix.shape[2]
         for j in range(count):
-            matrix[begin + j] = fault[j]
+            own = part_of(matrix, (begin + j) * elements, elements)
+            for element in range(elements):
+                own[element] = fault[j]
         # Outward: the momentum of a column overwrites those of the columns before it.
         for i in range(len(bodies)):
             column, of = route[i, COLUMN], i
-            for j in range(count):
-                matrix[begin + j, column, column] = diagonal[begin + j, column]
+            pair = pair_of(slots, route[i, BEFORE])
+            _give_element(pair, SLOT + TERMS, matrix, column, column, begin, count, fault)
             while route[of, PARENT] >= 0:
                 before, origin, parent = route[of, BEFORE], route[of, COPY_OF], route[of, PARENT]
-                _carry_momentum(bodies[of], slots[before * SLOT : (before + 2) * SLOT])
-                own = before
+                pair = pair_of(slots, before)
+                _carry_momentum(body_of(bodies, of), pair)
                 if origin >= 0:
-                    own = origin
-                    slots[own * SLOT + W : own * SLOT + W + 6 * BLOCK] = slots[
-                        before * SLOT + W : before * SLOT + W + 6 * BLOCK
-                    ]
-                _give_pair(
-                    slots, own, bodies[parent, SLIDES], matrix, route[parent, COLUMN], column, begin, count, fault
-                )
+                    for j in range(6 * BLOCK):
+                        slots[origin * SLOT + W + j] = pair[W + j]
+                first = (W if bodies[parent, SLIDES] else V) + 2 * BLOCK
+                _give_element(pair, first, matrix, route[parent, COLUMN], column, begin, count, fault)
                 of = parent
