@@ -115,8 +115,13 @@ class Machine(Protocol):
         """
         ...
 
-    def force_balance(self, torque: FloatArray, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """Return tau - C v - g - friction: the part that accelerates the joints or acts on an obstacle."""
+    def force_balance(
+        self, torque: FloatArray, position: FloatArray, speed: FloatArray, acceleration: FloatArray | None = None
+    ) -> FloatArray:
+        """Return tau - C v - g - friction: the part that accelerates the joints or acts on an obstacle.
+
+        With an acceleration, M a is subtracted too.
+        """
         ...
 
     def drive_power(self, torque: FloatArray, speed: FloatArray) -> FloatArray:

@@ -106,7 +106,7 @@ class DesiredDynamics:
         pose, speed, acceleration = (
             hold_last(item, ~np.isfinite(item)) for item in (reference.values, speed, acceleration)
         )
-        balance = machine.force_balance(torque, pose, speed) - machine.inertia_times(pose, acceleration)
+        balance = machine.force_balance(torque, pose, speed, acceleration)
         cutoff = per_joint(self.cutoff, len(machine.joints))
         # A torque that is missing after it was present interrupts the low-pass, like a missing reference.
         waits = motion_missing | missing_after_first(torque_missing)

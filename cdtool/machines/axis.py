@@ -58,9 +58,12 @@ class Axis(JointMachine):
         """Return (F - friction, p = m w), both (n, J); viscous friction acts on the velocity w, like the momentum."""
         return self.minus_friction(torque.copy(), speed, velocity), self.nominal_inertia * velocity
 
-    def force_balance(self, torque: FloatArray, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """Return F - friction (n, J): what is left to accelerate or to collide."""
-        return self.minus_friction(torque.copy(), speed, speed)
+    def force_balance(
+        self, torque: FloatArray, position: FloatArray, speed: FloatArray, acceleration: FloatArray | None = None
+    ) -> FloatArray:
+        """Return F - friction (n, J): what is left to accelerate or to collide; with an acceleration, to collide."""
+        force = self.minus_friction(torque.copy(), speed, speed)
+        return force if acceleration is None else force - self.inertia_times(position, acceleration)
 
     def required_torque(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Return m a + friction (n, J): the drive force of this motion without contact."""

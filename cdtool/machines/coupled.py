@@ -103,10 +103,24 @@ class CoupledMachine(JointMachine, ABC):
         velocity_force += torque
         return self.minus_friction(velocity_force, speed, velocity), momentum
 
-    def force_balance(self, torque: FloatArray, position: FloatArray, speed: FloatArray) -> FloatArray:
-        """Return tau - C v - g - friction (n, J)."""
+    def force_balance(
+        self, torque: FloatArray, position: FloatArray, speed: FloatArray, acceleration: FloatArray | None = None
+    ) -> FloatArray:
+        """Return tau - C v - g - friction (n, J), with an acceleration also without M a."""
+        return self._balance(torque, position, speed, speed, acceleration)
+
+    def _balance(
+        self,
+        torque: FloatArray,
+        position: FloatArray,
+        speed: FloatArray,
+        velocity: FloatArray,
+        acceleration: FloatArray | None,
+    ) -> FloatArray:
+        """As `force_balance`; viscous friction acts on `velocity`."""
         rest = torque - self.inverse_dynamics(position, speed, np.zeros_like(speed))
-        return self.minus_friction(rest, speed, speed)
+        force = self.minus_friction(rest, speed, velocity)
+        return force if acceleration is None else force - self.inertia_times(position, acceleration)
 
     def required_torque(self, position: FloatArray, speed: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Return M a + C v + g + friction (n, J)."""
@@ -127,9 +141,8 @@ class CoupledMachine(JointMachine, ABC):
     ) -> list[JointEquation]:
         """M_jj a_j = tau_j - (C v + g)_j - sum over the others M_ji a_i - d v_j: the other joints are measured."""
         own = np.zeros_like(speed)
-        force = self.minus_friction(torque - self.inverse_dynamics(position, speed, own), speed, own)
         diagonal = self.inertia_diagonal(position)
-        known = force - self.inertia_times(position, acceleration) + diagonal * acceleration
+        known = self._balance(torque, position, speed, own, acceleration) + diagonal * acceleration
         rows = zip(np.ascontiguousarray(diagonal.T), np.ascontiguousarray(known.T), strict=True)
         return [
             JointEquation(inertia, own, self.viscous_friction[j] / self.transmission_ratio[j] ** 2)

@@ -70,6 +70,24 @@ class UrdfRobot(CoupledMachine):
         """M a + C v + g (n, J)."""
         return self.tree.inverse_dynamics(position, speed, acceleration)
 
+    def _balance(
+        self,
+        torque: FloatArray,
+        position: FloatArray,
+        speed: FloatArray,
+        velocity: FloatArray,
+        acceleration: FloatArray | None,
+    ) -> FloatArray:
+        """As of every coupled machine; M a + C v + g is one sweep where no friction depends on the force.
+
+        Dry friction without a slope does: it balances the force of a resting joint.
+        """
+        sticks = any(own and not slope for own, slope in zip(self.coulomb_friction, self.coulomb_slope, strict=True))
+        if acceleration is None or sticks:
+            return super()._balance(torque, position, speed, velocity, acceleration)
+        rest = torque - self.inverse_dynamics(position, speed, acceleration)
+        return self.minus_friction(rest, speed, velocity)
+
     def inertia_times(self, position: FloatArray, vector: FloatArray) -> FloatArray:
         """M x (n, J)."""
         return self.tree.inertia_times(position, vector)

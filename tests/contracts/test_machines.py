@@ -105,6 +105,20 @@ def test_what_an_arms_sensors_feel_becomes_an_acceleration_causally(arm):
         np.testing.assert_array_equal(part.values, whole["acceleration"].values[: len(part)])
 
 
+@pytest.mark.parametrize("slope", [50.0, 0.0], ids=["smooth friction", "friction that sticks"])
+def test_the_balance_with_an_acceleration_is_the_balance_without_m_a(machine, slope):
+    joints = len(machine.joints)
+    machine = replace(machine, coulomb_friction=(0.02,) * joints, coulomb_slope=(slope,) * joints)
+    recording = moving_recording(machine, seconds=1.0)
+    position, acceleration = recording["position"].values, recording["acceleration"].values
+    # Slow samples stick where the torque is that of the motion.
+    for speed in (recording["speed"].values, np.zeros_like(position)):
+        torque = machine.required_torque(position, speed, acceleration)
+        apart = machine.force_balance(torque, position, speed) - machine.inertia_times(position, acceleration)
+        together = machine.force_balance(torque, position, speed, acceleration)
+        np.testing.assert_allclose(together, apart, rtol=0.0, atol=1e-13 * np.abs(torque).max())
+
+
 def test_momentum_force_energy_and_inertia_are_of_one_machine(machine):
     recording = moving_recording(machine, seconds=3.0)
     position, speed = recording["position"].values, recording["speed"].values
