@@ -1,19 +1,30 @@
 """Processor instructions for kernels that numba does not provide.
 
-`prefetch`, `store`, `load`, two on bits, `add_products` on several numbers at once, `part_of` an array, and
-`widest_vectors`.
+`prefetch`, `store`, `load`, two on bits, three on rows of numbers, `part_of` an array, and `widest_vectors`.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from cdtool.kernels import Kernel
 
-# `add_products` handles so many numbers at once, and those of the next product are so many elements further.
-LANES, STRIDE = 16, 32
+# `add_products`, `add_rows` and `set_rows` handle so many numbers at once: a row.
+LANES = 16
+
+
+def aligned_zeros(count: int) -> npt.NDArray[np.float64]:
+    """Return zeros (count,) that begin with a cache line of the processor, so that a row is in as few as possible."""
+    line = 64
+    spare = np.zeros(count + line // 8)
+    begin = -spare.ctypes.data % line // 8
+    return spare[begin : begin + count]
 
 
 class _Instruction(Kernel):
@@ -161,45 +172,84 @@ def _emit_trailing_zeros() -> Callable[..., Any]:
 
 
 def _add_products(sums: Any, at: Any, first: Any, first_at: Any, second: Any, second_at: Any, count: Any) -> None:
-    """Add products to 16 numbers of the array `sums` from index `at` on: those of `first` and `second`, `count` times.
+    """Add products to a row of the array `sums` from index `at` on: those of rows of `first` and `second`, one by one.
 
-    They begin at `first_at` and `second_at`, and each time 32 elements further. All must be in the arrays, of float64.
-    A loop over few numbers takes longer to find that arrays do not overlap than to compute.
+    `count` rows of both, one after the other, begin at `first_at` and `second_at`. All must be in the arrays, of
+    float64. A loop over few numbers takes longer to find that arrays do not overlap than to compute.
     """
 
 
-def _emit_add_products() -> Callable[..., Any]:
+def _add_rows(sums: Any, at: Any, rows: Any, first: Any, factors: Any, factors_at: Any, count: Any) -> None:
+    """Add `count` rows of `rows`, which begin at index `first`, each multiplied by the same row of `factors`.
+
+    They are added to the rows of `sums` that begin at `at`. All must be in the arrays, of float64.
+    """
+
+
+def _set_rows(results: Any, at: Any, rows: Any, first: Any, factors: Any, factors_at: Any, count: Any) -> None:
+    """As `add_rows`, but the products replace what was in `results`, which may be `rows` itself."""
+
+
+def _emit_on_rows(lines_of: Callable[..., None]) -> Callable[..., Any]:
+    """Return an instruction on rows of three arrays, each with an index, and a count of rows.
+
+    `lines_of(builder, count, row_of)` writes it; `row_of(which, number)` is the address of a row of an array.
+    """
     from llvmlite import ir
     from numba import types
-    from numba.core import cgutils
     from numba.extending import intrinsic
 
-    build: Any = cgutils
     vector = ir.VectorType(ir.DoubleType(), LANES)
 
-    def emit(_: Any, sums: Any, at: Any, first: Any, first_at: Any, second: Any, second_at: Any, count: Any) -> Any:
+    def emit(_: Any, first: Any, first_at: Any, second: Any, second_at: Any, third: Any, third_at: Any, n: Any) -> Any:
         def lines(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            def place(number: int) -> Any:
-                array = context.make_array(signature.args[number])(context, builder, arguments[number])
-                return builder.gep(array.data, [arguments[number + 1]])
+            def row_of(which: int, number: Any = None) -> Any:
+                array = context.make_array(signature.args[2 * which])(context, builder, arguments[2 * which])
+                at = arguments[2 * which + 1]
+                if number is not None:
+                    at = builder.add(at, builder.mul(number, ir.Constant(number.type, LANES)))
+                return builder.bitcast(builder.gep(array.data, [at]), vector.as_pointer())
 
-            total, (a, b) = builder.bitcast(place(0), vector.as_pointer()), (place(2), place(4))
-            kept = build.alloca_once_value(builder, builder.load(total, align=8))
-            with build.for_range(builder, arguments[6]) as loop:
-                step = [builder.mul(loop.index, ir.Constant(loop.index.type, STRIDE))]
-                one, other = (
-                    builder.load(builder.bitcast(builder.gep(item, step), vector.as_pointer()), align=8)
-                    for item in (a, b)
-                )
-                product = builder.fmul(one, other, flags=("contract",))
-                builder.store(builder.fadd(builder.load(kept), product, flags=("contract",)), kept)
-            builder.store(builder.load(kept), total, align=8)
+            lines_of(builder, arguments[6], row_of)
             return context.get_dummy_value()
 
-        return types.void(sums, at, first, first_at, second, second_at, count), lines
+        return types.void(first, first_at, second, second_at, third, third_at, n), lines
 
     made: Callable[..., Any] = intrinsic(emit)
     return made
+
+
+def _emit_add_products() -> Callable[..., Any]:
+    from numba.core import cgutils
+
+    build: Any = cgutils
+
+    def lines(builder: Any, count: Any, row_of: Any) -> None:
+        kept = build.alloca_once_value(builder, builder.load(row_of(0), align=8))
+        with build.for_range(builder, count) as loop:
+            one, other = (builder.load(row_of(which, loop.index), align=8) for which in (1, 2))
+            product = builder.fmul(one, other, flags=("contract",))
+            builder.store(builder.fadd(builder.load(kept), product, flags=("contract",)), kept)
+        builder.store(builder.load(kept), row_of(0), align=8)
+
+    return _emit_on_rows(lines)
+
+
+def _emit_rows(adds: bool) -> Callable[..., Any]:
+    from numba.core import cgutils
+
+    build: Any = cgutils
+
+    def lines(builder: Any, count: Any, row_of: Any) -> None:
+        factors = builder.load(row_of(2), align=8)
+        with build.for_range(builder, count) as loop:
+            result = builder.fmul(builder.load(row_of(1, loop.index), align=8), factors, flags=("contract",))
+            place = row_of(0, loop.index)
+            if adds:
+                result = builder.fadd(builder.load(place, align=8), result, flags=("contract",))
+            builder.store(result, place, align=8)
+
+    return _emit_on_rows(lines)
 
 
 def _part_of(data: Any, at: Any, size: Any) -> Any:
@@ -261,5 +311,7 @@ load = _Instruction(_load, _emit_load)
 equal_bytes = _Instruction(_equal_bytes, _emit_equal_bytes)
 trailing_zeros = _Instruction(_trailing_zeros, _emit_trailing_zeros)
 add_products = _Instruction(_add_products, _emit_add_products)
+add_rows = _Instruction(_add_rows, partial(_emit_rows, True))
+set_rows = _Instruction(_set_rows, partial(_emit_rows, False))
 part_of = _Instruction(_part_of, _emit_part_of)
 widest_vectors = _Instruction(_widest_vectors, _emit_widest_vectors)

@@ -12,12 +12,14 @@ from hypothesis import strategies as st
 
 from cdtool.instructions import (
     LANES,
-    STRIDE,
     add_products,
+    add_rows,
+    aligned_zeros,
     equal_bytes,
     load,
     part_of,
     prefetch,
+    set_rows,
     store,
     trailing_zeros,
     widest_vectors,
@@ -116,10 +118,10 @@ def add_to(sums, at, first, first_at, second, second_at, count):
 @given(st.integers(0, 5), st.integers(0, 40), st.integers(0, 40), st.integers(0, 40))
 def test_products_are_added_to_their_own_numbers_only(count, at, first_at, second_at):
     rng = np.random.default_rng(count)
-    sums, first, second = rng.normal(size=(3, 6 * STRIDE + 40))
+    sums, first, second = rng.normal(size=(3, 6 * LANES + 40))
     expected = sums.copy()
     for number in range(count):
-        a, b = (item[start + number * STRIDE :][:LANES] for item, start in ((first, first_at), (second, second_at)))
+        a, b = (item[start + number * LANES :][:LANES] for item, start in ((first, first_at), (second, second_at)))
         expected[at : at + LANES] += a * b
     before = sums.copy()
     add_to(sums, at, first, first_at, second, second_at, count)
@@ -127,6 +129,42 @@ def test_products_are_added_to_their_own_numbers_only(count, at, first_at, secon
     beside = np.ones(len(sums), dtype=bool)
     beside[at : at + LANES] = False
     np.testing.assert_array_equal(sums[beside], before[beside])
+
+
+@kernel("void(float64[::1], int64, float64[::1], int64, float64[::1], int64, int64)")
+def add_rows_to(sums, at, rows, first, factors, factors_at, count):
+    add_rows(sums, at, rows, first, factors, factors_at, count)
+
+
+@kernel("void(float64[::1], int64, float64[::1], int64, float64[::1], int64, int64)")
+def set_rows_of(results, at, rows, first, factors, factors_at, count):
+    set_rows(results, at, rows, first, factors, factors_at, count)
+
+
+@given(st.integers(0, 5), st.integers(0, 40), st.integers(0, 40), st.integers(0, 40))
+def test_rows_are_added_or_set_and_what_is_beside_them_is_not_touched(count, at, first, factors_at):
+    rng = np.random.default_rng(count)
+    sums, rows, factors = rng.normal(size=(3, 6 * LANES + 40))
+    results, before, size = sums.copy(), sums.copy(), count * LANES
+    products = rows[first : first + size] * np.tile(factors[factors_at : factors_at + LANES], count)
+    add_rows_to(sums, at, rows, first, factors, factors_at, count)
+    set_rows_of(results, at, rows, first, factors, factors_at, count)
+    np.testing.assert_allclose(sums[at : at + size], before[at : at + size] + products, rtol=0.0, atol=1e-14)
+    np.testing.assert_array_equal(results[at : at + size], products)
+    for found in (sums, results):
+        np.testing.assert_array_equal(np.delete(found, slice(at, at + size)), np.delete(before, slice(at, at + size)))
+
+
+def test_rows_can_be_set_in_their_own_place():
+    rows, half = np.arange(3.0 * LANES), np.full(LANES, 0.5)
+    set_rows_of(rows, 0, rows, 0, half, 0, 3)
+    assert rows.tolist() == [0.5 * number for number in range(3 * LANES)]
+
+
+def test_zeros_can_be_aligned_to_cache_lines():
+    for count in (1, 100, 4608):
+        zeros = aligned_zeros(count)
+        assert zeros.shape == (count,) and not zeros.any() and zeros.ctypes.data % 64 == 0
 
 
 @kernel("int64(float64[:, ::1], int64, int64)")

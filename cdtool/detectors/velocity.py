@@ -22,7 +22,7 @@ from cdtool.detectors.base import (
 )
 from cdtool.detectors.look import SKY, Look
 from cdtool.dynamics import Gain, Machine
-from cdtool.instructions import LANES, STRIDE, add_products
+from cdtool.instructions import LANES, add_products, add_rows, aligned_zeros, part_of, set_rows, widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 
@@ -33,26 +33,25 @@ _MATRICES = "Array(float64, 3, 'C', readonly=True)"
 _INDICES = "Array(int64, 1, 'C', readonly=True)"
 # A matrix (J, J) of every sample of a block is a table (J J BLOCK,): element by element, the sample innermost, so that
 # one instruction handles several samples. No result depends on the other samples of its block.
-BLOCK = STRIDE
-# Number of tables of work space for `fill_relaxations`.
-WORK_TABLES = 3
+BLOCK = LANES
+# Number of tables of work space for `fill_relaxations`, and of its rows: so many more than joints.
+WORK_TABLES, WORK_ROWS = 2, 6
 # Number of steps whose inertia matrices are computed together: they fit into the processor's cache.
-_STEPS = 64 * BLOCK
+_STEPS = 128 * BLOCK
 # Tables (J J BLOCK,): S of each step, what relaxes, and work space.
 _SCALED, _RELAXED, _WORK = 0, 1, 2
-# Rows (J,) of a step: the residual over sqrt(K), which lasts from block to block; what relaxes of it; its change.
-_VALUE, _TARGET, _CHANGE, _ROWS = range(4)
+# Rows (J,) of a step: the residual over sqrt(K), which lasts from block to block, and the next one; in long steps what
+# relaxes, and its change.
+_TARGET, _CHANGE, _ROWS = 2, 3, 4
 
 # Up to this norm of X, the first term left out of the series is below the last bit; X is halved until it is.
-_SERIES_NORM = 0.05
+_SERIES_NORM = 0.08
 # X of more halvings is left to its modes: the error of the inverse, a share of the fastest one, would be doubled too.
-_MOST_HALVINGS = 5
-# exp(A) to the eighth power of A by three products (Bader, Blanes and Casas, Mathematics 7:1174, 2019):
-# I + A + Y2 A^2 + (X3 A^2 + A4) (X4 I + X5 A + X6 A^2 + X7 A4) with A4 = A^2 (X1 A + X2 A^2).
-_ROOT = math.sqrt(177.0)
-_X1, _X2, _X3 = (1.0 + _ROOT) / 132.0, (1.0 + _ROOT) / 528.0, 2.0 / 3.0
-_X4, _X5 = (29.0 * _ROOT - 271.0) / 210.0, 11.0 * (_ROOT - 1.0) / 840.0
-_X6, _X7, _Y2 = 11.0 * (_ROOT - 9.0) / 3360.0, (89.0 - _ROOT) / 2240.0, (857.0 - 58.0 * _ROOT) / 630.0
+_MOST_HALVINGS = 4
+# 1 / (1 - exp(-x)) = 1 / x + 1 / 2 + x / 40 + (7 / 120) / (1 / x + x / 42), to the seventh power of x.
+_OUTER, _FRACTION, _INNER = 1.0 / 40.0, 7.0 / 120.0, 1.0 / 42.0
+# Rows of work space of `fill_relaxations`: halvings; 1 / f, -f / 42 and -f / 40 with f = T / 2^h; for the inverse.
+_HALVINGS, _INVERSE, _INNER_SHARE, _OUTER_SHARE, _LEFT = range(0, 5 * BLOCK, BLOCK)
 # Jacobi rotations converge quadratically: few sweeps are ever needed.
 _MOST_SWEEPS, _OFF_DIAGONAL = 60, 1e-36
 
@@ -162,25 +161,29 @@ def observe_velocity(
     joints, root = len(gains), np.sqrt(gains)
     residual, status = np.zeros(balance.shape), np.full(balance.shape, Status.GAP, dtype=np.uint8)
     known = np.flatnonzero(~motion_missing)
-    tables = np.zeros((_WORK + WORK_TABLES, joints * joints * BLOCK))
-    # Duration and forces of each step, work space; matrix and vectors of the modes of one step.
-    work = np.zeros(BLOCK), np.zeros(joints * BLOCK), np.zeros(2 * joints * BLOCK), np.zeros((2, joints, joints))
-    rows, settled = np.zeros((_ROWS, joints)), np.zeros(1)
+    count = joints * joints * BLOCK
+    tables = aligned_zeros((_WORK + WORK_TABLES) * count).reshape(-1, count)
+    # Duration, change of speed and forces of each step, work space; matrix and vectors of the modes of one step.
+    sizes = BLOCK, joints * BLOCK, joints * BLOCK, (joints + WORK_ROWS) * BLOCK
+    work = *map(aligned_zeros, sizes), np.zeros((4, BLOCK), dtype=np.int64), np.zeros((2, joints, joints))
+    rows, settled = np.zeros(_ROWS * joints), np.zeros(1)
+    scales = aligned_zeros(count + joints * BLOCK)
+    scales[:] = np.repeat(np.append(1.0 / np.outer(root, root), 1.0 / root), BLOCK)
     for begin in range(0, len(known), _STEPS):
         end = min(begin + _STEPS, len(known))
         # From the sample before, where the first step of this part begins.
         first = int(known[max(begin - 1, 0)])
         part = np.ascontiguousarray(inertia(slice(first, int(known[end - 1]) + 1)))
         samples = (time, balance, speed, missing, known, begin, end, part, first)
-        _observe(*samples, root, tables, *work, rows, settled, residual, status)
+        _observe(*samples, root, scales, tables, *work, rows, settled, residual, status)
     if len(known):
         residual[known[-1] + 1 :] = residual[known[-1]]
     return residual, status
 
 
 @kernel(
-    f"void({READ_ONLY}, {_TABLE}, {_TABLE}, {_INDICES}, int64, int64, {_MATRICES}, int64, {READ_ONLY}, {ROW}, {ROW}, "
-    f"{ROW})"
+    f"void({READ_ONLY}, {_TABLE}, {_TABLE}, {_INDICES}, int64, int64, {_MATRICES}, int64, int64, {ROW}, {ROW}, "
+    f"{ROW}, {ROW}, {ROW}, {ROW}, int64[:, ::1])"
 )
 def _fill_steps(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
@@ -191,53 +194,66 @@ def _fill_steps(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     end: int,
     inertia: FloatArray,
     first: int,
-    root: FloatArray,
+    joints: int,
+    scales: FloatArray,
     scaled: FloatArray,
     elapsed: FloatArray,
+    change: FloatArray,
     forces: FloatArray,
+    rows: FloatArray,
+    ends: npt.NDArray[np.int64],
 ) -> None:
-    """Fill S, duration and (mean balance - M dv / T) / sqrt(K) of the steps that end at `known` from `begin` on."""
-    joints = len(root)
+    """Fill S, duration and (mean balance - M dv / T) / sqrt(K) of the steps that end at `known` from `begin` on.
+
+    Over a gap the balance is based on held values: it is interpolated by a straight line. Beyond the steps of this
+    block, S is that of a sample. `scales` (J J + J,): rows 1 / sqrt(K K') and 1 / sqrt(K). `ends` (4, BLOCK), where
+    the samples of a step begin, `rows` (1,) and `change` (J,) are overwritten.
+    """
+    widest_vectors()
+    elements = joints * joints
     for lane in range(BLOCK):
-        number = begin + lane
+        number = min(begin + lane, end - 1)
+        k, last = known[number], known[max(number - 1, 0)]
+        ends[0, lane], ends[1, lane] = k * joints, last * joints
+        ends[2, lane], ends[3, lane] = (k - first) * elements, (last - first) * elements
         elapsed[lane] = 0.0
-        for i in range(joints):
-            forces[i * BLOCK + lane] = 0.0
-        if not 0 < number < end:
-            # Beyond the steps of this block: any matrix that has an inverse.
-            for i in range(joints):
-                for j in range(i + 1):
-                    scaled[(i * joints + j) * BLOCK + lane] = 1.0 if i == j else 0.0
-            continue
-        k, last = known[number], known[number - 1]
         for at in range(last + 1, k + 1):
-            step = time[at] - time[at - 1]
-            elapsed[lane] += step
-            for i in range(joints):
-                forces[i * BLOCK + lane] += 0.5 * (balance[at, i] + balance[at - 1, i]) * step
-        if k > last + 1:
-            # Over a gap the balance is based on held values: it is interpolated by a straight line.
-            for i in range(joints):
-                forces[i * BLOCK + lane] = 0.5 * (balance[k, i] + balance[last, i]) * elapsed[lane]
-        now, before = inertia[k - first], inertia[last - first]
-        for i in range(joints):
-            force, scale = forces[i * BLOCK + lane], 1.0 / root[i]
-            for j in range(joints):
-                mean = 0.5 * (now[i, j] + before[i, j])
-                force -= mean * (speed[k, j] - speed[last, j])
-                if j <= i:
-                    scaled[(i * joints + j) * BLOCK + lane] = mean * scale / root[j]
-            forces[i * BLOCK + lane] = force * scale / elapsed[lane]
+            elapsed[lane] += time[at] - time[at - 1]
+        rows[lane] = 1.0 / elapsed[lane]
+    # Parts of one element: no index is checked.
+    for i in range(joints):
+        for lane in range(BLOCK):
+            now, before = ends[0, lane] + i, ends[1, lane] + i
+            forces[i * BLOCK + lane] = 0.5 * (part_of(balance, now, 1)[0] + part_of(balance, before, 1)[0])
+            change[i * BLOCK + lane] = part_of(speed, before, 1)[0] - part_of(speed, now, 1)[0]
+        for j in range(i + 1):
+            element = i * joints + j
+            for lane in range(BLOCK):
+                now, before = ends[2, lane] + element, ends[3, lane] + element
+                scaled[element * BLOCK + lane] = 0.5 * (part_of(inertia, now, 1)[0] + part_of(inertia, before, 1)[0])
+    set_rows(change, 0, change, 0, rows, 0, joints)
+    for i in range(joints):
+        # M dv / T, from the lower triangle of M.
+        add_products(forces, i * BLOCK, scaled, i * joints * BLOCK, change, 0, i + 1)
+        for j in range(i):
+            add_products(forces, j * BLOCK, scaled, (i * joints + j) * BLOCK, change, i * BLOCK, 1)
+    for i in range(joints):
+        set_rows(forces, i * BLOCK, forces, i * BLOCK, scales, (elements + i) * BLOCK, 1)
+        for j in range(i + 1):
+            element = (i * joints + j) * BLOCK
+            set_rows(scaled, element, scaled, element, scales, element, 1)
 
 
-@kernel(f"float64({_MATRICES}, int64, int64, {READ_ONLY}, float64[:, :, ::1])")
-def _find_step_modes(inertia: FloatArray, begin: int, end: int, root: FloatArray, modes: FloatArray) -> float:
-    """Fill time constants and vectors of the modes of S of a step between two samples; return the slowest constant."""
+@kernel(f"float64({_MATRICES}, int64, int64, {READ_ONLY}, float64[:, :, ::1], b1)")
+def _find_step_modes(
+    inertia: FloatArray, begin: int, end: int, root: FloatArray, modes: FloatArray, with_vectors: bool
+) -> float:
+    """Fill time constants of the modes of S of a step between two samples, and their vectors; return the slowest."""
     joints = len(root)
     for i in range(joints):
         for j in range(joints):
             modes[0, i, j] = 0.5 * (inertia[end, i, j] + inertia[begin, i, j]) / (root[i] * root[j])
-    find_modes(modes[0], modes[1])
+    find_modes(modes[0], modes[1] if with_vectors else modes[1, :0])
     slowest = modes[0, 0, 0]
     for i in range(1, joints):
         slowest = max(slowest, modes[0, i, i])
@@ -246,7 +262,8 @@ def _find_step_modes(inertia: FloatArray, begin: int, end: int, root: FloatArray
 
 @kernel(
     f"void({READ_ONLY}, {_TABLE}, {_TABLE}, {_BOOLS}, {_INDICES}, int64, int64, {_MATRICES}, int64, {READ_ONLY}, "
-    f"{TABLE}, {ROW}, {ROW}, {ROW}, float64[:, :, ::1], {TABLE}, {ROW}, {TABLE}, uint8[:, ::1])"
+    f"{ROW}, {TABLE}, {ROW}, {ROW}, {ROW}, {ROW}, int64[:, ::1], float64[:, :, ::1], {ROW}, {ROW}, {TABLE}, "
+    "uint8[:, ::1])"
 )
 def _observe(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
@@ -259,10 +276,13 @@ def _observe(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     inertia: FloatArray,
     first: int,
     root: FloatArray,
+    scales: FloatArray,
     tables: FloatArray,
     elapsed: FloatArray,
+    change_of_speed: FloatArray,
     forces: FloatArray,
     lane_rows: FloatArray,
+    ends: npt.NDArray[np.int64],
     modes: FloatArray,
     rows: FloatArray,
     settled: FloatArray,
@@ -274,168 +294,179 @@ def _observe(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     `inertia` is that of the samples from `first` on; `settled` (1,) counts time constants since the start. `status` is
     GAP where nothing is set.
     """
-    joints = len(root)
-    value, target, change, relaxed = rows[_VALUE], rows[_TARGET], rows[_CHANGE], tables[_RELAXED]
-    for number in range(begin, end):
-        lane = (number - begin) % BLOCK
-        if lane == 0:
-            _fill_steps(
-                time, balance, speed, known, number, end, inertia, first, root, tables[_SCALED], elapsed, forces
-            )
-            fill_relaxations(tables[_SCALED], elapsed, tables[_WORK:], lane_rows, relaxed, joints)
-        k = known[number]
-        if number > 0:
-            last, duration = known[number - 1], elapsed[lane]
-            for at in range(last + 1, k):
-                for i in range(joints):
-                    residual[at, i] = root[i] * value[i]
-            # The modes are found only where they count: while the residual settles, and in long steps.
-            slowest, is_long = 0.0, lane_rows[lane] < 0.0
-            if settled[0] < 3.0 or duration > BRIDGED or is_long:
-                slowest = _find_step_modes(inertia, last - first, k - first, root, modes)
-            if duration > max(3.0 * slowest, BRIDGED):
-                for i in range(joints):
-                    value[i] = 0.0
-                settled[0] = 0.0
-            else:
+    joints, turn = len(root), 0
+    relaxed, gained = tables[_RELAXED], tables[_WORK]
+    target, change = part_of(rows, _TARGET * joints, joints), part_of(rows, _CHANGE * joints, joints)
+    for block in range(begin, end, BLOCK):
+        _fill_steps(
+            *(time, balance, speed, known, block, end, inertia, first, joints, scales),
+            *(tables[_SCALED], elapsed, change_of_speed, forces, lane_rows, ends),
+        )
+        fill_relaxations(tables[_SCALED], elapsed, tables[_WORK:], lane_rows, relaxed, joints)
+        _fill_gains(relaxed, forces, gained, joints)
+        for lane in range(min(BLOCK, end - block)):
+            number = block + lane
+            k = known[number]
+            # What was and what follows: each in the place of the other at the next sample.
+            value, later = part_of(rows, turn, joints), part_of(rows, joints - turn, joints)
+            own, own_status = part_of(residual, k * joints, joints), part_of(status, k * joints, joints)
+            relaxes, duration, slowest, is_long = False, 0.0, 0.0, False
+            if number > 0:
+                last, duration = known[number - 1], elapsed[lane]
+                for at in range(last + 1, k):
+                    for i in range(joints):
+                        residual[at, i] = root[i] * value[i]
+                # The modes are found only where they count: while the residual settles, and in long steps.
+                is_long = lane_rows[lane] < 0.0
+                if settled[0] < 3.0 or duration > BRIDGED or is_long:
+                    slowest = _find_step_modes(inertia, last - first, k - first, root, modes, is_long)
+                relaxes = not duration > max(3.0 * slowest, BRIDGED)
+                if not relaxes:
+                    settled[0] = 0.0
+                    for i in range(joints):
+                        value[i] = 0.0
+                elif settled[0] < 3.0:
+                    settled[0] += duration / slowest
+            verdict = Status.GAP if missing[k] else Status.START_UP if settled[0] < 3.0 else Status.VALID
+            if relaxes and is_long:
                 for i in range(joints):
                     target[i] = forces[i * BLOCK + lane] - value[i]
-                if is_long:
-                    relax_by_modes(modes[0], modes[1], duration, target, change)
-                else:
-                    for i in range(joints):
-                        share = 0.0
-                        for j in range(joints):
-                            share += relaxed[(i * joints + j) * BLOCK + lane] * target[j]
-                        change[i] = share
+                relax_by_modes(modes[0], modes[1], duration, target, change)
                 for i in range(joints):
                     value[i] += change[i]
-                if settled[0] < 3.0:
-                    settled[0] += duration / slowest
-        verdict = Status.GAP if missing[k] else Status.START_UP if settled[0] < 3.0 else Status.VALID
-        for i in range(joints):
-            residual[k, i] = root[i] * value[i]
-            status[k, i] = verdict
+            if relaxes and not is_long:
+                # One loop over another: the compiler would handle several joints of a short loop at once, for longer.
+                for i in range(joints):
+                    share = gained[i * BLOCK + lane]
+                    row = part_of(relaxed, i * joints * BLOCK + lane, (joints - 1) * BLOCK + 1)
+                    for j in range(joints):
+                        share -= row[j * BLOCK] * value[j]
+                    later[i] = value[i] + share
+                    own[i] = root[i] * later[i]
+                    own_status[i] = verdict
+                turn = joints - turn
+            else:
+                for i in range(joints):
+                    own[i] = root[i] * value[i]
+                    own_status[i] = verdict
+    for i in range(joints):
+        rows[i] = rows[turn + i]
 
 
-@kernel(f"void({ROW}, {ROW}, int64)")
-def _invert(matrix: FloatArray, work: FloatArray, size: int) -> None:  # noqa: C901  a kernel: loops over a table
+@kernel(f"void({ROW}, {ROW}, {ROW}, int64)")
+def _fill_gains(relaxed: FloatArray, forces: FloatArray, gained: FloatArray, size: int) -> None:
+    """Fill `gained` (J,) with E times the forces, of every sample."""
+    for k in range(size * BLOCK):
+        gained[k] = 0.0
+    for i in range(size):
+        add_products(gained, i * BLOCK, relaxed, i * size * BLOCK, forces, 0, size)
+
+
+@kernel(f"void({ROW}, {ROW}, int64, int64)")
+def _invert(matrix: FloatArray, rows: FloatArray, left: int, size: int) -> None:
     """Replace the lower triangle of every matrix by that of its negative inverse: the sweep operator, pivot by pivot.
 
-    Of a positive definite matrix no pivot is 0. Of `work`, 2 J rows are overwritten.
+    Of a positive definite matrix no pivot is 0. The J + 1 rows of `rows` from index `left` on are overwritten.
     """
+    widest_vectors()
+    minus = left + size * BLOCK
+    for k in range(BLOCK):
+        rows[minus + k] = -1.0
     for p in range(size):
-        pivot = matrix[(p * size + p) * BLOCK : (p * size + p + 1) * BLOCK]
+        row, pivot = p * size * BLOCK, (p * size + p) * BLOCK
         for k in range(BLOCK):
-            pivot[k] = 1.0 / pivot[k]
+            matrix[pivot + k] = 1.0 / matrix[pivot + k]
+        # Row and column of the pivot, negative; 0 at the pivot itself, so that they are not changed below.
+        set_rows(rows, left, matrix, row, rows, minus, p)
+        for k in range(BLOCK):
+            rows[left + p * BLOCK + k] = 0.0
+        set_rows(matrix, row, matrix, row, matrix, pivot, p)
+        for i in range(p + 1, size):
+            element = (i * size + p) * BLOCK
+            set_rows(rows, left + i * BLOCK, matrix, element, rows, minus, 1)
+            set_rows(matrix, element, matrix, element, matrix, pivot, 1)
         for i in range(size):
             if i != p:
-                element = i * size + p if i > p else p * size + i
-                own, kept = matrix[element * BLOCK : (element + 1) * BLOCK], work[2 * i * BLOCK : 2 * (i + 1) * BLOCK]
-                for k in range(BLOCK):
-                    kept[k] = -own[k]
-                    own[k] *= pivot[k]
-                    kept[BLOCK + k] = own[k]
-        for i in range(size):
-            for j in range(i + 1):
-                if p not in (i, j):
-                    for k in range(0, BLOCK, LANES):
-                        own_at, first_at = (i * size + j) * BLOCK + k, (2 * i + 1) * BLOCK + k
-                        add_products(matrix, own_at, work, first_at, work, 2 * j * BLOCK + k, 1)
-        for k in range(BLOCK):
-            pivot[k] = -pivot[k]
+                element = (i * size + p) * BLOCK if i > p else row + i * BLOCK
+                add_rows(matrix, i * size * BLOCK, rows, left, matrix, element, i + 1)
+        set_rows(matrix, pivot, matrix, pivot, rows, minus, 1)
 
 
-@kernel(f"int64({ROW}, {READ_ONLY}, {ROW}, int64)")
-def _scale(x: FloatArray, elapsed: FloatArray, work: FloatArray, size: int) -> int:  # noqa: C901  a kernel
-    """Fill X = T S^-1 from the lower triangle of -S^-1, halved until its norm is small; return the most halvings.
+@kernel(f"int64({READ_ONLY}, {READ_ONLY}, {ROW}, int64)")
+def _scale(inverse: FloatArray, elapsed: FloatArray, rows: FloatArray, size: int) -> int:
+    """Fill the first rows of work space from -S^-1: X = T S^-1 is halved until its norm is small; return most halvings.
 
-    Row 0 of `work`: the number of halvings, -1 if they would be too many; row 1 is overwritten.
+    The number of halvings is -1 if they would be too many.
     """
-    norms, factors = work[:BLOCK], work[BLOCK : 2 * BLOCK]
+    widest_vectors()
     for k in range(BLOCK):
-        norms[k] = 0.0
+        rows[_HALVINGS + k] = 0.0
     for i in range(size):
-        for j in range(i + 1):
-            count, own = 1.0 if i == j else 2.0, x[(i * size + j) * BLOCK : (i * size + j + 1) * BLOCK]
-            for k in range(BLOCK):
-                norms[k] += count * own[k] * own[k]
-    large = 0
+        row = i * size * BLOCK
+        add_products(rows, _HALVINGS, inverse, row, inverse, row, i)
     for k in range(BLOCK):
-        factors[k] = -elapsed[k]
-        norms[k] = abs(elapsed[k]) * math.sqrt(norms[k])
-        large += 1 if norms[k] > _SERIES_NORM else 0
+        rows[_HALVINGS + k] *= 2.0
+    for i in range(size):
+        element = (i * size + i) * BLOCK
+        add_products(rows, _HALVINGS, inverse, element, inverse, element, 1)
     most = 0
     for k in range(BLOCK):
-        if large == 0:
-            norms[k] = 0.0
-            continue
-        halvings = 0
-        while norms[k] > _SERIES_NORM and halvings <= _MOST_HALVINGS:
-            norms[k] *= 0.5
-            factors[k] *= 0.5
+        norm, factor, halvings = abs(elapsed[k]) * math.sqrt(rows[_HALVINGS + k]), elapsed[k], 0
+        while norm > _SERIES_NORM and halvings <= _MOST_HALVINGS:
+            norm *= 0.5
+            factor *= 0.5
             halvings += 1
-        norms[k] = halvings
-        if halvings > _MOST_HALVINGS:
-            norms[k], factors[k] = -1.0, 0.0
-        else:
+        if halvings <= _MOST_HALVINGS:
             most = max(most, halvings)
-    for i in range(size):
-        for j in range(i + 1):
-            own = x[(i * size + j) * BLOCK : (i * size + j + 1) * BLOCK]
-            for k in range(BLOCK):
-                own[k] *= factors[k]
-            if i != j:
-                mirrored = x[(j * size + i) * BLOCK : (j * size + i + 1) * BLOCK]
-                for k in range(BLOCK):
-                    mirrored[k] = own[k]
+        rows[_HALVINGS + k] = halvings if halvings <= _MOST_HALVINGS else -1.0
+        rows[_INVERSE + k] = 1.0 / factor
+        rows[_INNER_SHARE + k] = -_INNER * factor
+        rows[_OUTER_SHARE + k] = -_OUTER * factor
     return most
 
 
 @kernel(f"void({ROW}, {ROW}, {ROW}, int64)")
 def _multiply(a: FloatArray, b: FloatArray, product: FloatArray, size: int) -> None:
     """Fill the product of matrices that are functions of one matrix: it is symmetric, as they are."""
+    widest_vectors()
     for k in range(size * size * BLOCK):
         product[k] = 0.0
     for i in range(size):
         for j in range(i + 1):
-            for k in range(0, BLOCK, LANES):
-                row, first, second = (i * size + j) * BLOCK + k, i * size * BLOCK + k, j * size * BLOCK + k
-                add_products(product, row, a, first, b, second, size)
-            own = product[(i * size + j) * BLOCK : (i * size + j + 1) * BLOCK]
-            if i != j:
-                mirrored = product[(j * size + i) * BLOCK : (j * size + i + 1) * BLOCK]
-                for k in range(BLOCK):
-                    mirrored[k] = own[k]
+            add_products(product, (i * size + j) * BLOCK, a, i * size * BLOCK, b, j * size * BLOCK, size)
+    _mirror(product, size)
+
+
+@kernel(f"void({ROW}, int64)")
+def _mirror(matrix: FloatArray, size: int) -> None:
+    """Fill the upper triangle of every matrix from the lower one."""
+    for i in range(size):
+        for j in range(i):
+            own, mirrored = (i * size + j) * BLOCK, (j * size + i) * BLOCK
+            for k in range(BLOCK):
+                matrix[mirrored + k] = matrix[own + k]
 
 
 @kernel(f"void({ROW}, {READ_ONLY}, {TABLE}, {ROW}, {ROW}, int64)")
 def fill_relaxations(
-    x: FloatArray, elapsed: FloatArray, work: FloatArray, rows: FloatArray, result: FloatArray, size: int
+    scaled: FloatArray, elapsed: FloatArray, work: FloatArray, rows: FloatArray, result: FloatArray, size: int
 ) -> None:
-    """Fill `result` with E = I - exp(-X), X = T S^-1, from the lower triangle of S in `x`, and T in `elapsed`.
+    """Fill `result` with E = I - exp(-X), X = T S^-1, from the lower triangle of S in `scaled`, and T in `elapsed`.
 
-    A series to X^8; after h halvings of X, E is doubled h times: E (2 I - E). Row 0 of `rows` becomes h, or -1 where X
-    is too large and E must be found by `relax_by_modes`. `x`, the tables of `work` and the other rows (2 J) are
-    overwritten.
+    E^-1 = S / T + I / 2 + X / 40 + (7 / 120) (S / T + X / 42)^-1, for X that is small: after h halvings of X, E is
+    doubled h times, E (2 I - E). Row 0 of `rows` (J + WORK_ROWS) becomes h, or -1 where X is too large and E must be
+    found by `relax_by_modes`. The tables of `work` and the other rows are overwritten.
     """
-    square, left, right = work[0], work[1], work[2]
-    _invert(x, rows, size)
-    doublings = _scale(x, elapsed, rows, size)
-    _multiply(x, x, square, size)
-    for k in range(size * size * BLOCK):
-        left[k] = _X2 * square[k] - _X1 * x[k]
-    _multiply(square, left, right, size)
-    for k in range(size * size * BLOCK):
-        left[k] = _X3 * square[k] + right[k]
-        right[k] = _X7 * right[k] + _X6 * square[k] - _X5 * x[k]
+    widest_vectors()
+    doublings = _fill_inverse_relaxations(scaled, elapsed, work, rows, result, size)
+    _invert(result, rows, _LEFT, size)
+    minus = _LEFT + size * BLOCK
     for i in range(size):
-        own = right[(i * size + i) * BLOCK : (i * size + i + 1) * BLOCK]
-        for k in range(BLOCK):
-            own[k] += _X4
-    _multiply(left, right, result, size)
-    for k in range(size * size * BLOCK):
-        result[k] = x[k] - (_Y2 * square[k] + result[k])
+        row = i * size * BLOCK
+        for j in range(i):
+            set_rows(result, (j * size + i) * BLOCK, result, row + j * BLOCK, rows, minus, 1)
+        set_rows(result, row, result, row, rows, minus, i + 1)
+    square = work[0]
     for doubling in range(doublings):
         _multiply(result, result, square, size)
         for row in range(0, size * size * BLOCK, BLOCK):
@@ -444,14 +475,42 @@ def fill_relaxations(
                 result[row + k] = doubled if doubling < rows[k] else result[row + k]
 
 
+@kernel(f"int64({ROW}, {READ_ONLY}, {TABLE}, {ROW}, {ROW}, int64)")
+def _fill_inverse_relaxations(
+    scaled: FloatArray, elapsed: FloatArray, work: FloatArray, rows: FloatArray, result: FloatArray, size: int
+) -> int:
+    """Fill the lower triangle of E^-1 of X that is small, as in `fill_relaxations`; return the most halvings."""
+    widest_vectors()
+    inverse, inner = work[0], work[1]
+    for k in range(size * size * BLOCK):
+        inverse[k] = scaled[k]
+    _invert(inverse, rows, _LEFT, size)
+    most = _scale(inverse, elapsed, rows, size)
+    for i in range(size):
+        row = i * size * BLOCK
+        set_rows(result, row, scaled, row, rows, _INVERSE, i + 1)
+        set_rows(inner, row, inverse, row, rows, _INNER_SHARE, i + 1)
+        add_rows(inner, row, scaled, row, rows, _INVERSE, i + 1)
+        add_rows(result, row, inverse, row, rows, _OUTER_SHARE, i + 1)
+    _invert(inner, rows, _LEFT, size)
+    for k in range(BLOCK):
+        rows[_LEFT + k] = -_FRACTION
+    for i in range(size):
+        row = i * size * BLOCK
+        add_rows(result, row, inner, row, rows, _LEFT, i + 1)
+        for k in range(BLOCK):
+            result[row + i * BLOCK + k] += 0.5
+    return most
+
+
 @kernel(f"void({TABLE}, {TABLE})")
 def find_modes(matrix: FloatArray, vectors: FloatArray) -> None:
     """Fill the eigenvectors of one symmetric matrix (J, J), one per column, by cyclic Jacobi rotations.
 
-    The matrix is overwritten: its diagonal holds the eigenvalues, in no order.
+    The matrix is overwritten: its diagonal holds the eigenvalues, in no order. Without rows in `vectors`, only these.
     """
     size = len(matrix)
-    for i in range(size):
+    for i in range(len(vectors)):
         for j in range(size):
             vectors[i, j] = 1.0 if i == j else 0.0
     for _ in range(_MOST_SWEEPS):
@@ -484,6 +543,7 @@ def _rotate(matrix: FloatArray, vectors: FloatArray, p: int, q: int) -> None:
             a, b = matrix[k, p], matrix[k, q]
             matrix[k, p] = matrix[p, k] = cosine * a - sine * b
             matrix[k, q] = matrix[q, k] = sine * a + cosine * b
+    for k in range(len(vectors)):
         a, b = vectors[k, p], vectors[k, q]
         vectors[k, p], vectors[k, q] = cosine * a - sine * b, sine * a + cosine * b
 

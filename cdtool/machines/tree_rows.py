@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.instructions import LANES, add_products, part_of, widest_vectors
+from cdtool.instructions import LANES, add_products, aligned_zeros, part_of, widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import FloatArray
 
@@ -52,9 +52,9 @@ MATRIX = "UniTuple(float64, 9)"
 
 def work_space(route: IndexArray, first: int, base: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Slots for a sweep, with a vector in the base's slot from row `first` on; a row of faults and one of zeros."""
-    slots = np.zeros((int(route[:, BEFORE].max()) + 2) * SLOT)
+    slots = aligned_zeros((int(route[:, BEFORE].max()) + 2) * SLOT)
     slots[first : first + 3 * BLOCK] = np.repeat(base, BLOCK)
-    return slots, np.zeros(2 * BLOCK)
+    return slots, aligned_zeros(2 * BLOCK)
 
 
 @kernel(f"{ROW}({ROW}, int64)", inline=True)

@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from cdtool.detection import Status
-from cdtool.detectors.velocity import BLOCK, WORK_TABLES, fill_relaxations, find_modes, observe_velocity, relax_by_modes
+from cdtool.detectors.velocity import (
+    BLOCK,
+    WORK_ROWS,
+    WORK_TABLES,
+    fill_relaxations,
+    find_modes,
+    observe_velocity,
+    relax_by_modes,
+)
 from cdtool.recording import FloatArray
 
 
@@ -27,11 +35,15 @@ def random_matrices(seed: int, size: int, count: int, condition: float) -> Float
 def relaxations(matrices: FloatArray, elapsed: FloatArray) -> FloatArray:
     """I - exp(-T S^-1) of up to a block of matrices."""
     count, size = len(matrices), matrices.shape[1]
+    if count > BLOCK:
+        return np.concatenate(
+            [relaxations(matrices[k : k + BLOCK], elapsed[k : k + BLOCK]) for k in range(0, count, BLOCK)]
+        )
     x = np.repeat(np.eye(size).reshape(-1, 1), BLOCK, axis=1)
     x[:, :count] = matrices.reshape(count, -1).T
     times, result = np.zeros(BLOCK), np.empty_like(x)
     times[:count] = elapsed
-    work, rows = np.empty((WORK_TABLES, x.size)), np.empty(2 * size * BLOCK)
+    work, rows = np.empty((WORK_TABLES, x.size)), np.empty((size + WORK_ROWS) * BLOCK)
     fill_relaxations(x.ravel(), times, work, rows, result.ravel(), size)
     made = np.ascontiguousarray(result[:, :count].T).reshape(count, size, size)
     for k in np.flatnonzero(rows[:count] < 0.0):
@@ -110,6 +122,9 @@ def test_modes_are_orthogonal_make_up_the_matrix_and_are_those_of_lapack(size):
         modes, vectors = matrix.copy(), np.empty((size, size))
         find_modes(modes, vectors)
         values = np.diag(modes)
+        alone = matrix.copy()
+        find_modes(alone, np.empty((0, size)))
+        np.testing.assert_array_equal(np.diag(alone), values)
         np.testing.assert_allclose(vectors.T @ vectors, np.eye(size), atol=1e-14)
         np.testing.assert_allclose((vectors * values) @ vectors.T, matrix, atol=1e-15)
         np.testing.assert_allclose(np.sort(values), np.linalg.eigvalsh(matrix), rtol=0.0, atol=1e-15)
