@@ -113,7 +113,8 @@ class DesiredDynamics:
         residual, _ = low_pass(time, balance, waits, cutoff)
         settle = settling_time(cutoff)
         started = started_at(time, waits, longest_gap(cutoff))
-        status = np.where(time[:, np.newaxis] < started + settle, np.uint8(Status.START_UP), np.uint8(Status.VALID))
+        status = np.full(started.shape, Status.VALID, dtype=np.uint8)
+        status[time[:, np.newaxis] < started + settle] = Status.START_UP
         lost = np.abs(error) > per_joint(self.tracking_limit, error.shape[1])
         status[for_every_joint(lost) if machine.coupled else lost] = Status.NOT_APPLICABLE
         status[missing] = Status.GAP

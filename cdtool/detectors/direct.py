@@ -89,9 +89,8 @@ class Direct:
         residual = filtered - machine.inertia_times(drive.position, acceleration)
         settle = settling_time(cutoff)
         started = started_at(drive.time, waits, longest_gap(cutoff))
-        status = np.where(
-            drive.time[:, np.newaxis] < started + settle, np.uint8(Status.START_UP), np.uint8(Status.VALID)
-        )
+        status = np.full(started.shape, Status.VALID, dtype=np.uint8)
+        status[drive.time[:, np.newaxis] < started + settle] = Status.START_UP
         missing = for_every_joint(drive.missing) if machine.coupled else drive.missing
         status[missing] = Status.GAP
         return Signal(drive.time, residual, status, self.unit(machine), self.signed)

@@ -11,6 +11,7 @@ from cdtool.clock import GAP_PERIODS, HOLD_PERIODS
 from cdtool.clock.held_samples import READ_MARKS, READ_TABLE
 from cdtool.clock.recent_steps import usual_steps
 from cdtool.detectors.base import BRIDGED
+from cdtool.instructions import aligned_zeros, part_of, widest_vectors
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray
 
@@ -215,7 +216,7 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
     if samples >= _FEWEST:
-        work = np.empty(samples * _POWERS), np.empty(_ROWS), np.empty((2, BLOCK + samples - 1))
+        work = aligned_zeros(samples * _POWERS), aligned_zeros(_ROWS), np.empty((2, BLOCK + samples - 1))
         _polynomial_rates(time, np.ascontiguousarray(values), samples, *work, first, second)
     return first, second
 
@@ -249,7 +250,7 @@ def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
         pieces = 1
         if k > 1 and time[k] - time[k - 1] > HOLD_PERIODS * usual[k - 1]:
             pieces = int(min(np.rint((time[k] - time[k - 1]) / usual[k - 1]), _MOST_PIECES))
-        angle = half = w = -1.0
+        angle = half = kept = share = whole = -1.0
         for j in range(joints):
             y = filtered[k - 1, j] if k > 0 else 0.0
             slope = rate[k - 1, j] if k > 0 else 0.0
@@ -262,19 +263,20 @@ def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
                 else:
                     parts = max(pieces, k - before)
                     own_half = 0.5 * step / parts
-                    # Joints with the same cut-off and the same step share the tangent.
+                    # Joints with the same cut-off and the same step share the coefficients.
                     if cutoff[j] * own_half != angle or own_half != half:
                         angle, half = cutoff[j] * own_half, own_half
                         # Above its Nyquist frequency a filter cannot be prewarped: it stays just below.
                         w = math.tan(min(angle, 1.4)) / half
-                    square = w * w
+                        square = w * w
+                        kept, share = 1.0 - half * root * w, half * square
+                        whole = 1.0 + half * root * w + half * half * square
                     old = values[before, j]
                     for part in range(parts):
                         new = values[k, j] if part == parts - 1 else old + (values[k, j] - old) / (parts - part)
-                        drive = half * square * (new + old)
-                        right_slope = slope * (1.0 - half * root * w) - half * square * y + drive
+                        right_slope = slope * kept - share * y + share * (new + old)
                         right_y = y + half * slope
-                        slope = (right_slope - half * square * right_y) / (1.0 + half * root * w + half * half * square)
+                        slope = (right_slope - share * right_y) / whole
                         y = right_y + half * slope
                         old = new
                 last[j] = k
@@ -317,6 +319,7 @@ def _fill_powers(
     The sample is innermost, and its rows are at distances known at compile time: otherwise one instruction handles one
     sample. In a window that begins before the first sample, what is missing there does not count: weight and x are 0.
     """
+    widest_vectors()
     clock = window[0]
     for i in range(BLOCK + before):
         clock[i] = time[min(max(begin - before + i, 0), len(time) - 1)]
@@ -345,6 +348,31 @@ def _fill_powers(
             rows[_S33 + k] += own[_CUBE + k] * own[_CUBE + k]
 
 
+@kernel(f"void({READ_TABLE}, int64, int64, float64[::1])", inline=True)
+def _take_window(values: FloatArray, begin: int, joint: int, column: FloatArray) -> None:
+    """Fill `column` with the samples of one joint from `begin` on, those beyond the ends as the last one there."""
+    count, joints = values.shape
+    if begin >= 0 and begin + len(column) <= count:
+        own = part_of(values, begin * joints + joint, (len(column) - 1) * joints + 1)
+        for i in range(len(column)):
+            column[i] = own[i * joints]
+    else:
+        for i in range(len(column)):
+            column[i] = values[min(max(begin + i, 0), count - 1), joint]
+
+
+@kernel("void(float64[::1], int64, int64, float64[:, ::1], float64[:, ::1])", inline=True)
+def _give_rates(rows: FloatArray, begin: int, joint: int, first: FloatArray, second: FloatArray) -> None:
+    """The rates of one joint in a block of samples, where there are enough before them."""
+    count, joints = first.shape
+    size = (min(BLOCK, count - begin) - 1) * joints + 1
+    at = begin * joints + joint
+    speeds, accelerations = part_of(first, at, size), part_of(second, at, size)
+    for k in range(max(_FEWEST - 1 - begin, 0), min(BLOCK, count - begin)):
+        speeds[k * joints] = rows[_R0 + k]
+        accelerations[k * joints] = rows[_R1 + k]
+
+
 @kernel(
     f"void({READ_ONLY}, {READ_TABLE}, int64, float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], "
     "float64[:, ::1])",
@@ -365,14 +393,14 @@ def _polynomial_rates(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     All joints have the same matrix, which is eliminated once per sample, and a block of samples is computed at once.
     `powers`, `rows` and `window` are work space; what `first` and `second` (n, J) hold stays where x is too short.
     """
+    widest_vectors()
     before = samples - 1
     column = window[1]
     for begin in range(0, len(time), BLOCK):
         _fill_powers(time, begin, before, window, powers, rows)
         _eliminate(rows)
         for j in range(values.shape[1]):
-            for i in range(BLOCK + before):
-                column[i] = values[min(max(begin - before + i, 0), len(time) - 1), j]
+            _take_window(values, begin - before, j, column)
             for k in range(_R0, _R3 + BLOCK):
                 rows[k] = 0.0
             # Two samples of a window at once; the newest one, whose change is 0, may be left out.
@@ -395,14 +423,13 @@ def _polynomial_rates(  # noqa: PLR0913  a kernel: one loop, arrays one by one
                 linear = (r1 - rows[_M12 + k] * square - rows[_M13 + k] * cubic) / rows[_M11 + k]
                 rows[_R0 + k] = linear / rows[_SPAN + k]
                 rows[_R1 + k] = 2.0 * square / (rows[_SPAN + k] * rows[_SPAN + k])
-            for k in range(max(_FEWEST - 1 - begin, 0), min(BLOCK, len(time) - begin)):
-                first[begin + k, j] = rows[_R0 + k]
-                second[begin + k, j] = rows[_R1 + k]
+            _give_rates(rows, begin, j, first, second)
 
 
 @kernel("void(float64[::1])")
 def _eliminate(rows: FloatArray) -> None:
     """Eliminate (n, s1, s2, s3), (s1, s2, s3, s4), (s2, s3, s22, s5), (s3, s4, s5, s33): factors and upper rows."""
+    widest_vectors()
     for k in range(BLOCK):
         n, s1, s2, s3 = rows[_COUNT + k], rows[_S1 + k], rows[_S2 + k], rows[_S3 + k]
         s4, s5, s22, s33 = rows[_S4 + k], rows[_S5 + k], rows[_S22 + k], rows[_S33 + k]
