@@ -485,7 +485,7 @@ def _fill_inverse_relaxations(
     for k in range(size * size * BLOCK):
         inverse[k] = scaled[k]
     _invert(inverse, rows, _LEFT, size)
-    most = _scale(inverse, elapsed, rows, size)
+    most: int = _scale(inverse, elapsed, rows, size)
     for i in range(size):
         row = i * size * BLOCK
         set_rows(result, row, scaled, row, rows, _INVERSE, i + 1)

@@ -60,13 +60,15 @@ def work_space(route: IndexArray, first: int, base: FloatArray) -> tuple[FloatAr
 @kernel(f"{ROW}({ROW}, int64)", inline=True)
 def pair_of(slots: FloatArray, before: int) -> FloatArray:
     """The slot before a joint's own, and its own."""
-    return part_of(slots, before * SLOT, 2 * SLOT)
+    pair: FloatArray = part_of(slots, before * SLOT, 2 * SLOT)
+    return pair
 
 
 @kernel(f"{READ_ONLY}({READ_TABLE}, int64)", inline=True)
 def body_of(bodies: FloatArray, joint: int) -> FloatArray:
     """The constants of a joint."""
-    return part_of(bodies, joint * CONSTANTS, CONSTANTS)
+    body: FloatArray = part_of(bodies, joint * CONSTANTS, CONSTANTS)
+    return body
 
 
 @kernel(f"{VECTOR}({ROW}, int64)")
