@@ -35,9 +35,9 @@ def read_in_turn(monkeypatch):
     reading, filling = Decompressor.read, chunk_read_ahead.ChunkReadAhead._fill
     threads = []
 
-    def fill(self, index, content):
+    def fill(self, reader, index, content):
         threads.append(index.chunk_start_offset)
-        return filling(self, index, content)
+        return filling(self, reader, index, content)
 
     def read_chunk(self, file, header, target):
         offsets[header.at in threads].append(header.at)

@@ -18,7 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, ChunkHeader, Dec
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
-from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
+from cdtool.formats.mcap.container.records import PREFIX, Chunk, ChunkIndex
+from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.fast_path import ChunkReader, ChunkRows
@@ -84,14 +85,17 @@ def _large_pages(size: int) -> mmap.mmap:
 
 
 # The first use of memory costs as much time as decompressing into it: buffers are kept for the next logs.
-_BUFFERS = Buffers(JOINED)
+BUFFERS = Buffers(JOINED)
 
 
-@dataclass(frozen=True)
-class _CheckedChunk:
-    """A checked chunk: its header, and either its messages, if the fast path has read them, or its address."""
+class CheckedChunk(NamedTuple):
+    """A checked chunk: its header, and either its messages, if the fast path has read them, or its address.
+
+    `end` is the byte after its record, or after its message indexes if nothing else is before the next chunk.
+    """
 
     header: ChunkHeader
+    end: int
     address: int = 0
     taken: ChunkRows | None = None
 
@@ -116,7 +120,7 @@ class _Group:
     """Memory for a group of chunks, and the future result of each; None if the chunk must be read again."""
 
     memory: Bytes
-    chunks: tuple[Future[list[_CheckedChunk | None]], ...]
+    chunks: tuple[Future[list[CheckedChunk | None]], ...]
 
 
 class ChunkReadAhead:
@@ -139,8 +143,9 @@ class ChunkReadAhead:
         threads = min(usable_cores(), _MOST_THREADS, len(chunks))
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
         self._following = dict(pairwise(self._groups))
+        self._next_chunk = dict(pairwise(sorted(summary.chunks)))
         self._started: dict[int, _Group] = {}
-        self._checked: dict[ChunkHeader, _CheckedChunk] = {}
+        self._checked: dict[int, CheckedChunk] = {}
         self._threads = ThreadPoolExecutor(threads, "chunks") if threads > 1 else None
         self._readers: SimpleQueue[_Reader] = SimpleQueue()
 
@@ -159,11 +164,9 @@ class ChunkReadAhead:
         """Return whether the chunk at byte `at` is the first of a group, which has its own memory."""
         return at in self._groups
 
-    def memory(self, at: int, size: int) -> Bytes:
-        """Return memory of at least `size` bytes for the chunk at byte `at`; for the first of a group, the group's."""
+    def group(self, at: int) -> Bytes | None:
+        """Return the memory of the group that begins at byte `at`; None if one of its chunks must be read again."""
         self._checked = {}
-        if at not in self._groups:
-            return _BUFFERS.take(size)
         for earlier in [start for start in self._started if start < at]:
             del self._started[earlier]
         following: int | None = at
@@ -175,24 +178,21 @@ class ChunkReadAhead:
             following = self._following.get(following) if following is not None else None
         group = self._started.pop(at)
         chunks = [chunk for future in group.chunks for chunk in future.result()]
-        if not all(chunks) or len(group.memory) < size:
-            return _BUFFERS.take(size)
-        self._checked = {chunk.header: chunk for chunk in chunks if chunk is not None}
+        if not all(chunks):
+            return None
+        self._checked = {chunk.header.at: chunk for chunk in chunks if chunk is not None}
         return group.memory
 
-    def has_filled(self, header: ChunkHeader, content: Bytes) -> bool:
-        """Return whether `content` is the checked chunk with this header."""
-        chunk = self._checked.get(header)
-        return chunk is not None and chunk.address == content.ctypes.data
-
-    def taken(self, header: ChunkHeader) -> ChunkRows | None:
-        """Return the messages of the chunk with this header; None if the fast path has not read them."""
-        chunk = self._checked.get(header)
-        return None if chunk is None or self._definitions.ambiguous else chunk.taken
+    def checked(self, at: int) -> CheckedChunk | None:
+        """Return the chunk at byte `at` of the current group; None if it must be read."""
+        chunk = self._checked.get(at)
+        if chunk is not None and chunk.taken is not None and self._definitions.ambiguous:
+            return None
+        return chunk
 
     def _start(self, chunks: list[ChunkIndex]) -> _Group:
         assert self._threads is not None
-        memory = _BUFFERS.take(sum(index.uncompressed_size for index in chunks))
+        memory = BUFFERS.take(sum(index.uncompressed_size for index in chunks))
         targets, end = [], 0
         for index in chunks:
             start, end = end, end + index.uncompressed_size
@@ -200,33 +200,44 @@ class ChunkReadAhead:
         tasks = [targets[i : i + _SUBMITTED] for i in range(0, len(targets), _SUBMITTED)]
         return _Group(memory, tuple(self._threads.submit(self._fill_all, task) for task in tasks))
 
-    def _fill_all(self, targets: list[tuple[ChunkIndex, Bytes]]) -> list[_CheckedChunk | None]:
-        return [self._fill(index, content) for index, content in targets]
-
-    def _fill(self, index: ChunkIndex, content: Bytes) -> _CheckedChunk | None:
-        at = index.chunk_start_offset
+    def _fill_all(self, targets: list[tuple[ChunkIndex, Bytes]]) -> list[CheckedChunk | None]:
         try:
             reader = self._reader()
         except OSError:
-            return None
+            return [None] * len(targets)
         try:
-            header = chunk_header(at, reader.file.read(at, HEADER_LENGTH))
-            if header is None or not header.uncompressed_crc or not matches_header(index, header):
-                return None
-            header.check()
-            if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
-                reader.decompressor.read(reader.file, header, content)
-                return _CheckedChunk(header, content.ctypes.data)
-            checked = reader.decompressor.content(reader.file, header, reader.buffer(len(content)))
-            taken = self._chunk_reader.read(checked, self._rows[at], self._is_known)
-            if taken is not None:
-                return _CheckedChunk(header, taken=taken)
-            content[:] = checked
-            return _CheckedChunk(header, content.ctypes.data)
-        except (DamageError, OSError):
-            return None
+            return [self._fill(reader, index, content) for index, content in targets]
         finally:
             self._readers.put(reader)
+
+    def _fill(self, reader: _Reader, index: ChunkIndex, content: Bytes) -> CheckedChunk | None:
+        at, file = index.chunk_start_offset, reader.file
+        try:
+            head = file.read(at, HEADER_LENGTH)
+            header = chunk_header(at, head)
+            if header is None or head[0] != Chunk.opcode or not header.uncompressed_crc:
+                return None
+            if not matches_header(index, header) or at + header.length > file.size:
+                return None
+            header.check()
+            end = self._end(file, index, header)
+            if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
+                reader.decompressor.read(file, header, content)
+                return CheckedChunk(header, end, content.ctypes.data)
+            checked = reader.buffer(len(content))
+            reader.decompressor.read(file, header, checked)
+            taken = self._chunk_reader.read(checked, self._rows[at], self._is_known)
+            if taken is not None:
+                return CheckedChunk(header, end, taken=taken)
+            content[:] = checked
+            return CheckedChunk(header, end, content.ctypes.data)
+        except (DamageError, OSError):
+            return None
+
+    def _end(self, file: FileBytes, index: ChunkIndex, header: ChunkHeader) -> int:
+        end, following = header.at + header.length, self._next_chunk.get(header.at)
+        indexes_end = end + index.message_index_length
+        return indexes_end if following == indexes_end and only_message_indexes(file, end, indexes_end) else end
 
     def _is_known(self, opcode: int, body: bytes) -> bool:
         return self._definitions.is_known(opcode, body, covered=True)
