@@ -33,14 +33,15 @@ def read_in_turn(monkeypatch):
     """Yield the offsets of the chunks that were read one by one (False) and read ahead (True)."""
     offsets = {True: [], False: []}
     reading, filling = Decompressor.read, chunk_read_ahead.ChunkReadAhead._fill
-    threads = []
 
     def fill(self, reader, index, content):
-        threads.append(index.chunk_start_offset)
-        return filling(self, reader, index, content)
+        checked = filling(self, reader, index, content)
+        if checked is not None:
+            offsets[True].append(index.chunk_start_offset)
+        return checked
 
     def read_chunk(self, file, header, target):
-        offsets[header.at in threads].append(header.at)
+        offsets[False].append(header.at)
         return reading(self, file, header, target)
 
     monkeypatch.setattr(chunk_read_ahead.ChunkReadAhead, "_fill", fill)

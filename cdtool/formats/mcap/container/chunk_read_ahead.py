@@ -38,7 +38,8 @@ _MOST_FREE = 3
 # The size of a group [bytes] (writers make chunks of slightly more than one MiB). Larger groups exceed the processor's
 # cache; with smaller ones the effort per group dominates.
 JOINED = 14 << 20
-_LARGEST = 16 << 20  # chunks beyond this size are read one by one
+# Chunks beyond this size are read one by one, and so are those whose record and message indexes are longer.
+_LARGEST, _LONGEST = 16 << 20, 32 << 20
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4
 _SUBMITTED = 3  # chunks per task of a thread: submitting a task costs as much as a tenth of a chunk
@@ -211,33 +212,40 @@ class ChunkReadAhead:
             self._readers.put(reader)
 
     def _fill(self, reader: _Reader, index: ChunkIndex, content: Bytes) -> CheckedChunk | None:
-        at, file = index.chunk_start_offset, reader.file
+        at, length = index.chunk_start_offset, index.chunk_length + self._indexes_length(index)
+        if length > min(_LONGEST, reader.file.size - at):
+            return None
         try:
-            head = file.read(at, HEADER_LENGTH)
-            header = chunk_header(at, head)
-            if header is None or head[0] != Chunk.opcode or not header.uncompressed_crc:
+            record = reader.file.read_scratch(at, length)
+            header = chunk_header(at, record[:HEADER_LENGTH].data)
+            if header is None or record[0] != Chunk.opcode or not header.uncompressed_crc:
                 return None
-            if not matches_header(index, header) or at + header.length > file.size:
+            if not matches_header(index, header):
                 return None
             header.check()
-            end = self._end(file, index, header)
+            packed = record[header.data - at : header.data - at + header.size]
+            end = at + (length if _only_indexes(record.data, header.length) else header.length)
             if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
-                reader.decompressor.read(file, header, content)
+                reader.decompressor.fill(header, packed, content)
                 return CheckedChunk(header, end, content.ctypes.data)
-            checked = reader.buffer(len(content))
-            reader.decompressor.read(file, header, checked)
-            taken = self._chunk_reader.read(checked, self._rows[at], self._is_known)
+            target = reader.buffer(len(content)) if header.compression else packed
+            reader.decompressor.fill(header, packed, target)
+            taken = self._chunk_reader.read(target, self._rows[at], self._is_known)
             if taken is not None:
                 return CheckedChunk(header, end, taken=taken)
-            content[:] = checked
+            content[:] = target
             return CheckedChunk(header, end, content.ctypes.data)
         except (DamageError, OSError):
             return None
 
-    def _end(self, file: FileBytes, index: ChunkIndex, header: ChunkHeader) -> int:
-        end, following = header.at + header.length, self._next_chunk.get(header.at)
-        indexes_end = end + index.message_index_length
-        return indexes_end if following == indexes_end and only_message_indexes(file, end, indexes_end) else end
+    def _indexes_length(self, index: ChunkIndex) -> int:
+        """Return the length of the bytes after a chunk if only its message indexes should be there; otherwise 0.
+
+        An entry is smaller than its message: a longer index is not read at once.
+        """
+        end, length = index.chunk_start_offset + index.chunk_length, index.message_index_length
+        is_usual = length <= index.uncompressed_size and self._next_chunk.get(index.chunk_start_offset) == end + length
+        return length if is_usual else 0
 
     def _is_known(self, opcode: int, body: bytes) -> bool:
         return self._definitions.is_known(opcode, body, covered=True)
@@ -247,6 +255,10 @@ class ChunkReadAhead:
             return self._readers.get_nowait()
         except Empty:
             return _Reader(self._path)
+
+
+def _only_indexes(record: memoryview, at: int) -> bool:
+    return only_message_indexes(lambda start, length: record[start : start + length], at, len(record))
 
 
 def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:

@@ -115,8 +115,14 @@ class Decompressor:
             check_crc(header, target)
 
     def fill(self, header: ChunkHeader, packed: Bytes, target: Bytes) -> None:
-        """Decompress a complete chunk into `target` (uncompressed_size,) and check it; raises DamageError."""
-        if header.compression != "lz4" or decode_frame(packed, target) == NOT_DECODED:
+        """Decompress a complete chunk into `target` (uncompressed_size,) and check it; raises DamageError.
+
+        A chunk that is not compressed may already be in `target`.
+        """
+        if not header.compression:
+            if packed is not target:
+                target[:] = packed
+        elif header.compression != "lz4" or decode_frame(packed, target) == NOT_DECODED:
             size = self.fill_available(header, packed, target)
             if size != len(target):
                 raise DamageError(f"a chunk of {size} bytes declares {len(target)}")

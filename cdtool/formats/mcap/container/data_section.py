@@ -195,7 +195,7 @@ class DataSection:
         end, index = header.at + header.length, self._summary.chunks.get(header.at)
         if self._lost is None and index is not None and self._summary.verified and matches_header(index, header):
             following = self._following.get(header.at)
-            if following == end + index.message_index_length and only_message_indexes(self._file, end, following):
+            if following == end + index.message_index_length and only_message_indexes(self._file.read, end, following):
                 return following
         return end
 
