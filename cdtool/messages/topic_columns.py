@@ -133,7 +133,7 @@ class TopicColumns(Topic):
         self._memory = memory or ColumnMemory()
         self._rows = {text: _FieldRows(expected.get(topic, 0), self._memory) for text in self.fields}
         # A header's stamp may be before 1970.
-        self._stamps = Rows(expected.get(topic, 0), np.int64 if self.clock == "header" else np.uint64)
+        self._stamps = Rows(expected.get(topic, 0), np.int64 if self.clock == "header" else np.uint64, self._memory)
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
 
     def add(self, stream: Stream, batch: Batch) -> None:

@@ -7,9 +7,6 @@ again one by one, and damage is reported then.
 
 from __future__ import annotations
 
-import mmap
-import sys
-import weakref
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -32,9 +29,8 @@ from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.fast_path import ChunkReader, ChunkRows
+from cdtool.messages.large_pages import Buffers
 
-_LARGE_PAGE = 2 << 20
-_MOST_FREE = 3
 # The size of a group [bytes] (writers make chunks of slightly more than one MiB). Larger groups exceed the processor's
 # cache; with smaller ones the effort per group dominates.
 JOINED = 14 << 20
@@ -47,46 +43,10 @@ _SUBMITTED = 3  # chunks per task of a thread: submitting a task costs as much a
 _BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
 
 
-class Buffers:
-    """Memory for decompressed chunks, in large pages; it is reused when nothing refers to it.
-
-    Arrays have `size` bytes, a multiple of a large page; larger ones are allocated separately. Messages are far apart,
-    and a page of 4 KiB contains few of them: with small pages, address translation needs a quarter of the time of
-    decompressing and half of the time of gathering.
-    """
-
-    def __init__(self, size: int) -> None:
-        self.size = size
-        self._free: list[mmap.mmap] = []
-
-    def take(self, size: int) -> Bytes:
-        """Return an uninitialised array of at least `size` bytes."""
-        if size > self.size:
-            return np.empty(size, np.uint8)
-        memory = self._free.pop() if self._free else _large_pages(self.size)
-        whole: Bytes = np.frombuffer(memory, np.uint8)
-        # Every view refers to `whole`, which therefore exists as long as any of them.
-        weakref.finalize(whole, self._give_back, memory)
-        start = -whole.ctypes.data % _LARGE_PAGE
-        return whole[start : start + self.size]
-
-    def _give_back(self, memory: mmap.mmap) -> None:
-        if len(self._free) < _MOST_FREE:
-            self._free.append(memory)
-
-
-def _large_pages(size: int) -> mmap.mmap:
-    if sys.platform == "win32":
-        return mmap.mmap(-1, size + _LARGE_PAGE)
-    # Private: without it, forked workers would write into the same memory as this process and each other.
-    memory = mmap.mmap(-1, size + _LARGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    if hasattr(mmap, "MADV_HUGEPAGE"):  # Linux
-        memory.madvise(mmap.MADV_HUGEPAGE)
-    return memory
-
-
-# The first use of memory costs as much time as decompressing into it: buffers are kept for the next logs.
-BUFFERS = Buffers(JOINED)
+# The first use of memory costs as much time as decompressing into it. Messages are far apart, and a page of 4 KiB
+# contains few of them: with small pages, address translation needs a quarter of the time of decompressing and half of
+# the time of gathering.
+BUFFERS = Buffers(JOINED, kept=3)
 
 
 class CheckedChunk(NamedTuple):
