@@ -124,7 +124,7 @@ def _decode_block(
             at += count
             filled += count
             if at == end:  # the last sequence has no match
-                return np.int64(filled)
+                return int(np.int64(filled))
             if end - at < two:
                 return NOT_DECODED
             offset = np.uint64(packed[at]) | np.uint64(packed[at + one]) << eight
@@ -190,7 +190,7 @@ def decode_frame(packed: Bytes, target: Bytes) -> int:
         word = _number(packed, at, np.uint64(4))
         at += np.uint64(4)
         if not word:
-            return np.int64(filled) if at == length and filled == size else NOT_DECODED
+            return int(np.int64(filled)) if at == length and filled == size else NOT_DECODED
         block = word & np.uint64(_UNCOMPRESSED - 1)
         if block > length - at or block > largest:
             return NOT_DECODED
