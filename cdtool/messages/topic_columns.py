@@ -19,7 +19,7 @@ from cdtool.findings import Finding
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
 from cdtool.messages.column_memory import ColumnMemory
-from cdtool.messages.fast_path import Binding, Destination, WrittenRows
+from cdtool.messages.fast_path import Binding, Destination, WrittenRows, joined_rows
 from cdtool.messages.stream import Stream
 from cdtool.messages.topic import Topic, Values, sort_times
 from cdtool.recording import FloatArray
@@ -192,10 +192,9 @@ class TopicColumns(Topic):
 def _joined(parts: Sequence[WrittenRows]) -> list[WrittenRows]:
     """Return the same rows, with adjacent parts joined."""
     joined: list[WrittenRows] = []
-    for part in parts:
-        together = joined[-1].joined(part) if joined else None
-        if together is None:
-            joined.append(part)
-        else:
-            joined[-1] = together
+    begin = 0
+    for number in range(1, len(parts) + 1):
+        if number == len(parts) or not parts[number].follows(parts[number - 1]):
+            joined.append(joined_rows(parts[begin:number]))
+            begin = number
     return joined
