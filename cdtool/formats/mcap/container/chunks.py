@@ -16,9 +16,9 @@ import numpy as np
 from cdtool.formats.mcap.container.checksums import crc32
 from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.file_bytes import FileBytes
-from cdtool.formats.mcap.container.lz4_kernel import NOT_DECODED, decode_frame
 from cdtool.formats.mcap.container.records import PREFIX
 from cdtool.formats.mcap.container.walk_kernel import Bytes
+from cdtool.lz4_kernel import NOT_DECODED, decode_frame
 
 # The largest size of a record, compressed or not [bytes]: writers make chunks of 1 to 8 MB.
 LARGEST = 128 << 20
@@ -119,13 +119,14 @@ class Decompressor:
 
         A chunk that is not compressed may already be in `target`.
         """
-        if not header.compression:
-            if packed is not target:
-                target[:] = packed
-        elif header.compression != "lz4" or decode_frame(packed, target) == NOT_DECODED:
+        if header.compression == "lz4" and _decode_lz4(header, packed, target):
+            return
+        if header.compression:
             size = self.fill_available(header, packed, target)
             if size != len(target):
                 raise DamageError(f"a chunk of {size} bytes declares {len(target)}")
+        elif packed is not target:
+            target[:] = packed
         check_crc(header, target)
 
     def fill_available(self, header: ChunkHeader, packed: Bytes, target: Bytes) -> int:
@@ -139,6 +140,13 @@ def check_crc(header: ChunkHeader, content: Bytes) -> None:
     """Raise DamageError if a chunk's content does not match its CRC."""
     if header.uncompressed_crc and crc32(content) != header.uncompressed_crc:
         raise DamageError("the checksum of a chunk does not match")
+
+
+def _decode_lz4(header: ChunkHeader, packed: Bytes, target: Bytes) -> bool:
+    """Decompress a chunk that is intact; False if its CRC does not show that, so that lz4 finds out what is wrong."""
+    if not header.uncompressed_crc or decode_frame(packed, target) == NOT_DECODED:
+        return False
+    return crc32(target) == header.uncompressed_crc
 
 
 def _zstd() -> Callable[[Bytes, Bytes], int]:

@@ -1,17 +1,18 @@
-"""Compiled decoder of LZ4 frames (LZ4 Frame Format 1.6.x, LZ4 Block Format), straight into the memory of a chunk.
+"""Compiled decoder of LZ4 frames (LZ4 Frame Format 1.6.x, LZ4 Block Format), straight into given memory.
 
 The `lz4` package decodes into memory of its own, which it allocates and copies for every chunk; decoding straight into
 the target takes a fifth less time. Damaged frames, and those with features that writers of MCAP do not use, are left to
 the package and its error messages.
 
-The package refuses blocks whose last bytes are not literals. Here they are decoded, which the chunk's CRC makes safe.
+The package refuses blocks whose last bytes are not literals. Here they are decoded, so that a checksum
+of the content must follow.
 """
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
-from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.instructions import copy_block, load, store
 from cdtool.kernels import kernel
 
@@ -30,6 +31,7 @@ _BLOCK, _MARGIN = 32, 64
 _PRIME_1, _PRIME_2, _PRIME_3, _PRIME_4, _PRIME_5 = 0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D, 0x27D4EB2F, 0x165667B1
 _LOW = 0xFFFFFFFF
 
+Bytes = npt.NDArray[np.uint8]
 _BYTES = "Array(uint8, 1, 'C', readonly=True)"
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdtool.formats.mcap.container.lz4_kernel import NOT_DECODED, decode_frame
+from cdtool.lz4_kernel import NOT_DECODED, decode_frame
 
 BLOCK_SIZES = [lz4.frame.BLOCKSIZE_MAX64KB, lz4.frame.BLOCKSIZE_MAX256KB, lz4.frame.BLOCKSIZE_MAX4MB]
 GUARD = 200
