@@ -1,6 +1,7 @@
 """Processor instructions for kernels that numba does not provide.
 
-`prefetch`, `store`, `load`, two on bits, three on rows of numbers, `part_of` an array, and `widest_vectors`.
+`prefetch`, `store`, `copy_block`, `load`, two on bits, three on rows of numbers, `part_of` an array, and
+`widest_vectors`.
 """
 
 from __future__ import annotations
@@ -91,6 +92,30 @@ def _emit_store() -> Callable[..., Any]:
             return context.get_dummy_value()
 
         return types.void(address, value), lines
+
+    made: Callable[..., Any] = intrinsic(emit)
+    return made
+
+
+def _copy_block(address: int, data: Any, at: Any) -> None:
+    """Copy the 32 bytes from byte `at` of the array `data` to an address, as `store` does; they must not overlap."""
+
+
+def _emit_copy_block() -> Callable[..., Any]:
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic
+
+    def emit(_: Any, address: Any, data: Any, at: Any) -> Any:
+        def lines(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = context.make_array(signature.args[1])(context, builder, arguments[1])
+            vector = ir.VectorType(ir.IntType(8), 32).as_pointer()
+            place = builder.gep(builder.bitcast(array.data, ir.IntType(8).as_pointer()), [arguments[2]])
+            block = builder.load(builder.bitcast(place, vector), align=1)
+            builder.store(block, builder.inttoptr(arguments[0], vector), align=1)
+            return context.get_dummy_value()
+
+        return types.void(address, data, at), lines
 
     made: Callable[..., Any] = intrinsic(emit)
     return made
@@ -307,6 +332,7 @@ def _emit_widest_vectors() -> Callable[..., Any]:
 
 prefetch = _Instruction(_prefetch, _emit_prefetch)
 store = _Instruction(_store, _emit_store)
+copy_block = _Instruction(_copy_block, _emit_copy_block)
 load = _Instruction(_load, _emit_load)
 equal_bytes = _Instruction(_equal_bytes, _emit_equal_bytes)
 trailing_zeros = _Instruction(_trailing_zeros, _emit_trailing_zeros)

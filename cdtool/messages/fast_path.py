@@ -5,7 +5,7 @@ These types pass between the container, which reads chunks, the decoders, which 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -137,13 +137,21 @@ class WrittenRows:
         """The number of messages."""
         return int(self.rows.stop - self.rows.start)
 
-    def joined(self, other: WrittenRows) -> WrittenRows | None:
-        """Return these rows and the `other` ones as one; None if the others do not follow directly."""
-        if other.destination is not self.destination or other.rows.start != self.rows.stop:
-            return None
-        stamps, border = self.destination.stamps, self.rows.stop
-        ascending = self.ascending and other.ascending and bool(stamps[border - 1] <= stamps[border])
-        return WrittenRows(self.destination, slice(self.rows.start, other.rows.stop), ascending)
+    def follows(self, other: WrittenRows) -> bool:
+        """Return whether these rows directly follow the `other` ones."""
+        return other.destination is self.destination and other.rows.stop == self.rows.start
+
+
+def joined_rows(parts: Sequence[WrittenRows]) -> WrittenRows:
+    """Return rows, each of which directly follow the ones before, as one."""
+    if len(parts) == 1:
+        return parts[0]
+    destination, rows = parts[0].destination, slice(parts[0].rows.start, parts[-1].rows.stop)
+    ascending = all(part.ascending for part in parts)
+    if ascending:
+        borders = np.array([part.rows.start for part in parts[1:]])
+        ascending = bool(np.all(destination.stamps[borders - 1] <= destination.stamps[borders]))
+    return WrittenRows(destination, rows, ascending)
 
 
 @dataclass(frozen=True)

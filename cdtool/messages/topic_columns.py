@@ -19,7 +19,7 @@ from cdtool.findings import Finding
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch
 from cdtool.messages.column_memory import ColumnMemory
-from cdtool.messages.fast_path import Binding, Destination, WrittenRows
+from cdtool.messages.fast_path import Binding, Destination, WrittenRows, joined_rows
 from cdtool.messages.stream import Stream
 from cdtool.messages.topic import Topic, Values, sort_times
 from cdtool.recording import FloatArray
@@ -133,7 +133,7 @@ class TopicColumns(Topic):
         self._memory = memory or ColumnMemory()
         self._rows = {text: _FieldRows(expected.get(topic, 0), self._memory) for text in self.fields}
         # A header's stamp may be before 1970.
-        self._stamps = Rows(expected.get(topic, 0), np.int64 if self.clock == "header" else np.uint64)
+        self._stamps = Rows(expected.get(topic, 0), np.int64 if self.clock == "header" else np.uint64, self._memory)
         self._clock: tuple[FloatArray, npt.NDArray[np.intp] | None] | None = None
 
     def add(self, stream: Stream, batch: Batch) -> None:
@@ -192,10 +192,9 @@ class TopicColumns(Topic):
 def _joined(parts: Sequence[WrittenRows]) -> list[WrittenRows]:
     """Return the same rows, with adjacent parts joined."""
     joined: list[WrittenRows] = []
-    for part in parts:
-        together = joined[-1].joined(part) if joined else None
-        if together is None:
-            joined.append(part)
-        else:
-            joined[-1] = together
+    begin = 0
+    for number in range(1, len(parts) + 1):
+        if number == len(parts) or not parts[number].follows(parts[number - 1]):
+            joined.append(joined_rows(parts[begin:number]))
+            begin = number
     return joined

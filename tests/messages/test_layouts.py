@@ -104,3 +104,13 @@ def test_a_missing_field_is_reported_with_the_fields_that_exist(field, problem, 
     (field_values,) = decoder.decode(batch_of([b"\0\1\0\0" + bytes(64)]), fields_of(field)).fields
     assert (field_values.fault.problem, field_values.fault.known) == (problem, known)
     assert field_values.state.tolist() == [2]
+
+
+def test_the_schema_of_the_same_definition_is_parsed_once_unless_it_is_long():
+    name, text = "test_msgs/msg/Thing", b"float64 kept_value\n"
+    assert parse_ros2msg(name, text) is parse_ros2msg(name, bytes(bytearray(text)))
+    assert parse_ros2msg(name, text).root.members == parse_ros2msg("test_msgs/msg/Other", text).root.members
+    assert parse_ros2msg("test_msgs/msg/Other", text).root.name == "test_msgs/Other"
+    long = text + b"#" * (1 << 16)
+    assert parse_ros2msg(name, long) is not parse_ros2msg(name, long)
+    assert parse_ros2msg(name, long).root == parse_ros2msg(name, text).root

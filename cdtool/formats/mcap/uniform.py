@@ -31,11 +31,13 @@ from cdtool.messages.fast_path import (
     Words,
     WrittenRows,
 )
+from cdtool.recording import FloatArray
 
 # The fast path is given up when the chunks that did not match outnumber those that did by this number.
 _MOST_MISMATCHES = 16
 _TEXT_TOKEN, _TEXT_LITERAL = 4, 0  # the columns of tokens of JSON, and that of their first literal
 _NONE = np.zeros(0, np.uint64)
+_NO_VALUES, _NO_LEVELS = np.zeros(1), np.zeros((1, LEVEL), np.int64)
 _KINDS = {"f": kernel.SINGLE, "i": kernel.SIGNED_INTEGER, "u": kernel.UNSIGNED_INTEGER, "?": kernel.TRUTH}
 
 
@@ -67,6 +69,12 @@ class _Tables:
         """The arguments of the kernel that it only reads, in its order."""
         layouts = (self.slots, self.bounds, self.compared, self.mask, self.pattern, self.numbers, self.stamps)
         return (*layouts, self.tags, self.texts, self.literals, powers_of_five())
+
+    def overwritten(self) -> tuple[FloatArray, IntArray]:
+        """Return the arrays that the kernel uses for messages with tokens; for fixed bytes they stay as they are."""
+        if len(self.tags) or len(self.texts):
+            return np.empty(self.values), np.empty((DEEPEST, LEVEL), np.int64)
+        return _NO_VALUES, _NO_LEVELS
 
 
 class UniformChunkReader:
@@ -103,15 +111,12 @@ class UniformChunkReader:
         if claimed is None:
             return None
         first, limits = claimed
-        reached, last = first.copy(), np.zeros(len(first), np.uint64)
-        times = np.array([kernel.NO_DATE, 0, 0], np.uint64)
-        values, levels = np.empty(tables.values), np.empty((DEEPEST, LEVEL), np.int64)
-        arguments = tables.arguments
-        at, reason = 0, kernel.DEFINITION
+        progress = np.array((first, limits, [0] * len(first)), np.uint64)
+        times = np.array((kernel.NO_DATE, 0, 0), np.uint64)
+        arguments = (*tables.arguments, *tables.overwritten(), self._time, progress, times)
+        at, reason, size = 0, kernel.DEFINITION, len(content)
         while reason == kernel.DEFINITION:
-            at, reason = kernel.take_messages(
-                content, at, len(content), *arguments, self._time, limits, values, levels, reached, last, times
-            )
+            at, reason = kernel.take_messages(content, at, size, *arguments)
             if reason == kernel.DEFINITION:
                 begin = at + kernel.PREFIX
                 opcode, end = int(content[at]), begin + int.from_bytes(content[at + 1 : begin].tobytes(), "little")
@@ -122,8 +127,9 @@ class UniformChunkReader:
         if reason != kernel.DONE or earliest > latest or latest >= kernel.NO_DATE:
             return None
         counts, parts = {}, {}
+        reached, _, latest_stamps = progress.tolist()
         for (channel, binding), begin, end, limit, stamp in zip(
-            tables.bindings.items(), first.tolist(), reached.tolist(), limits.tolist(), last.tolist(), strict=True
+            tables.bindings.items(), first, reached, limits, latest_stamps, strict=True
         ):
             if binding is not None and end < limit:
                 return None
@@ -134,7 +140,7 @@ class UniformChunkReader:
         return ChunkRows(counts, parts, (earliest, latest), first_time)
 
 
-def _claimed_rows(tables: _Tables, rows: Mapping[int, range]) -> tuple[Words, Words] | None:
+def _claimed_rows(tables: _Tables, rows: Mapping[int, range]) -> tuple[list[int], list[int]] | None:
     """Return first row and end of each channel's messages; None if its columns do not have as many free rows."""
     first, limits = [0] * len(tables.bindings), [0] * len(tables.bindings)
     for channel, (slot, free) in tables.free.items():
@@ -143,7 +149,7 @@ def _claimed_rows(tables: _Tables, rows: Mapping[int, range]) -> tuple[Words, Wo
             if wanted.start < free.start or wanted.stop > free.stop:
                 return None
             first[slot], limits[slot] = wanted.start, wanted.stop
-    return np.array(first, np.uint64), np.array(limits, np.uint64)
+    return first, limits
 
 
 def _tables(bindings: Mapping[int, Binding]) -> _Tables:

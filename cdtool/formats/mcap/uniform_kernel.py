@@ -41,6 +41,8 @@ COUNTED, FIXED, TAGGED, TEXT = range(4)
 # contains it, and shifts of that word up and down. In messages with tokens, all are float64, in an array of values.
 ADDRESS, STRIDE, BYTE, COUNT, KIND, WORD, UP, DOWN, NUMBER = range(9)
 DOUBLE, SINGLE, SIGNED_INTEGER, UNSIGNED_INTEGER, TRUTH = range(5)
+# The rows of `progress`, with a column per channel.
+ROW, LIMIT, LATEST = range(3)
 # Size of a record's prefix, and of the header in a message's content [bytes].
 PREFIX, _HEADER = 9, 22
 # Positions of log time and publish time in a message's content [bytes].
@@ -104,8 +106,8 @@ def _copy_others(data: ByteArray, begin: np.uint64, first: int, last: int, numbe
 @kernel(
     f"UniTuple(int64, 2)({_BYTES}, int64, int64, "
     "Array(int64, 1, 'C', readonly=True), Array(int64, 2, 'C', readonly=True), "
-    f"{_TABLE}, {_TABLE}, {_TABLE}, {_ROWS}, {_TABLE}, {_TOKENS}, {_TOKENS}, {_BYTES}, {_ROWS}, int64, {_TABLE}, "
-    "float64[::1], int64[:, ::1], uint64[::1], uint64[::1], uint64[::1])"
+    f"{_TABLE}, {_TABLE}, {_TABLE}, {_ROWS}, {_TABLE}, {_TOKENS}, {_TOKENS}, {_BYTES}, {_ROWS}, "
+    "float64[::1], int64[:, ::1], int64, uint64[:, ::1], uint64[::1])"
 )
 def take_messages(
     data: ByteArray,
@@ -122,22 +124,21 @@ def take_messages(
     texts: IntArray,
     literals: ByteArray,
     powers: _Words,
-    time: int,
-    limits: _Words,
     values: _Floats,
     levels: IntArray,
-    rows: _Words,
-    latest: _Words,
+    time: int,
+    progress: _Words,
     times: _Words,
 ) -> tuple[int, int]:
     """Read the messages of the bytes [at, end) of `data`; return the byte where that ends, and the reason.
 
     `slots[channel]` is the channel's row of `bounds` (m, BOUNDS), or -1 for an unknown channel. The numbers (k, NUMBER)
-    of the next message are written to row `rows[slot]` of their columns, and its time to that row of the column at the
-    address `stamps[slot]`; rows from `limits[slot]` are not written. `tags` and `texts` are the tokens of protobuf and
-    JSON, which refer to `literals`. `time` selects the time of the record. `values` and `levels` are overwritten.
-    Outputs: `rows` (m,) are increased; `latest` (m,) is the time of the last message, or NO_DATE after a backward step
-    or an invalid time; `times` (3,) are the earliest, latest and first log time of all messages.
+    of the next message are written to row `progress[ROW, slot]` of their columns, and its time to that row of the
+    column at the address `stamps[slot]`; rows from `progress[LIMIT, slot]` are not written. `tags` and `texts` are the
+    tokens of protobuf and JSON, which refer to `literals`. `values` and `levels` are overwritten by messages with
+    tokens. `time` selects the time of the record. Outputs: rows in `progress` are increased; `progress[LATEST, slot]`
+    is the time of the last message, or NO_DATE after a backward step or an invalid time; `times` (3,) are the earliest,
+    latest and first log time of all messages.
     """
     # Unsigned, so that the compiled code does not test indices for negative values.
     eight, low, no_date = np.uint64(8), np.uint64(0xFFFFFFFF), np.uint64(NO_DATE)
@@ -159,11 +160,11 @@ def take_messages(
             return at, OTHER
         slot = np.uint64(slots[channel])
         begin = body + np.uint64(_HEADER)
-        row = rows[slot]
+        row = progress[ROW, slot]
         form = bounds[slot, FORM]
         if form != COUNTED:
             length = np.int64(size) - _HEADER
-            if row >= limits[slot]:
+            if row >= progress[LIMIT, slot]:
                 return at, OTHER
             stamp = load(data, body + np.uint64(time))
             first, others, last = bounds[slot, NUMBERS], bounds[slot, OTHERS], bounds[slot, NUMBERS_END]
@@ -196,8 +197,8 @@ def take_messages(
                     stamp = np.uint64(np.int64(whole) * _SECOND + np.int64(rest))
                 _copy_doubles(copied, np.uint64(0), first, last, numbers, row)
             store(stamps[slot] + row * eight, stamp)
-            latest[slot] = min(stamp, no_date) if stamp >= latest[slot] else no_date
-        rows[slot] = row + np.uint64(1)
+            progress[LATEST, slot] = min(stamp, no_date) if stamp >= progress[LATEST, slot] else no_date
+        progress[ROW, slot] = row + np.uint64(1)
         logged = load(data, body + np.uint64(LOG_TIME))
         if times[0] > times[1]:
             times[2] = logged

@@ -47,7 +47,6 @@ class SequentialLocator:
 
     schema: Schema
     header: int
-    _programs: dict[tuple[MemberPath, ...], Program] = field(default_factory=dict)
     _layouts: dict[tuple[MemberPath, ...], UniformLayout | None] = field(default_factory=dict)
 
     def locate(self, batch: Batch, paths: tuple[MemberPath, ...]) -> MemberLocations:
@@ -83,9 +82,7 @@ class SequentialLocator:
         return replace(locations, status=(locations.status != 0).astype(np.uint8), reason=reason)
 
     def _program(self, paths: tuple[MemberPath, ...]) -> Program:
-        if paths not in self._programs:
-            self._programs[paths] = compile_program(self.schema, paths, self.header > 0)
-        return self._programs[paths]
+        return compile_program(self.schema, paths, self.header > 0)
 
 
 def ros1_decoder(schema: Schema) -> SchemaDecoder:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from cdtool.messages.columns.decoded_batch import IntArray, UndecodableError
 from cdtool.messages.columns.member_locations import MemberPath
 from cdtool.messages.layouts.layout import Layout, Member, Message, Number, Schema, Text
 
+_KEPT = 32  # programs
 _LONGEST_PROGRAM = 20_000
 _LARGEST_MESSAGE = 2**40
 _LARGEST_ELEMENT = 2**24
@@ -28,10 +30,12 @@ class Program:
     members: dict[MemberPath, tuple[int, Number | None]]
 
 
-def compile_program(schema: Schema, paths: Sequence[MemberPath], aligned: bool) -> Program:
+@lru_cache(_KEPT)
+def compile_program(schema: Schema, paths: tuple[MemberPath, ...], aligned: bool) -> Program:
     """Return the program that locates the members `paths` in a message of `schema`; raises UndecodableError.
 
-    `aligned` is True for CDR, in which a message without members takes one byte; in ROS 1 it takes none.
+    `aligned` is True for CDR, in which a message without members takes one byte; in ROS 1 it takes none. The last
+    programs are kept for logs with the same schemas.
     """
     compiler = _Compiler(schema, aligned)
     wants: list[_Want] = []

@@ -105,7 +105,7 @@ class Layout:
         return next((member for member in self.members if member.name == name), None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Schema:
     """All layouts of a schema by name, and the layout of the message itself."""
 

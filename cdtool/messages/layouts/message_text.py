@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from cdtool.messages.layouts.layout import Array, Layout, Member, Message, Number, Schema, SchemaError, Text
 
@@ -20,8 +21,12 @@ _TYPE = re.compile(
 
 Kind = Number | Text | Message
 
+# The schemas of so many definitions are kept, if they are not longer than this [bytes]: all logs of a robot have the
+# same ones.
+_KEPT, _LONGEST_KEPT = 64, 1 << 16
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Dialect:
     """The differences between ROS 1 and ROS 2: the primitive types and the layouts that need no definition."""
 
@@ -31,6 +36,10 @@ class Dialect:
 
 def parse_definitions(name: str, data: bytes, dialect: Dialect) -> Schema:
     """Return the layouts of a definition text; raises SchemaError."""
+    return (_parse_and_keep if len(data) <= _LONGEST_KEPT else _parse)(name, data, dialect)
+
+
+def _parse(name: str, data: bytes, dialect: Dialect) -> Schema:
     try:
         text = data.decode()
     except UnicodeDecodeError as fault:
@@ -41,6 +50,9 @@ def parse_definitions(name: str, data: bytes, dialect: Dialect) -> Schema:
     layouts = known | {title: _layout(title, body, names, dialect) for title, body in sections.items()}
     _check_nesting(short_name(name), layouts)
     return Schema(layouts[short_name(name)], layouts)
+
+
+_parse_and_keep = lru_cache(_KEPT)(_parse)
 
 
 def short_name(name: str) -> str:

@@ -7,9 +7,6 @@ again one by one, and damage is reported then.
 
 from __future__ import annotations
 
-import mmap
-import sys
-import weakref
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -18,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -27,17 +24,18 @@ from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, ChunkHeader, Dec
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
-from cdtool.formats.mcap.container.records import PREFIX, ChunkIndex
+from cdtool.formats.mcap.container.records import PREFIX, Chunk, ChunkIndex
+from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.fast_path import ChunkReader, ChunkRows
+from cdtool.messages.large_pages import Buffers
 
-_LARGE_PAGE = 2 << 20
-_MOST_FREE = 3
 # The size of a group [bytes] (writers make chunks of slightly more than one MiB). Larger groups exceed the processor's
 # cache; with smaller ones the effort per group dominates.
 JOINED = 14 << 20
-_LARGEST = 16 << 20  # chunks beyond this size are read one by one
+# Chunks beyond this size are read one by one, and so are those whose record and message indexes are longer.
+_LARGEST, _LONGEST = 16 << 20, 32 << 20
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4
 _SUBMITTED = 3  # chunks per task of a thread: submitting a task costs as much as a tenth of a chunk
@@ -45,53 +43,20 @@ _SUBMITTED = 3  # chunks per task of a thread: submitting a task costs as much a
 _BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
 
 
-class Buffers:
-    """Memory for decompressed chunks, in large pages; it is reused when nothing refers to it.
+# The first use of memory costs as much time as decompressing into it. Messages are far apart, and a page of 4 KiB
+# contains few of them: with small pages, address translation needs a quarter of the time of decompressing and half of
+# the time of gathering.
+BUFFERS = Buffers(JOINED, kept=3)
 
-    Arrays have `size` bytes, a multiple of a large page; larger ones are allocated separately. Messages are far apart,
-    and a page of 4 KiB contains few of them: with small pages, address translation needs a quarter of the time of
-    decompressing and half of the time of gathering.
+
+class CheckedChunk(NamedTuple):
+    """A checked chunk: its header, and either its messages, if the fast path has read them, or its address.
+
+    `end` is the byte after its record, or after its message indexes if nothing else is before the next chunk.
     """
 
-    def __init__(self, size: int) -> None:
-        self.size = size
-        self._free: list[mmap.mmap] = []
-
-    def take(self, size: int) -> Bytes:
-        """Return an uninitialised array of at least `size` bytes."""
-        if size > self.size:
-            return np.empty(size, np.uint8)
-        memory = self._free.pop() if self._free else _large_pages(self.size)
-        whole: Bytes = np.frombuffer(memory, np.uint8)
-        # Every view refers to `whole`, which therefore exists as long as any of them.
-        weakref.finalize(whole, self._give_back, memory)
-        start = -whole.ctypes.data % _LARGE_PAGE
-        return whole[start : start + self.size]
-
-    def _give_back(self, memory: mmap.mmap) -> None:
-        if len(self._free) < _MOST_FREE:
-            self._free.append(memory)
-
-
-def _large_pages(size: int) -> mmap.mmap:
-    if sys.platform == "win32":
-        return mmap.mmap(-1, size + _LARGE_PAGE)
-    # Private: without it, forked workers would write into the same memory as this process and each other.
-    memory = mmap.mmap(-1, size + _LARGE_PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    if hasattr(mmap, "MADV_HUGEPAGE"):  # Linux
-        memory.madvise(mmap.MADV_HUGEPAGE)
-    return memory
-
-
-# The first use of memory costs as much time as decompressing into it: buffers are kept for the next logs.
-_BUFFERS = Buffers(JOINED)
-
-
-@dataclass(frozen=True)
-class _CheckedChunk:
-    """A checked chunk: its header, and either its messages, if the fast path has read them, or its address."""
-
     header: ChunkHeader
+    end: int
     address: int = 0
     taken: ChunkRows | None = None
 
@@ -116,7 +81,7 @@ class _Group:
     """Memory for a group of chunks, and the future result of each; None if the chunk must be read again."""
 
     memory: Bytes
-    chunks: tuple[Future[list[_CheckedChunk | None]], ...]
+    chunks: tuple[Future[list[CheckedChunk | None]], ...]
 
 
 class ChunkReadAhead:
@@ -139,8 +104,9 @@ class ChunkReadAhead:
         threads = min(usable_cores(), _MOST_THREADS, len(chunks))
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
         self._following = dict(pairwise(self._groups))
+        self._next_chunk = dict(pairwise(sorted(summary.chunks)))
         self._started: dict[int, _Group] = {}
-        self._checked: dict[ChunkHeader, _CheckedChunk] = {}
+        self._checked: dict[int, CheckedChunk] = {}
         self._threads = ThreadPoolExecutor(threads, "chunks") if threads > 1 else None
         self._readers: SimpleQueue[_Reader] = SimpleQueue()
 
@@ -159,11 +125,9 @@ class ChunkReadAhead:
         """Return whether the chunk at byte `at` is the first of a group, which has its own memory."""
         return at in self._groups
 
-    def memory(self, at: int, size: int) -> Bytes:
-        """Return memory of at least `size` bytes for the chunk at byte `at`; for the first of a group, the group's."""
+    def group(self, at: int) -> Bytes | None:
+        """Return the memory of the group that begins at byte `at`; None if one of its chunks must be read again."""
         self._checked = {}
-        if at not in self._groups:
-            return _BUFFERS.take(size)
         for earlier in [start for start in self._started if start < at]:
             del self._started[earlier]
         following: int | None = at
@@ -175,24 +139,21 @@ class ChunkReadAhead:
             following = self._following.get(following) if following is not None else None
         group = self._started.pop(at)
         chunks = [chunk for future in group.chunks for chunk in future.result()]
-        if not all(chunks) or len(group.memory) < size:
-            return _BUFFERS.take(size)
-        self._checked = {chunk.header: chunk for chunk in chunks if chunk is not None}
+        if not all(chunks):
+            return None
+        self._checked = {chunk.header.at: chunk for chunk in chunks if chunk is not None}
         return group.memory
 
-    def has_filled(self, header: ChunkHeader, content: Bytes) -> bool:
-        """Return whether `content` is the checked chunk with this header."""
-        chunk = self._checked.get(header)
-        return chunk is not None and chunk.address == content.ctypes.data
-
-    def taken(self, header: ChunkHeader) -> ChunkRows | None:
-        """Return the messages of the chunk with this header; None if the fast path has not read them."""
-        chunk = self._checked.get(header)
-        return None if chunk is None or self._definitions.ambiguous else chunk.taken
+    def checked(self, at: int) -> CheckedChunk | None:
+        """Return the chunk at byte `at` of the current group; None if it must be read."""
+        chunk = self._checked.get(at)
+        if chunk is not None and chunk.taken is not None and self._definitions.ambiguous:
+            return None
+        return chunk
 
     def _start(self, chunks: list[ChunkIndex]) -> _Group:
         assert self._threads is not None
-        memory = _BUFFERS.take(sum(index.uncompressed_size for index in chunks))
+        memory = BUFFERS.take(sum(index.uncompressed_size for index in chunks))
         targets, end = [], 0
         for index in chunks:
             start, end = end, end + index.uncompressed_size
@@ -200,33 +161,51 @@ class ChunkReadAhead:
         tasks = [targets[i : i + _SUBMITTED] for i in range(0, len(targets), _SUBMITTED)]
         return _Group(memory, tuple(self._threads.submit(self._fill_all, task) for task in tasks))
 
-    def _fill_all(self, targets: list[tuple[ChunkIndex, Bytes]]) -> list[_CheckedChunk | None]:
-        return [self._fill(index, content) for index, content in targets]
-
-    def _fill(self, index: ChunkIndex, content: Bytes) -> _CheckedChunk | None:
-        at = index.chunk_start_offset
+    def _fill_all(self, targets: list[tuple[ChunkIndex, Bytes]]) -> list[CheckedChunk | None]:
         try:
             reader = self._reader()
         except OSError:
-            return None
+            return [None] * len(targets)
         try:
-            header = chunk_header(at, reader.file.read(at, HEADER_LENGTH))
-            if header is None or not header.uncompressed_crc or not matches_header(index, header):
-                return None
-            header.check()
-            if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
-                reader.decompressor.read(reader.file, header, content)
-                return _CheckedChunk(header, content.ctypes.data)
-            checked = reader.decompressor.content(reader.file, header, reader.buffer(len(content)))
-            taken = self._chunk_reader.read(checked, self._rows[at], self._is_known)
-            if taken is not None:
-                return _CheckedChunk(header, taken=taken)
-            content[:] = checked
-            return _CheckedChunk(header, content.ctypes.data)
-        except (DamageError, OSError):
-            return None
+            return [self._fill(reader, index, content) for index, content in targets]
         finally:
             self._readers.put(reader)
+
+    def _fill(self, reader: _Reader, index: ChunkIndex, content: Bytes) -> CheckedChunk | None:
+        at, length = index.chunk_start_offset, index.chunk_length + self._indexes_length(index)
+        if length > min(_LONGEST, reader.file.size - at):
+            return None
+        try:
+            record = reader.file.read_scratch(at, length)
+            header = chunk_header(at, record[:HEADER_LENGTH].data)
+            if header is None or record[0] != Chunk.opcode or not header.uncompressed_crc:
+                return None
+            if not matches_header(index, header):
+                return None
+            header.check()
+            packed = record[header.data - at : header.data - at + header.size]
+            end = at + (length if _only_indexes(record.data, header.length) else header.length)
+            if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
+                reader.decompressor.fill(header, packed, content)
+                return CheckedChunk(header, end, content.ctypes.data)
+            target = reader.buffer(len(content)) if header.compression else packed
+            reader.decompressor.fill(header, packed, target)
+            taken = self._chunk_reader.read(target, self._rows[at], self._is_known)
+            if taken is not None:
+                return CheckedChunk(header, end, taken=taken)
+            content[:] = target
+            return CheckedChunk(header, end, content.ctypes.data)
+        except (DamageError, OSError):
+            return None
+
+    def _indexes_length(self, index: ChunkIndex) -> int:
+        """Return the length of the bytes after a chunk if only its message indexes should be there; otherwise 0.
+
+        An entry is smaller than its message: a longer index is not read at once.
+        """
+        end, length = index.chunk_start_offset + index.chunk_length, index.message_index_length
+        is_usual = length <= index.uncompressed_size and self._next_chunk.get(index.chunk_start_offset) == end + length
+        return length if is_usual else 0
 
     def _is_known(self, opcode: int, body: bytes) -> bool:
         return self._definitions.is_known(opcode, body, covered=True)
@@ -236,6 +215,10 @@ class ChunkReadAhead:
             return self._readers.get_nowait()
         except Empty:
             return _Reader(self._path)
+
+
+def _only_indexes(record: memoryview, at: int) -> bool:
+    return only_message_indexes(lambda start, length: record[start : start + length], at, len(record))
 
 
 def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:

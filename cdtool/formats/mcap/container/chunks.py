@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from cdtool.formats.mcap.container.damage import DamageError, RefusedError
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX
 from cdtool.formats.mcap.container.walk_kernel import Bytes
+from cdtool.lz4_kernel import NOT_DECODED, decode_frame
 
 # The largest size of a record, compressed or not [bytes]: writers make chunks of 1 to 8 MB.
 LARGEST = 128 << 20
@@ -33,8 +34,7 @@ _FIXED = struct.Struct("<BQQQQII")  # opcode, content length, three sizes, CRC, 
 _KNOWN = ("", "zstd", "lz4")
 
 
-@dataclass(frozen=True)
-class ChunkHeader:
+class ChunkHeader(NamedTuple):
     """The fields before a chunk's data: `length` is the record's, `data` and `size` locate the compressed data."""
 
     at: int
@@ -105,7 +105,6 @@ class Decompressor:
 
     def __init__(self) -> None:
         self._functions: dict[str, Callable[[Bytes, Bytes], int]] = {}
-        self._lz4_frame = _Lz4Frame()
 
     def read(self, file: FileBytes, header: ChunkHeader, target: Bytes) -> None:
         """Read a complete chunk from the file into `target` (uncompressed_size,) and check it; raises DamageError."""
@@ -115,22 +114,19 @@ class Decompressor:
             file.read_into(header.data, target)
             check_crc(header, target)
 
-    def content(self, file: FileBytes, header: ChunkHeader, buffer: Bytes) -> Bytes:
-        """Return a complete chunk as `read` does: in `buffer`, or read-only in memory of the decompressor's."""
-        if header.compression == "lz4":
-            packed = file.read_scratch(header.data, header.size)
-            content = self._lz4_frame.decompress(packed, header.uncompressed_size)
-            if content is not None:
-                check_crc(header, content)
-                return content
-        self.read(file, header, buffer)
-        return buffer
-
     def fill(self, header: ChunkHeader, packed: Bytes, target: Bytes) -> None:
-        """Decompress a complete chunk into `target` (uncompressed_size,) and check it; raises DamageError."""
-        size = self.fill_available(header, packed, target)
-        if size != len(target):
-            raise DamageError(f"a chunk of {size} bytes declares {len(target)}")
+        """Decompress a complete chunk into `target` (uncompressed_size,) and check it; raises DamageError.
+
+        A chunk that is not compressed may already be in `target`.
+        """
+        if header.compression == "lz4" and _decode_lz4(header, packed, target):
+            return
+        if header.compression:
+            size = self.fill_available(header, packed, target)
+            if size != len(target):
+                raise DamageError(f"a chunk of {size} bytes declares {len(target)}")
+        elif packed is not target:
+            target[:] = packed
         check_crc(header, target)
 
     def fill_available(self, header: ChunkHeader, packed: Bytes, target: Bytes) -> int:
@@ -146,27 +142,11 @@ def check_crc(header: ChunkHeader, content: Bytes) -> None:
         raise DamageError("the checksum of a chunk does not match")
 
 
-class _Lz4Frame:
-    """Decompresses single frames at once, without a copy of input and output."""
-
-    def __init__(self) -> None:
-        self._context: Any = None  # of frames that were complete: it keeps its memory for the next one
-
-    def decompress(self, packed: Bytes, size: int) -> Bytes | None:
-        """Return the content of a frame of `size` bytes; None if it is not one intact frame of that size."""
-        if size > _LZ4_OUT:
-            return None
-        import lz4.frame  # type: ignore[import-untyped]
-
-        context, self._context = self._context or lz4.frame.create_decompression_context(), None
-        try:
-            content, used, complete = lz4.frame.decompress_chunk(context, packed, max_length=size + 1)
-        except RuntimeError:
-            return None
-        if not complete or used != len(packed) or len(content) != size:
-            return None
-        self._context = context
-        return np.frombuffer(content, np.uint8)
+def _decode_lz4(header: ChunkHeader, packed: Bytes, target: Bytes) -> bool:
+    """Decompress a chunk that is intact; False if its CRC does not show that, so that lz4 finds out what is wrong."""
+    if not header.uncompressed_crc or decode_frame(packed, target) == NOT_DECODED:
+        return False
+    return crc32(target) == header.uncompressed_crc
 
 
 def _zstd() -> Callable[[Bytes, Bytes], int]:
@@ -192,7 +172,7 @@ def _zstd() -> Callable[[Bytes, Bytes], int]:
 
 
 def _lz4() -> Callable[[Bytes, Bytes], int]:
-    import lz4.frame
+    import lz4.frame  # type: ignore[import-untyped]
 
     def decompress(packed: Bytes, target: Bytes) -> int:
         filled, left = 0, packed.data

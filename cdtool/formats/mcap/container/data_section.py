@@ -16,7 +16,7 @@ import numpy as np
 from cdtool.formats.mcap.container import walk_kernel
 from cdtool.formats.mcap.container.arena import Arena, MessageBlock, WalkResult
 from cdtool.formats.mcap.container.attachments import check_attachment
-from cdtool.formats.mcap.container.chunk_read_ahead import ChunkReadAhead
+from cdtool.formats.mcap.container.chunk_read_ahead import BUFFERS, CheckedChunk, ChunkReadAhead
 from cdtool.formats.mcap.container.chunks import (
     HEADER_LENGTH,
     LARGEST,
@@ -100,7 +100,7 @@ class DataSection:
             self.losses.add(Loss(0, min(at, self._file.size), "the file does not start like an MCAP file"))
             self.losses.stopped = self._file.size <= at
         while not self.losses.stopped and self.end is None:
-            self.end_at = at
+            self.end_at = at = yield from self._checked_chunks(at)
             head = self._file.read(at, HEADER_LENGTH)
             try:
                 if not len(head):
@@ -140,7 +140,21 @@ class DataSection:
         self.losses.add(Loss(begin, end - begin, reason))
         return end
 
-    def _chunk(self, header: ChunkHeader) -> Iterator[MessageBlock]:
+    def _checked_chunks(self, at: int) -> Generator[MessageBlock, None, int]:
+        """Yield the messages of chunks that were read ahead, from byte `at` on, and return the byte after them."""
+        while True:
+            if self._ahead.begins(at):
+                yield from self.arena.flush()  # first, because the next group's fast path may learn from these messages
+                memory = self._ahead.group(at)
+                if memory is not None:
+                    self.arena.reset(memory, covered=True)
+            checked = self._ahead.checked(at)
+            if checked is None:
+                return at
+            yield from self._chunk(checked.header, checked)
+            at = checked.end if self._lost is None else at + checked.header.length
+
+    def _chunk(self, header: ChunkHeader, checked: CheckedChunk | None = None) -> Iterator[MessageBlock]:
         self._lost = None
         self.chunks[header.at] = header
         if header.at in self._skip:
@@ -151,12 +165,12 @@ class DataSection:
         try:
             header.check()
             self._claims.add(header)
-            if self._ahead.begins(header.at) or not self.arena.fits(header.uncompressed_size, covered):
-                yield from self.arena.flush()  # first, because the next group's fast path may learn from these messages
-                self.arena.reset(self._ahead.memory(header.at, header.uncompressed_size), covered)
+            if not self.arena.fits(header.uncompressed_size, covered):
+                yield from self.arena.flush()
+                self.arena.reset(BUFFERS.take(header.uncompressed_size), covered)
             content = self.arena.reserve(header.uncompressed_size)
-            taken = self._ahead.taken(header)
-            if taken is None and not self._ahead.has_filled(header, content):
+            taken = None if checked is None else checked.taken
+            if taken is None and (checked is None or checked.address != content.ctypes.data):
                 self._decompressor.read(self._file, header, content)
         except DamageError as fault:
             loss = Loss.of_chunk(header, self._summary, str(fault), refused=isinstance(fault, RefusedError))
@@ -181,7 +195,7 @@ class DataSection:
         end, index = header.at + header.length, self._summary.chunks.get(header.at)
         if self._lost is None and index is not None and self._summary.verified and matches_header(index, header):
             following = self._following.get(header.at)
-            if following == end + index.message_index_length and only_message_indexes(self._file, end, following):
+            if following == end + index.message_index_length and only_message_indexes(self._file.read, end, following):
                 return following
         return end
 
@@ -196,7 +210,7 @@ class DataSection:
         self.losses.stopped = True
         self.losses.add(loss)
         yield from self.arena.flush()
-        self.arena.reset(self._ahead.memory(header.at, header.uncompressed_size), covered=False)
+        self.arena.reset(BUFFERS.take(header.uncompressed_size), covered=False)
         content = self.arena.reserve(header.uncompressed_size)
         packed = self._file.read_scratch(header.data, left)
         if header.compression:

@@ -44,10 +44,13 @@ def skippable_chunks(file: FileBytes, summary: Summary, wanted: Callable[[str], 
     return {at: indexed[at] for at in unwanted} if dict(total) == stated else {}
 
 
-def only_message_indexes(file: FileBytes, at: int, end: int) -> bool:
-    """Return whether the bytes from `at` to `end` are only message indexes, and no chunk that the summary omits."""
+def only_message_indexes(read: Callable[[int, int], memoryview], at: int, end: int) -> bool:
+    """Return whether the bytes from `at` to `end` are only message indexes, and no chunk that the summary omits.
+
+    `read` returns bytes by position and length.
+    """
     while at < end:
-        head = file.read(at, PREFIX)
+        head = read(at, PREFIX)
         if len(head) < PREFIX or head[0] != MessageIndex.opcode:
             return False
         at += PREFIX + int.from_bytes(head[1:], "little")
