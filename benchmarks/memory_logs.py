@@ -1,6 +1,7 @@
 """The long logs for measuring memory: a gate's joint and sensors at 1 kHz with a camera, which fills the rest.
 
-The samples are those of a recording of the simulated gate, repeated; the images are noise, which cannot be compressed.
+The samples are those of a recording of the simulated gate, repeated from where it ended, as a position that leapt back
+would be damage; the images are noise, which cannot be compressed.
 `mcap` writes them in its usual chunks of 1 MiB.
 """
 
@@ -51,6 +52,7 @@ def write_log(path: Path, run: Recording, seconds: float, size: float, compressi
     """Write so many seconds at 1 kHz, `size` bytes in all; of the run's channels in motor units."""
     samples = {name: run[name].values[:, 0].tolist() for _, names in TOPICS.values() for name in names}
     length = min(len(values) for values in samples.values())
+    travel = samples["position"][length - 1] - samples["position"][0]
     noise = np.random.default_rng(0).bytes(1 << 20)
     count = round(seconds * SECOND_NS / STEP_NS)
     with path.open("wb") as file:
@@ -63,7 +65,8 @@ def write_log(path: Path, run: Recording, seconds: float, size: float, compressi
         written = pending = 0  # bytes in the file, and of images that wait in a chunk
         for i in range(count):
             stamp, k = START_NS + i * STEP_NS, i % length
-            joint = _joint_state(stamp, *(samples[name][k] for name in TOPICS[JOINT][1]))
+            position = samples["position"][k] + i // length * travel
+            joint = _joint_state(stamp, position, samples["speed"][k], samples["torque"][k])
             writer.add_message(channels[JOINT], stamp, joint, stamp, i)
             for topic, (_, (name, *_)) in sensors:
                 value = struct.pack("<4sd", b"\0\1\0\0", samples[name][k])
