@@ -70,6 +70,15 @@ def _short_hash(data: Bytes, at: np.uint64, size: np.uint64) -> np.uint64:
     return value ^ (value >> np.uint64(16))
 
 
+@kernel(f"uint64({_BYTES}, uint64, uint64)", inline=True)
+def _end_of_length(packed: Bytes, at: np.uint64, end: np.uint64) -> np.uint64:
+    """Return the byte after the further bytes of a length: all of them 255 but the last; 0 if they do not end."""
+    one, every = np.uint64(1), np.uint64(255)
+    while at < end and np.uint64(packed[at]) == every:
+        at += one
+    return at + one if at < end else np.uint64(0)
+
+
 @kernel(f"int64({_BYTES}, uint64, uint64, uint8[::1], uint64, uint64, uint64)")
 def _decode_block(
     packed: Bytes,
@@ -93,13 +102,11 @@ def _decode_block(
         at += one
         count = token >> four
         if count == fifteen:
-            more = every
-            while more == every:
-                if at >= end:
-                    return NOT_DECODED
-                more = np.uint64(packed[at])
-                at += one
-                count += more
+            more = at
+            at = _end_of_length(packed, at, end)
+            if not at:
+                return NOT_DECODED
+            count += every * (at - more - one) + np.uint64(packed[at - one])
         if at + count + margin <= end and filled + count + margin <= most:
             copy_block(memory + filled, packed, at)
             done = block
@@ -135,13 +142,11 @@ def _decode_block(
         if not offset or offset > filled - first:
             return NOT_DECODED
         if count == np.uint64(19):
-            more = every
-            while more == every:
-                if at >= end:
-                    return NOT_DECODED
-                more = np.uint64(packed[at])
-                at += one
-                count += more
+            more = at
+            at = _end_of_length(packed, at, end)
+            if not at:
+                return NOT_DECODED
+            count += every * (at - more - one) + np.uint64(packed[at - one])
         if count > most - filled:
             return NOT_DECODED
         source = filled - offset

@@ -44,9 +44,10 @@ COMMANDS: Mapping[str, str] = {
 }
 """Every command in the order of the help: the function that defines its options, or the app with its subcommands."""
 
-# In typer's default mode the help drops text in brackets, such as units.
 # The logger on which `cdtool.kernel_cache` reports that it compiles.
 _LOGGER = logging.getLogger("cdtool.kernel_cache")
+
+# In typer's default mode the help drops text in brackets, such as units.
 _LOOK: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": "markdown"}
 
 

@@ -140,9 +140,8 @@ class CoupledMachine(JointMachine, ABC):
         self, torque: FloatArray, position: FloatArray, speed: FloatArray, acceleration: FloatArray
     ) -> list[JointEquation]:
         """M_jj a_j = tau_j - (C v + g)_j - sum over the others M_ji a_i - d v_j: the other joints are measured."""
-        own = np.zeros_like(speed)
         diagonal = self.inertia_diagonal(position)
-        known = self._balance(torque, position, speed, own, acceleration) + diagonal * acceleration
+        known = self._balance(torque, position, speed, np.zeros_like(speed), acceleration) + diagonal * acceleration
         rows = zip(np.ascontiguousarray(diagonal.T), np.ascontiguousarray(known.T), strict=True)
         return [
             JointEquation(inertia, own, self.viscous_friction[j] / self.transmission_ratio[j] ** 2)
