@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import logging
+import os
 import signal
 import sys
 import threading
@@ -208,6 +209,9 @@ def _run_app(came: list[int]) -> Any:
 
 def _main(came: list[int]) -> None:
     open_standard_streams()
+    # NumPy starts a thread of linear algebra per core: a sixth of the CPU time of a short command. The matrices here
+    # are small, and jobs are processes.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Imported modules stay alive: collecting garbage among them takes a tenth of a short command's time, and as much
     # again when Python ends.
     gc.set_threshold(50_000, 10, 10)
