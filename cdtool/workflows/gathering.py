@@ -1,9 +1,10 @@
-"""Gather the rows of many logs, for detectors and for external alarms."""
+"""Score many logs, with detectors or by external alarms, and gather their rows."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from cdtool.errors import ConfigurationError, RecordingError
@@ -19,6 +20,38 @@ from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, OperationOutcome, WantedTraces
 from cdtool.workflows.contacts.impact_free import unchecked
+from cdtool.workflows.workers import Progress, in_order
+
+# The name of its group and the path of each log.
+Logs = Sequence[tuple[str, Path]]
+# Returns the outcome of the log of a group.
+ScoreLog = Callable[[str, Path, WantedTraces], LogOutcome]
+
+# A process receives several logs at once: sending one costs as much as a twentieth of scoring it. At the beginning and
+# the end they are few, so that no process waits for the others.
+_MOST_TOGETHER = 8
+_SHARES = 4  # of what is left, per process
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Consecutive logs from number `first` on, and the choice of traces as far as it is known."""
+
+    first: int
+    logs: Logs
+    choice: TraceChoice
+
+
+@dataclass(frozen=True)
+class _PieceScoring:
+    """Scores the logs of a piece one after the other."""
+
+    score: ScoreLog
+
+    def __call__(self, piece: _Piece) -> list[LogOutcome]:
+        choice = piece.choice
+        numbered = enumerate(piece.logs, piece.first)
+        return [self.score(group, path, WantedTraces(log, choice)) for log, (group, path) in numbered]
 
 
 class Gathering:
@@ -48,17 +81,32 @@ class Gathering:
         self._scored: dict[str, str] = {}
         self._unchecked: list[tuple[str, Finding]] = []
         self._traces: dict[int, Trace] = {}
-        self._logs = 0
         self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
+        # Time that all logs took [s].
+        self.reading = self.detecting = 0.0
 
-    def wanted(self, log: int) -> WantedTraces:
-        """Return which traces of log number `log` are wanted as far as is known now: no fewer than at its turn."""
-        return WantedTraces(log, self._choice.copy())
+    def score(self, score: ScoreLog, logs: Logs, jobs: int = 1, progress: Progress | None = None) -> None:
+        """Score the logs in `jobs` processes, and add their rows.
 
-    def add(self, group: str, outcome: LogOutcome) -> None:
-        """Add one log's rows; raises ConfigurationError if the same log, under any name, was learned from."""
-        log = self._logs
-        self._logs += 1
+        Raises ConfigurationError if the same log, under any name, was learned from or given twice.
+        """
+        sizes = list(_sizes(len(logs), jobs))
+        pieces = in_order(_PieceScoring(score), self._pieces(logs, sizes), len(sizes), jobs)
+        for log, outcome in enumerate(outcome for piece in pieces for outcome in piece):
+            self._add(log, logs[log][0], outcome)
+            if progress:
+                progress(log + 1, len(logs))
+
+    def _pieces(self, logs: Logs, sizes: Sequence[int]) -> Iterator[_Piece]:
+        first = 0
+        for size in sizes:
+            # Known now: more traces are made than are kept at the logs' turn, never fewer.
+            yield _Piece(first, logs[first : first + size], self._choice.copy())
+            first += size
+
+    def _add(self, log: int, group: str, outcome: LogOutcome) -> None:
+        self.reading += outcome.reading
+        self.detecting += outcome.detecting
         self.skipped += outcome.skipped
         self.findings += outcome.findings
         self._unchecked += outcome.unchecked
@@ -68,7 +116,9 @@ class Gathering:
         for operation in outcome.operations:
             for item in operation.detectors:
                 self.units.setdefault(item.detector, item.unit)
-                self._exposure.setdefault((group, item.detector), Exposure()).add(item)
+                if (exposure := self._exposure.get((group, item.detector))) is None:
+                    exposure = self._exposure[group, item.detector] = Exposure()
+                exposure.add(item)
                 self._sweep.add(group, item)
             self._offer(log, group, operation)
         for name in {item.detector for operation in outcome.operations for item in operation.detectors}:
@@ -129,3 +179,12 @@ class Gathering:
                 "which is used for learning",
                 "use a recording either in [learn] or for scoring",
             )
+
+
+def _sizes(count: int, jobs: int) -> Iterator[int]:
+    """Yield the numbers of logs of the pieces in which `count` logs are scored."""
+    done = 0
+    while done < count:
+        size = max(1, min(_MOST_TOGETHER, min(done, count - done) // (_SHARES * jobs))) if jobs > 1 else 1
+        yield size
+        done += size

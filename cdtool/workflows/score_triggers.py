@@ -29,7 +29,7 @@ from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, out
 from cdtool.workflows.benchmark.scoring import Scored, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import shown_path
-from cdtool.workflows.workers import Progress, in_order
+from cdtool.workflows.workers import Progress
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
@@ -107,9 +107,7 @@ def score(
     if listed_only:
         work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
     scoring = _TriggerScoring(setup, said, clock, listed_only)
-    asked = ((group, path, gathered.wanted(log)) for log, (group, path) in enumerate(work))
-    for (group, _), outcome in zip(work, in_order(scoring, asked, len(work), jobs, progress), strict=True):
-        gathered.add(group, outcome)
+    gathered.score(scoring, work, jobs, progress)
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
     return Score(evaluate(results, rules), gathered.traces, (Path(triggers), *setup.inputs))
@@ -124,8 +122,7 @@ class _TriggerScoring:
     clock: str
     listed_only: bool
 
-    def __call__(self, item: tuple[str, Path, WantedTraces]) -> LogOutcome:
-        group, path, wanted = item
+    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> LogOutcome:
         scored = score_log(self.setup, group, path, self._detect, {})
         for name, said in self.said.items():
             scored.skipped += _beside(scored, name, said, self.clock)

@@ -1,5 +1,6 @@
 """Work in several processes: the same results in the same order, errors as in this process, and no process left."""
 
+import gc
 import os
 import pickle
 import signal
@@ -68,6 +69,31 @@ def test_work_is_done_in_other_processes_with_and_without_threads_in_this_one(be
         stop.set()
     assert first == os.getpid(), "it imports and compiles what the others then share"
     assert os.getpid() not in others and 1 <= len(set(others)) <= 2
+
+
+def frozen_objects(_):
+    return gc.get_freeze_count()
+
+
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.skipif(sys.platform != "linux", reason="fork"))])
+def test_objects_made_before_the_work_are_not_searched_for_garbage_during_it(jobs):
+    assert gc.get_freeze_count() == 0
+    assert all(count > 10_000 for count in in_order(frozen_objects, range(6), 6, jobs))
+    assert gc.get_freeze_count() == 0
+    results = in_order(frozen_objects, range(6), 6)
+    next(results)
+    results.close()
+    assert gc.get_freeze_count() == 0
+
+
+def test_objects_that_the_caller_has_left_out_of_garbage_collection_stay_left_out():
+    gc.freeze()
+    try:
+        before = gc.get_freeze_count()
+        assert list(in_order(doubled, range(3), 3)) == [0, 2, 4]
+        assert gc.get_freeze_count() == before
+    finally:
+        gc.unfreeze()
 
 
 def test_items_are_taken_when_their_work_begins_not_all_at_once():

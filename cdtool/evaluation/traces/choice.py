@@ -15,7 +15,8 @@ class TraceChoice:
     """Selection of at most `MOST_KEPT` operations, and one of each group, from operations in order.
 
     `work` is the number of logs. The choice becomes stricter with each operation: one that is not kept when it is
-    offered is not kept later, and one that a choice after fewer operations does not keep is not kept either.
+    offered is not kept later, and one that a choice after only some of these operations does not keep is not kept
+    either.
     """
 
     work: int

@@ -42,7 +42,7 @@ from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import RunReading, load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normal_motions
 from cdtool.workflows.signature.threshold_settings import set_by_hand
-from cdtool.workflows.workers import Progress, in_order
+from cdtool.workflows.workers import Progress
 
 
 @dataclass(frozen=True)
@@ -140,11 +140,8 @@ def benchmark(
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     normals = NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS)
     scoring = _LogScoring(setup, tuple(used), learned.thresholds, learned.unusable, factors, learn.ranges, normals)
-    asked = ((group, path, gathered.wanted(log)) for log, (group, path) in enumerate(work))
-    for (group, _), outcome in zip(work, in_order(scoring, asked, len(work), jobs, progress), strict=True):
-        gathered.add(group, outcome)
-        seconds["reading"] += outcome.reading
-        seconds["detecting"] += outcome.detecting
+    gathered.score(scoring, work, jobs, progress)
+    seconds = {"reading": seconds["reading"] + gathered.reading, "detecting": seconds["detecting"] + gathered.detecting}
     provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))
     provenance["units"] |= gathered.units
     results = gathered.results(provenance, learned.calibration)
@@ -163,8 +160,7 @@ class _LogScoring:
     ranges: PlausibleRanges
     normals: NormalMotions
 
-    def __call__(self, item: tuple[str, Path, WantedTraces]) -> LogOutcome:
-        group, path, wanted = item
+    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> LogOutcome:
         detect = detect_with(self.setup, self.detectors, self.thresholds, self.unusable)
         scored = score_log(self.setup, group, path, detect, self.factors, self.ranges)
         return outcome_of(scored, self.setup, self.normals, wanted)

@@ -31,7 +31,8 @@ class Exposure:
         self.seconds += outcome.seconds
         self.not_assessable += outcome.is_not_assessable
         self.samples += outcome.samples
-        self.by_reason.update(outcome.by_reason)
+        for reason, count in outcome.by_reason.items():  # Counter.update takes three times as long
+            self.by_reason[reason] += count
 
     def result(self, group: str, detector: str) -> ExposureResult:
         """Return the row of results.json."""

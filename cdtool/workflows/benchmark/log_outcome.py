@@ -80,7 +80,10 @@ class LogOutcome:
 
 @dataclass(frozen=True)
 class WantedTraces:
-    """Which traces of log number `log` are wanted: those that are kept after the operations in `choice`."""
+    """Which traces of log number `log` are wanted: those that are kept after the operations in `choice`.
+
+    The operations of the log are then in `choice`, too.
+    """
 
     log: int
     choice: TraceChoice
@@ -88,7 +91,6 @@ class WantedTraces:
 
 def outcome_of(scored: Scored, setup: BenchmarkFile, normals: NormalMotions, wanted: WantedTraces) -> LogOutcome:
     """Return what remains of a scored log; alarms are explained by comparison with `normals`, for wanted traces."""
-    choice = wanted.choice.copy()
     return LogOutcome(
         recording=scored.recording,
         contacts=tuple(scored.contacts),
@@ -98,22 +100,20 @@ def outcome_of(scored: Scored, setup: BenchmarkFile, normals: NormalMotions, wan
         skipped=tuple(scored.skipped),
         findings=tuple(scored.findings),
         unchecked=tuple(scored.unchecked),
-        operations=tuple(_operation(judged, setup, normals, wanted.log, choice) for judged in scored.judged),
+        operations=tuple(_operation(judged, setup, normals, wanted) for judged in scored.judged),
         reading=scored.reading,
         detecting=scored.detecting,
     )
 
 
-def _operation(
-    judged: Judged, setup: BenchmarkFile, normals: NormalMotions, log: int, choice: TraceChoice
-) -> OperationOutcome:
+def _operation(judged: Judged, setup: BenchmarkFile, normals: NormalMotions, wanted: WantedTraces) -> OperationOutcome:
     pairs = list(zip(judged.detections, judged.matchings, strict=True))
     missed = [item.detector for item, made in pairs if any(match.outcome == "missed" for match in made.matches)]
     false = [item.detector for item, made in pairs if made.false_alarms]
     striking = [f"missed by {', '.join(missed)}"] if missed else []
     striking += [f"false alarm of {', '.join(false)}"] if false else []
     slowest = max((match.latency for _, made in pairs for match in made.matches if match.alarm), default=0.0)
-    is_wanted = choice.offer(log, judged.group, len(pairs), "; ".join(striking), slowest) is not None
+    kept = wanted.choice.offer(wanted.log, judged.group, len(pairs), "; ".join(striking), slowest)
     return OperationOutcome(
         tuple(
             _of_detector(detection, matching, swept)
@@ -121,7 +121,7 @@ def _operation(
         ),
         "; ".join(striking),
         slowest,
-        _trace(judged, setup, normals) if is_wanted else None,
+        _trace(judged, setup, normals) if kept is not None else None,
     )
 
 

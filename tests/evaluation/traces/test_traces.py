@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -139,18 +140,23 @@ OPERATIONS = st.lists(
 )
 
 
-@given(OPERATIONS, st.integers(0, 20), st.integers(1, 3))
-def test_what_a_choice_keeps_was_wanted_by_every_earlier_state_of_it(operations, behind, of_a_log):
-    """Workers decide from the state of some logs before: none of the traces kept at the end may be missing."""
+@given(OPERATIONS, st.integers(0, 20), st.integers(1, 3), st.lists(st.integers(1, 9), min_size=1))
+def test_what_a_choice_keeps_was_wanted_by_every_state_of_it_with_fewer_operations(operations, behind, of_a_log, sizes):
+    """A worker decides for the logs of a piece from the state some pieces before: no trace that is kept is missing."""
     logs = [operations[i : i + of_a_log] for i in range(0, len(operations), of_a_log)]
     choice, states, wanted = TraceChoice(len(logs)), [], set()
-    for log, inside in enumerate(logs):
+    first = number = 0
+    for size in cycle(sizes):
         states.append(choice.copy())
-        early, number = states[max(0, log - behind)].copy(), log * of_a_log
-        for operation in inside:
-            was_wanted = early.offer(log, *operation) is not None
-            if choice.offer(log, *operation) is not None:
-                assert was_wanted
-            wanted |= {number} if was_wanted else set()
-            number += 1
-    assert set(choice.kept()) <= wanted
+        early = states[max(0, len(states) - 1 - behind)].copy()
+        for log in range(first, min(first + size, len(logs))):
+            for operation in logs[log]:
+                was_wanted = early.offer(log, *operation) is not None
+                if choice.offer(log, *operation) is not None:
+                    assert was_wanted
+                wanted |= {number} if was_wanted else set()
+                number += 1
+        first += size
+        if first >= len(logs):
+            break
+    assert number == len(operations) and set(choice.kept()) <= wanted

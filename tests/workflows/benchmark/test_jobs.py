@@ -5,13 +5,14 @@ import threading
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import cdtool
 from cdtool.evaluation.results_file import to_json
 from cdtool.evaluation.traces.file import encode_traces
 from cdtool.thresholds import THRESHOLDS
-from cdtool.workflows import runs
-from cdtool.workflows.benchmark import benchmark as benchmark_module
+from cdtool.workflows import gathering, runs
 from cdtool.workflows.workers import in_order
 
 FILE = """machine = "machine.toml"
@@ -62,10 +63,51 @@ def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, threshold, mon
             sent.append(len(result))
             yield pickle.loads(result)
 
-    monkeypatch.setattr(benchmark_module, "in_order", by_pickles)
+    monkeypatch.setattr(gathering, "in_order", by_pickles)
     monkeypatch.setattr(runs, "in_order", by_pickles)
     assert run(gate, threshold) == alone
     assert len(sent) == 20
+    monkeypatch.setattr(gathering, "_sizes", lambda count, _: [1, 3, 2, count - 6])
+    assert run(gate, threshold) == alone
+    assert len(sent) == 20 + 11 + 4
+
+
+@given(st.integers(0, 3000), st.integers(1, 64))
+def test_the_pieces_of_the_work_are_small_at_its_beginning_and_its_end(count, jobs):
+    sizes = list(gathering._sizes(count, jobs))
+    assert sum(sizes) == count and all(1 <= size <= 8 for size in sizes)
+    assert max(sizes, default=1) == 1 or count >= 16 * jobs > 16
+    done = 0
+    for size in sizes:
+        assert size == 1 or size * 4 * jobs <= min(done, count - done), "other processes have as much to do"
+        done += size
+
+
+def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
+    """Of 60 logs, pieces have up to 3 in two processes."""
+    for name in ("free", "holdout", "machine.toml"):
+        (tmp_path / name).symlink_to(gate / name)
+    (tmp_path / "damaged").symlink_to(gate / "damaged")
+    (tmp_path / "stiff").mkdir()
+    for log in sorted((gate / "stiff").glob("*.csv")):
+        head, first, rest = log.read_text(encoding="utf-8").split("\n", 2)
+        for copy in range(15):
+            text = f"{head}\n{first[:-1]}{copy}\n{rest}"
+            (tmp_path / "stiff" / f"{log.stem}_{copy}.csv").write_text(text, encoding="utf-8")
+    file = tmp_path / "benchmark.toml"
+    file.write_text(FILE.format(threshold="signature"), encoding="utf-8")
+    made = set()
+    for jobs in (1, 2):
+        shown = []
+        done = cdtool.benchmark(
+            file,
+            detectors=["momentum"],
+            jobs=jobs,
+            progress=lambda number, total, shown=shown: shown.append((number, total)),
+        )
+        made.add(to_json(done.results).encode() + encode_traces(done.traces))
+        assert shown == [(number, 65) for number in range(1, 66)]
+    assert len(made) == 1
 
 
 @pytest.mark.parametrize("others", [0, 1], ids=["forked", "spawned"])
