@@ -240,13 +240,14 @@ def _seconds_after(stamps: npt.NDArray[np.uint64], origin: int, earliest: int, s
     The difference is between integers, as an epoch in ns has more digits than a float64; it may need all 64 bits.
     Stamps below `earliest` are before the origin. `signed`: the words are int64.
     """
-    ascending, before = True, -np.inf
+    early = 0  # whether any stamp is before the origin; a sum, so that the loop needs no branch
     for i in range(stamps.size):
-        later = stamps[i] - origin
-        seconds = np.float64(later) / 1e9
+        early += int(np.int64(stamps[i]) < np.int64(earliest) if signed else stamps[i] < earliest)
+        time[i] = np.float64(stamps[i] - origin) / 1e9
+    for i in range(stamps.size if early else 0):
         if np.int64(stamps[i]) < np.int64(earliest) if signed else stamps[i] < earliest:
-            seconds = -(np.float64(~later + np.uint64(1)) / 1e9)
-        time[i] = seconds
-        ascending = ascending and bool(seconds >= before)
-        before = seconds
-    return ascending
+            time[i] = -(np.float64(~(stamps[i] - origin) + np.uint64(1)) / 1e9)
+    descending = 0
+    for i in range(1, stamps.size):
+        descending += int(time[i] < time[i - 1])
+    return descending == 0

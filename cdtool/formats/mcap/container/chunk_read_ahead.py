@@ -7,7 +7,6 @@ again one by one, and damage is reported then.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -184,7 +183,7 @@ class ChunkReadAhead:
                 return None
             header.check()
             packed = record[header.data - at : header.data - at + header.size]
-            end = at + (length if _only_indexes(record.data, header.length) else header.length)
+            end = at + (length if only_message_indexes(record.data, header.length) else header.length)
             if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
                 reader.decompressor.fill(header, packed, content)
                 return CheckedChunk(header, end, content.ctypes.data)
@@ -217,10 +216,6 @@ class ChunkReadAhead:
             return _Reader(self._path)
 
 
-def _only_indexes(record: memoryview, at: int) -> bool:
-    return only_message_indexes(lambda start, length: record[start : start + length], at, len(record))
-
-
 def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
     """Yield groups of chunks; the first group is a single chunk, from which the fast path learns."""
     group: list[ChunkIndex] = []
@@ -244,16 +239,18 @@ def expected_rows(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]
     index (section "Chunk Index"). The result ends before the first chunk whose message indexes have impossible lengths.
     """
     expected: dict[int, Mapping[int, range]] = {}
-    before: Counter[int] = Counter()
+    before: dict[int, int] = {}
     for index in chunks:
-        indexes = sorted((at, channel) for channel, at in index.message_index_offsets.items())
-        indexes_end = index.chunk_start_offset + index.chunk_length + index.message_index_length
+        channels = sorted(index.message_index_offsets, key=index.message_index_offsets.__getitem__)
+        starts = [index.message_index_offsets[channel] for channel in channels]
+        starts.append(index.chunk_start_offset + index.chunk_length + index.message_index_length)
         rows = {}
-        for (at, channel), (end, _) in pairwise((*indexes, (indexes_end, 0))):
-            count, rest = divmod(end - at - _BEFORE_ENTRIES, _ENTRY)
+        for number, channel in enumerate(channels):
+            count, rest = divmod(starts[number + 1] - starts[number] - _BEFORE_ENTRIES, _ENTRY)
             if count < 0 or rest:
                 return expected
-            rows[channel] = range(before[channel], before[channel] + count)
-            before[channel] += count
+            first = before.get(channel, 0)
+            before[channel] = end = first + count
+            rows[channel] = range(first, end)
         expected[index.chunk_start_offset] = rows
     return expected

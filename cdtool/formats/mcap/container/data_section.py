@@ -194,9 +194,10 @@ class DataSection:
         """Return the byte after a chunk, or after its message indexes if a verified summary has nothing else there."""
         end, index = header.at + header.length, self._summary.chunks.get(header.at)
         if self._lost is None and index is not None and self._summary.verified and matches_header(index, header):
-            following = self._following.get(header.at)
-            if following == end + index.message_index_length and only_message_indexes(self._file.read, end, following):
-                return following
+            following, length = self._following.get(header.at), index.message_index_length
+            # An entry is smaller than its message: longer indexes are read one by one.
+            if following == end + length and length <= index.uncompressed_size:
+                return following if only_message_indexes(self._file.read(end, length)) else end
         return end
 
     def _cut_chunk(self, header: ChunkHeader) -> Iterator[MessageBlock]:

@@ -125,10 +125,15 @@ class Log:
         return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
     def _usable(self, piece: MessageBlock) -> Iterator[Messages]:
-        for channel in dict.fromkeys(channel for taken in piece.taken for channel in taken.counts):
-            count = sum(taken.counts.get(channel, 0) for taken in piece.taken)
-            parts = tuple(taken.parts[channel] for taken in piece.taken if channel in taken.parts)
-            yield from self._counted(channel, count, piece.covered, NO_BATCH, parts)
+        counts: dict[int, int] = {}
+        parts: dict[int, list[WrittenRows]] = {}
+        for taken in piece.taken:
+            for channel, count in taken.counts.items():
+                counts[channel] = counts.get(channel, 0) + count
+            for channel, part in taken.parts.items():
+                parts.setdefault(channel, []).append(part)
+        for channel, count in counts.items():
+            yield from self._counted(channel, count, piece.covered, NO_BATCH, tuple(parts.get(channel, ())))
         for channel, batch in piece.batches:
             if channel in piece.cuts:
                 unambiguous = int(np.searchsorted(batch.start, piece.cuts[channel]))

@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
+from itertools import groupby
 from typing import Any, ClassVar, Self
 
 from cdtool.formats.mcap.container.serialisation import (
+    INTEGERS,
     Read,
     byte_block,
     index_entries,
+    integers,
     long_block,
     mapping,
     numbers_by_channel,
@@ -43,16 +46,23 @@ class Record:
     @classmethod
     def read(cls, body: memoryview) -> Self:
         """Return the record with the content `body`; raises DamageError."""
-        values, at = [], 0
-        for read in _readers(cls):  # type: ignore[arg-type]
+        values: list[Any] = []
+        at = 0
+        for read, are_integers in _readers(cls):  # type: ignore[arg-type]
             value, at = read(body, at)
-            values.append(value)
+            if are_integers:
+                values += value
+            else:
+                values.append(value)
         return cls(*values)
 
 
 @cache
-def _readers(kind: type[Record]) -> tuple[Read, ...]:
-    return tuple(each.metadata["read"] for each in fields(kind))  # type: ignore[arg-type]
+def _readers(kind: type[Record]) -> tuple[tuple[Read, bool], ...]:
+    """Return the readers of a record's fields, and whether each reads several integers: all consecutive ones."""
+    reads = [each.metadata["read"] for each in fields(kind)]  # type: ignore[arg-type]
+    runs = [(are, list(run)) for are, run in groupby(reads, INTEGERS.__contains__)]
+    return tuple((read, are) for are, run in runs for read in ([integers(run)] if are else run))
 
 
 @dataclass(frozen=True)

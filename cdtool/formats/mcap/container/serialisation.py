@@ -7,7 +7,7 @@ are little-endian. A reader raises DamageError if the content ends within the va
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from cdtool.formats.mcap.container.damage import DamageError
@@ -24,12 +24,31 @@ def _integer(code: str) -> Read:
         try:
             return unpack(body, at)[0], at + size
         except struct.error as fault:
-            raise DamageError(f"a record of {len(body)} bytes ends within a number") from fault
+            raise _cut_number(body) from fault
 
     return read
 
 
+def _cut_number(body: memoryview) -> DamageError:
+    return DamageError(f"a record of {len(body)} bytes ends within a number")
+
+
 uint8, uint16, uint32, uint64 = (_integer(code) for code in "BHIQ")
+# The code of the module struct for each.
+INTEGERS: Mapping[Read, str] = {uint8: "B", uint16: "H", uint32: "I", uint64: "Q"}
+
+
+def integers(reads: Sequence[Read]) -> Callable[[memoryview, int], tuple[tuple[int, ...], int]]:
+    """Return a reader of consecutive integers, at once: `reads` are those of each of them."""
+    together = struct.Struct("<" + "".join(INTEGERS[read] for read in reads))
+
+    def read(body: memoryview, at: int) -> tuple[tuple[int, ...], int]:
+        try:
+            return together.unpack_from(body, at), at + together.size
+        except struct.error as fault:
+            raise _cut_number(body) from fault
+
+    return read
 
 
 def _prefixed(length: Read) -> Read:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from collections.abc import Callable
 
@@ -19,6 +20,8 @@ from cdtool.formats.mcap.container.records import (
     Schema,
 )
 from cdtool.formats.mcap.container.summary import Summary, matches_header
+
+_OPCODE_AND_LENGTH = struct.Struct("<BQ")
 
 
 def skippable_chunks(file: FileBytes, summary: Summary, wanted: Callable[[str], bool]) -> dict[int, dict[int, int]]:
@@ -44,16 +47,14 @@ def skippable_chunks(file: FileBytes, summary: Summary, wanted: Callable[[str], 
     return {at: indexed[at] for at in unwanted} if dict(total) == stated else {}
 
 
-def only_message_indexes(read: Callable[[int, int], memoryview], at: int, end: int) -> bool:
-    """Return whether the bytes from `at` to `end` are only message indexes, and no chunk that the summary omits.
-
-    `read` returns bytes by position and length.
-    """
-    while at < end:
-        head = read(at, PREFIX)
-        if len(head) < PREFIX or head[0] != MessageIndex.opcode:
+def only_message_indexes(content: memoryview, at: int = 0) -> bool:
+    """Return whether the bytes from `at` on are only message indexes, and no chunk that the summary omits."""
+    end = len(content)
+    while at <= end - PREFIX:
+        opcode, length = _OPCODE_AND_LENGTH.unpack_from(content, at)
+        if opcode != MessageIndex.opcode:
             return False
-        at += PREFIX + int.from_bytes(head[1:], "little")
+        at += PREFIX + length
     return at == end
 
 
