@@ -188,12 +188,14 @@ def _whiten(  # noqa: C901  a kernel is one loop
     covariance, moved = work[:order], work[order:]
     observed = order
     for k in range(len(values)):
-        if slots[k] == 0:
-            past[:] = 0.0
+        if slots[k] != 1:
+            for i in range(order):
+                past[i] = 0.0
             observed = order
-        elif slots[k] > 1:
-            past[:] = 0.0
-            covariance[:] = stationary
+        if slots[k] > 1:
+            for i in range(order):
+                for j in range(order):
+                    covariance[i, j] = stationary[i, j]
             observed = 0
         forecast = 0.0
         for i in range(order):

@@ -207,10 +207,10 @@ def find_runs(
             last = k
             count += 1
         elif count > 0:
-            runs[found] = first, last, count
+            runs[found, 0], runs[found, 1], runs[found, 2] = first, last, count
             found += 1
             count = 0
     if count > 0:
-        runs[found] = first, last, count
+        runs[found, 0], runs[found, 1], runs[found, 2] = first, last, count
         found += 1
     return found

@@ -145,7 +145,8 @@ def fit_before(  # noqa: PLR0913  a kernel: arrays one by one
         i -= 1
     size = WINDOW - known
     if size < 2:
-        line[:] = start
+        for k in range(len(start)):
+            line[k] = start[k]
         return math.inf
     _fit(times[known:], values[known:], size, scratch[2 * WINDOW :], line)
     return float(last)
