@@ -137,20 +137,28 @@ class WrittenRows:
         """The number of messages."""
         return int(self.rows.stop - self.rows.start)
 
-    def follows(self, other: WrittenRows) -> bool:
-        """Return whether these rows directly follow the `other` ones."""
-        return other.destination is self.destination and other.rows.stop == self.rows.start
+
+def joined_rows(parts: Sequence[WrittenRows]) -> list[WrittenRows]:
+    """Return the same rows; those that directly follow the ones before are one with them."""
+    joined: list[WrittenRows] = []
+    first, stop, ascending = 0, -1, True
+    for number, part in enumerate(parts):
+        rows = part.rows
+        if number > first and (part.destination is not parts[first].destination or rows.start != stop):
+            joined.append(_one(parts[first:number], ascending))
+            first, ascending = number, True
+        stop, ascending = rows.stop, ascending and part.ascending
+    if parts:
+        joined.append(_one(parts[first:], ascending))
+    return joined
 
 
-def joined_rows(parts: Sequence[WrittenRows]) -> WrittenRows:
-    """Return rows, each of which directly follow the ones before, as one."""
-    if len(parts) == 1:
-        return parts[0]
+def _one(parts: Sequence[WrittenRows], ascending: bool) -> WrittenRows:
+    """Return consecutive rows as one; `ascending`: the stamps of each part are in order."""
     destination, rows = parts[0].destination, slice(parts[0].rows.start, parts[-1].rows.stop)
-    ascending = all(part.ascending for part in parts)
-    if ascending:
+    if ascending and len(parts) > 1:
         borders = np.array([part.rows.start for part in parts[1:]])
-        ascending = bool(np.all(destination.stamps[borders - 1] <= destination.stamps[borders]))
+        ascending = bool((destination.stamps[borders - 1] <= destination.stamps[borders]).all())
     return WrittenRows(destination, rows, ascending)
 
 

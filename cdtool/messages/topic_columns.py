@@ -161,7 +161,7 @@ class TopicColumns(Topic):
 
     def confirm(self, stream: Stream, parts: Sequence[WrittenRows]) -> None:
         """Add messages that the fast path wrote into rows, using the result of `binding`."""
-        for part in _joined(parts):
+        for part in joined_rows(parts):
             self.decoders.decoded += part.count
             if self.first_stamp is None:
                 self.first_stamp = int(part.destination.stamps[part.rows.start])
@@ -187,14 +187,3 @@ class TopicColumns(Topic):
             time, order = self._clock
         column = replace(column, values=values if order is None else values[order], time=time)
         return column, [*findings, *rounding_finding(column.name, rounded)]
-
-
-def _joined(parts: Sequence[WrittenRows]) -> list[WrittenRows]:
-    """Return the same rows, with adjacent parts joined."""
-    joined: list[WrittenRows] = []
-    begin = 0
-    for number in range(1, len(parts) + 1):
-        if number == len(parts) or not parts[number].follows(parts[number - 1]):
-            joined.append(joined_rows(parts[begin:number]))
-            begin = number
-    return joined

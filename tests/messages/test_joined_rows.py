@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.messages.fast_path import Destination, WrittenRows
-from cdtool.messages.topic_columns import _joined
+from cdtool.messages.fast_path import Destination, WrittenRows, joined_rows
 
 
 def joined_one_by_one(parts):
@@ -35,6 +34,6 @@ def test_adjacent_parts_are_joined_and_in_order_if_the_times_at_their_borders_ar
         row, number = row + gap, number ^ (other and gap)
         parts.append(WrittenRows(destinations[number], slice(row, row + length), ascending))
         row += length
-    joined = [(part.destination, part.rows.start, part.rows.stop, part.ascending) for part in _joined(parts)]
+    joined = [(part.destination, part.rows.start, part.rows.stop, part.ascending) for part in joined_rows(parts)]
     assert joined == joined_one_by_one(parts)
-    assert sum(part.count for part in _joined(parts)) == sum(part.count for part in parts)
+    assert sum(part.count for part in joined_rows(parts)) == sum(part.count for part in parts)

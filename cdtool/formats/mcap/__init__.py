@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from typing import ClassVar
 
@@ -15,7 +15,7 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.container.log import Log, Messages
 from cdtool.formats.mcap.container.messages import NO_DATE
 from cdtool.formats.mcap.container.read_ahead import read_ahead
 from cdtool.formats.mcap.container.records import MAGIC
@@ -103,9 +103,7 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
     log = Log(path, names.__contains__, chunk_reader=chunk_reader)
     expected = {topic: log.expected(topic) for topic in names}
     topics = wanted_topics(path, wanted, partial(TopicColumns, expected=expected, memory=ColumnMemory()))
-    pieces = log.pieces()
-    # The chunk reader must learn from the first piece before the second one is read.
-    for piece in chain(islice(pieces, 1), read_ahead(pieces)):
+    for piece in _ahead(log):
         for messages in piece:
             topic = topics[messages.stream.topic]
             if messages.parts:
@@ -115,6 +113,19 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
         if any(not messages.parts for messages in piece):
             chunk_reader.learn(_bindings(log, topics))
     return mapped_source_of(log, wanted, topics)[0]
+
+
+def _ahead(log: Log) -> Iterator[tuple[Messages, ...]]:
+    """Yield the pieces; a thread reads the next one, unless the threads that decompress the chunks read the messages.
+
+    The chunk reader must learn from the first piece before the second one is read.
+    """
+    pieces = log.pieces()
+    for piece in pieces:
+        yield piece
+        if not log.section.is_fast:
+            break
+    yield from read_ahead(pieces)
 
 
 def _bindings(log: Log, topics: Mapping[str, TopicColumns]) -> dict[int, Binding]:

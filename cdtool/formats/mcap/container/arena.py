@@ -66,17 +66,19 @@ class Arena:
         """Start again with `memory`, after `flush`."""
         self._data, self._covered = memory, covered
 
-    def add_decoded(self, size: int, taken: ChunkRows) -> Iterator[MessageBlock]:
-        """Add the next `size` bytes as a chunk whose messages the fast path has read."""
-        if self._table.count:
-            yield from self._blocks()
+    def is_ready_for(self, size: int) -> bool:
+        """Return whether a chunk of `size` bytes, with a CRC, whose messages the fast path has read can be added."""
+        return self.fits(size, covered=True) and not self._table.count
+
+    def add_taken(self, size: int, taken: ChunkRows) -> None:
+        """Add the next `size` bytes as a chunk whose messages the fast path has read, if that `is_ready_for` it."""
         self._taken.append(taken)
         self._used += size
 
     def walk(self, size: int, top_level: bool = False) -> Generator[MessageBlock, None, WalkResult]:
         """Add the messages of the next `size` bytes; yield blocks if the table is full, and return the result."""
         if self._taken:
-            yield from self._blocks()
+            yield from self.blocks()
         at, end, before = self._used, self._used + size, self._table.count
         faults: list[str] = []
         emptied = False
@@ -86,7 +88,7 @@ class Arena:
             if reason != walk_kernel.FULL:
                 break
             emptied = True
-            yield from self._blocks()
+            yield from self.blocks()
         times = None if emptied else self._table.times(before)
         begin, self._used = self._used, end
         return WalkResult(at - begin, reason, times, tuple(faults))
@@ -101,7 +103,7 @@ class Arena:
 
     def flush(self) -> Iterator[MessageBlock]:
         """Yield the messages in memory, and release the memory."""
-        yield from self._blocks()
+        yield from self.blocks()
         self._data, self._used, self._cuts = np.empty(0, np.uint8), 0, {}
 
     def _define(self, definitions: list[tuple[int, int, int]]) -> Iterator[str]:
@@ -118,7 +120,8 @@ class Arena:
                 yield str(fault)
             self._cuts.update(dict.fromkeys(set(self._definitions.ambiguous) - before, start))
 
-    def _blocks(self) -> Iterator[MessageBlock]:
+    def blocks(self) -> Iterator[MessageBlock]:
+        """Yield the messages added since the last block."""
         if self._taken:
             taken, self._taken = tuple(self._taken), []
             self._note_first_time(taken[0].first_time)

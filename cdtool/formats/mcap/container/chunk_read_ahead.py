@@ -37,7 +37,6 @@ JOINED = 14 << 20
 _LARGEST, _LONGEST = 16 << 20, 32 << 20
 _GROUPS_AHEAD = 1
 _MOST_THREADS = 4
-_SUBMITTED = 3  # chunks per task of a thread: submitting a task costs as much as a tenth of a chunk
 # In a message index the prefix, the channel's id and the length precede the entries; each is a time and an offset.
 _BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
 
@@ -100,13 +99,13 @@ class ChunkReadAhead:
         self._path, self._definitions, self._chunk_reader = path, definitions, chunk_reader
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
         self._rows = expected_rows(chunks) if chunk_reader is not None else {}
-        threads = min(usable_cores(), _MOST_THREADS, len(chunks))
-        self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if threads > 1 else {}
+        self._count = min(usable_cores(), _MOST_THREADS, len(chunks))
+        self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if self._count > 1 else {}
         self._following = dict(pairwise(self._groups))
         self._next_chunk = dict(pairwise(sorted(summary.chunks)))
         self._started: dict[int, _Group] = {}
         self._checked: dict[int, CheckedChunk] = {}
-        self._threads = ThreadPoolExecutor(threads, "chunks") if threads > 1 else None
+        self._threads = ThreadPoolExecutor(self._count, "chunks") if self._count > 1 else None
         self._readers: SimpleQueue[_Reader] = SimpleQueue()
 
     def __enter__(self) -> Self:
@@ -119,6 +118,11 @@ class ChunkReadAhead:
             self._threads.shutdown(cancel_futures=True)
         while not self._readers.empty():
             self._readers.get().file.close()
+
+    @property
+    def is_fast(self) -> bool:
+        """Return whether its threads read the messages, too: as far as is known, nothing else takes long."""
+        return self._threads is not None and self._chunk_reader is not None and self._chunk_reader.is_ready
 
     def begins(self, at: int) -> bool:
         """Return whether the chunk at byte `at` is the first of a group, which has its own memory."""
@@ -157,7 +161,8 @@ class ChunkReadAhead:
         for index in chunks:
             start, end = end, end + index.uncompressed_size
             targets.append((index, memory[start:end]))
-        tasks = [targets[i : i + _SUBMITTED] for i in range(0, len(targets), _SUBMITTED)]
+        each = -(-len(targets) // self._count)  # a task per thread: fewer tasks, fewer waits for the interpreter's lock
+        tasks = [targets[i : i + each] for i in range(0, len(targets), each)]
         return _Group(memory, tuple(self._threads.submit(self._fill_all, task) for task in tasks))
 
     def _fill_all(self, targets: list[tuple[ChunkIndex, Bytes]]) -> list[CheckedChunk | None]:

@@ -45,7 +45,7 @@ from cdtool.formats.mcap.container.records import (
 from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.messages.fast_path import ChunkReader
+from cdtool.messages.fast_path import ChunkReader, ChunkRows
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
@@ -87,6 +87,11 @@ class DataSection:
         self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
+
+    @property
+    def is_fast(self) -> bool:
+        """Return whether threads read the messages of the chunks ahead."""
+        return self._ahead.is_fast
 
     def pieces(self) -> Iterator[MessageBlock]:
         """Yield all messages that can be read."""
@@ -151,8 +156,24 @@ class DataSection:
             checked = self._ahead.checked(at)
             if checked is None:
                 return at
-            yield from self._chunk(checked.header, checked)
+            if checked.taken is None or not self._take(checked.header, checked.taken):
+                yield from self._chunk(checked.header, checked)
             at = checked.end if self._lost is None else at + checked.header.length
+
+    def _take(self, header: ChunkHeader, taken: ChunkRows) -> bool:
+        """Add a chunk that the fast path has read if that needs nothing else; otherwise return False."""
+        if not self.arena.is_ready_for(header.uncompressed_size):
+            return False
+        try:
+            self._claims.add(header)
+        except RefusedError:
+            return False
+        self._lost = None
+        self.chunks[header.at] = header
+        self._resync.verified_to = header.at + header.length
+        self.arena.add_taken(header.uncompressed_size, taken)
+        self.other_times += taken.times != (header.message_start_time, header.message_end_time)
+        return True
 
     def _chunk(self, header: ChunkHeader, checked: CheckedChunk | None = None) -> Iterator[MessageBlock]:
         self._lost = None
@@ -178,7 +199,9 @@ class DataSection:
             return
         self._resync.verified_to = header.at + header.length
         if taken is not None:
-            yield from self.arena.add_decoded(len(content), taken)
+            if not self.arena.is_ready_for(0):
+                yield from self.arena.blocks()
+            self.arena.add_taken(len(content), taken)
             times: tuple[int, int] | None = taken.times
         else:
             walked = yield from self.arena.walk(len(content))
