@@ -13,9 +13,9 @@ from cdtool.messages.large_pages import Buffers
 
 _SMALLEST = 1 << 18  # smaller arrays are allocated as usual [bytes]
 _LINE = 64  # arrays begin at a line of the processor's cache
-# Address space that is reserved at once; only pages that are written take memory. Two regions are the columns of some
+# Address space that is reserved at once; only pages that are written take memory. Three regions are the columns of five
 # minutes of a robot's log.
-_REGIONS = Buffers(32 << 20, kept=2)
+_REGIONS = Buffers(32 << 20, kept=3)
 
 
 class ColumnMemory:
