@@ -42,7 +42,7 @@ class MachineFile(StoresDerived):
 def read_machine_file(path: str | Path) -> MachineFile:
     """Read and check a machine file; raises ConfigurationError."""
     file = Path(path)
-    values = read_toml(file)
+    values = read_toml(file, "a machine file")
     root = Table(values, str(file))
     if isinstance(values.get("machine"), str):
         raise ConfigurationError(f"{file}: is a benchmark file, not a machine file", f"give {values['machine']}")
@@ -70,8 +70,18 @@ def read_machine_file(path: str | Path) -> MachineFile:
 
 def fingerprint(machine: Machine) -> str:
     """Return a hash of a machine's parameters, to which a signature belongs."""
-    text = json.dumps({"type": type(machine).__name__, **asdict(machine)}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(_parameters_text(machine).encode()).hexdigest()
+
+
+def machine_parameters(machine: Machine) -> dict[str, Any]:
+    """Return type and parameters of a machine as JSON values, under the keys of the machine file."""
+    values: dict[str, Any] = json.loads(_parameters_text(machine), parse_constant=str)
+    keys = {"load_inertia": getattr(machine, "inertia_key", "load_inertia")}
+    return {keys.get(name, name): value for name, value in values.items()}
+
+
+def _parameters_text(machine: Machine) -> str:
+    return json.dumps({"type": type(machine).__name__, **asdict(machine)}, sort_keys=True)
 
 
 def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:

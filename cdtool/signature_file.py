@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 from cdtool.activation import Activation
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import SignatureError
-from cdtool.machine_file import fingerprint
-from cdtool.plain_text import counted, digits
+from cdtool.machine_file import fingerprint, machine_parameters
+from cdtool.plain_text import counted, digits, first_of
 from cdtool.plausible import PlausibleRanges
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.normal_motion import NormalMotion
+from cdtool.value_words import value_in_words
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,8 @@ class SignatureFile:
     `rule` is the threshold rule with its settings, `origin` the origin of its safety factor. `first` is what was first
     learned; `current` is in use. `joints` are the monitored joints: the columns of the signal. `operations`: how the
     logs were cut. `plausible`: value ranges of the runs' channels; None in older files. `normal`: the normal motion of
-    every channel, one per class of motion with enough runs; None in older files.
+    every channel, one per class of motion with enough runs; None in older files. `machine_parameters`: those of
+    `cdtool.machine_file.machine_parameters`; None in older files.
     """
 
     machine: str
@@ -72,6 +74,7 @@ class SignatureFile:
     source: str = ""
     plausible: PlausibleRanges | None = None
     normal: tuple[NormalMotion, ...] | None = ()
+    machine_parameters: Mapping[str, Any] | None = None
 
     @property
     def threshold(self) -> str:
@@ -120,7 +123,7 @@ class SignatureFile:
             )
         if fingerprint(machine) != self.machine_fingerprint:
             raise SignatureError(
-                f"{where}: learned on another machine ('{self.machine}', with other parameters than '{machine.name}')",
+                f"{where}: learned on another machine ({self._other_than(machine)})",
                 "learn a signature with this machine file",
             )
         gains = asdict(detector)
@@ -130,6 +133,25 @@ class SignatureFile:
                     f"{where}: learned with {name} = {self.gains.get(name)}, but the machine file has {value}",
                     "relearn it, or restore the gain in [detectors]",
                 )
+
+    def _other_than(self, machine: Machine) -> str:
+        """Return the parameters in which a machine differs from that of the runs, in words."""
+        differing: list[str] = []
+        if self.machine_parameters is not None:
+            differing = list(_differences(self.machine_parameters, machine_parameters(machine)))
+        return first_of(differing) or f"'{self.machine}', with other parameters than '{machine.name}'"
+
+
+def _differences(learned: Any, given: Any, name: str = "") -> Iterator[str]:
+    """Yield in words where parameters that were learned with differ from the given ones."""
+    if isinstance(learned, Mapping) and isinstance(given, Mapping):
+        for key in dict.fromkeys((*learned, *given)):
+            yield from _differences(learned.get(key), given.get(key), f"{name}.{key}" if name else str(key))
+    elif isinstance(learned, list) and isinstance(given, list) and len(learned) == len(given):
+        for number, pair in enumerate(zip(learned, given, strict=True)):
+            yield from _differences(*pair, f"{name}[{number}]" if len(given) > 1 else name)
+    elif learned != given:
+        yield f"{name} was {value_in_words(learned)}, is {value_in_words(given)}"
 
 
 def with_run(

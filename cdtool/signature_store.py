@@ -107,7 +107,11 @@ def _to_json(signature: SignatureFile) -> dict[str, Any]:
         "kind": _KIND,
         "schema_version": SCHEMA_VERSION,
         "tool_version": __version__,
-        "machine": {"name": signature.machine, "fingerprint": signature.machine_fingerprint},
+        "machine": {
+            "name": signature.machine,
+            "fingerprint": signature.machine_fingerprint,
+            "parameters": signature.machine_parameters,
+        },
         "detector": {"name": signature.detector, "gains": dict(signature.gains)},
         "unit": signature.unit,
         "joints": list(signature.joints),
@@ -148,6 +152,7 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
         source=source,
         plausible=PlausibleRanges.from_dict(values["plausible"]) if values.get("plausible") else None,
         normal=None if normal is None else tuple(NormalMotion.from_dict(item) for item in normal),
+        machine_parameters=_parameters(values["machine"].get("parameters")),
     )
 
 
@@ -174,6 +179,12 @@ def _activation(values: Mapping[str, Any]) -> Activation:
     if isinstance(debounce, bool) or not isinstance(debounce, int | None) or not isinstance(latch, bool):
         raise ValueError("activation: debounce must be a number of samples, latch true or false")
     return Activation(debounce, float(values["rearm"]), float(values["hysteresis"]), latch)
+
+
+def _parameters(values: Any) -> Mapping[str, Any] | None:
+    if values is not None and not isinstance(values, dict):
+        raise ValueError("the machine's parameters must be a table")
+    return values
 
 
 def _gain(value: Any) -> Gain:

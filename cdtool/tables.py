@@ -12,6 +12,8 @@ from cdtool.errors import ConfigurationError, nearest
 from cdtool.file_kinds import kind_of
 from cdtool.value_words import value_in_words
 
+_SWAPPED = ("a signature file", "a machine file")  # given, needed: commands take both
+
 
 class Table:
     """A table of a TOML file; a key that was not read before `finish()` is an unknown key."""
@@ -140,18 +142,22 @@ class Table:
         return float(value)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file; raises ConfigurationError with the file and the line."""
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Return the tables of a TOML file; raises ConfigurationError with the file and the line.
+
+    `what` the file should be, such as "a machine file", is stated if it is something else.
+    """
     text = read_text(path, ConfigurationError, most=MOST_TOML)
     try:
         return parse_toml(text)
     except ContentError as fault:
         kind = kind_of(text.encode())
-        what = f"is {kind}, not TOML" if kind and not kind.endswith(("machine file", "benchmark file")) else ""
-        raise ConfigurationError(
-            f"{path}: {what or f'not valid TOML: {fault}'}",
-            "give a machine file or benchmark file" if what else "write texts in quotes, decimals with a point",
-        ) from fault
+        if not kind or kind.endswith(("machine file", "benchmark file")):
+            raise ConfigurationError(
+                f"{path}: not valid TOML: {fault}", "write texts in quotes, decimals with a point"
+            ) from fault
+        swapped = "; it may be swapped with the signature" if (kind, what) == _SWAPPED else ""
+        raise ConfigurationError(f"{path}: is {kind}, not {what}", f"give {what}{swapped}") from fault
 
 
 def _range_text(minimum: float, above: float) -> str:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
 from cdtool.activation import Activation
 from cdtool.detectors.momentum import Momentum
 from cdtool.errors import SignatureError
-from cdtool.machine_file import fingerprint
+from cdtool.machine_file import fingerprint, machine_parameters
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.signature_store import read_signature, update_signature, write_signature
 from cdtool.thresholds.normal_motion import learn_normal_motion
@@ -55,6 +57,44 @@ def test_it_survives_writing_and_reading(tmp_path, learned):
     assert loaded.runs == learned.runs and loaded.current[0].motion == learned.current[0].motion
     values = json.loads(path.read_text())
     assert values["schema_version"] == 4 and values["detector"] == {"name": "momentum", "gains": {"bandwidth": 10.0}}
+
+
+def test_on_another_machine_the_parameters_that_differ_are_named(tmp_path, learned, gate):
+    path = tmp_path / "s.json"
+    write_signature(path, replace(learned, machine_parameters=machine_parameters(gate)))
+    loaded = read_signature(path)
+    loaded.check(gate, DETECTOR)
+    lighter = replace(gate, load_inertia=(500.0,))
+    with pytest.raises(SignatureError) as raised:
+        loaded.check(lighter, DETECTOR)
+    was = f"load_mass was {gate.load_inertia[0]:g}, is 500"
+    assert raised.value.message == f"{path}: learned on another machine ({was})"
+    with pytest.raises(SignatureError, match=f"{was}, name was 'axis', is 'door'"):
+        loaded.check(replace(lighter, name="door"), DETECTOR)
+    write_signature(path, learned)  # of an earlier version
+    with pytest.raises(SignatureError, match="'gate', with other parameters than 'axis'"):
+        read_signature(path).check(lighter, DETECTOR)
+
+
+def test_parameters_of_every_joint_are_compared_and_those_that_are_no_numbers_can_be_written(tmp_path, learned, gate):
+    def check(before, now):
+        stored = replace(learned, machine_parameters=before, machine_fingerprint="other")
+        write_signature(tmp_path / "s.json", stored)
+        with (
+            mock.patch("cdtool.signature_file.machine_parameters", lambda _: now),
+            pytest.raises(SignatureError) as why,
+        ):
+            read_signature(tmp_path / "s.json").check(gate, DETECTOR)
+        return why.value.message.partition("(")[2]
+
+    links = {"links": [{"mass": 1.0}, {"mass": 2.0}]}
+    assert check(links, {"links": [{"mass": 1.0}, {"mass": 2.5}]}) == "links[1].mass was 2, is 2.5)"
+    assert check(links, {"links": [{"mass": 1.0}]}).startswith("links was a list of 2 values, is a list of 1 value)")
+    assert check({"a": 1}, {"b": True}) == "a was 1, is empty, b was empty, is true)"
+    assert check({"a": 1}, {"a": 1}) == "'gate', with other parameters than 'axis')"
+    values = machine_parameters(replace(gate, load_inertia=(math.inf,)))
+    write_signature(tmp_path / "s.json", replace(learned, machine_parameters=values))
+    assert read_signature(tmp_path / "s.json").machine_parameters == values
 
 
 def test_what_normal_runs_look_like_is_stored_with_it(tmp_path, learned, simulated):

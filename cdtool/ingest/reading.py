@@ -71,6 +71,8 @@ def choose_format(path: Path) -> Format:
     """Return the format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
     head = _read_head(path)
     suffix = path.suffix.lower()
+    if suffix == ".toml" and (kind := kind_of(head)):  # its numbers could be read as a table
+        raise RecordingError(f"{path}: is not a recording: it is {kind}", "give a log in its place")
     for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
         likely: Format = FORMATS.load(name)()
         if suffix in likely.suffixes and likely.sniff(path):

@@ -203,3 +203,22 @@ def test_limits_set_by_hand_exclude_a_factor_and_need_no_runs(gate_folder, tmp_p
     assert done.status == 0 and "limit 400 N set by hand" in done.out and "less certain" not in done.err
     refused = cdtool(*learn, "-k", 3)
     assert refused.status == 2 and "cannot be combined with limits set by hand" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--rule", "foo"), "--rule: is 'foo'"),
+        (("--align", "foo"), "--align: is 'foo'"),
+        (("--sides", "three"), "--sides: is 'three'"),
+        (("--safety-factor", "-1"), "--safety-factor: is -1"),
+        (("--threshold", "cusum", "--rule", "foo"), "--rule: is 'foo'"),
+        (("--set", "rule=foo"), "--set: rule: is 'foo'"),
+        (("--set", "foo=1"), "--set: foo: unknown key"),
+        (("--threshold", "cusum", "--set", "drift=a"), "--set: threshold.drift: is 'a'"),
+    ],
+)
+def test_a_wrong_setting_is_named_by_the_option_that_was_given(gate_folder, tmp_path, options, named):
+    machine, log = gate_folder / "machine.toml", gate_folder / "free" / "01.csv"
+    done = cdtool("learn-signature", log, "-m", machine, "-d", "gm", "-o", tmp_path / "s.json", *options)
+    assert done.status == 2 and done.err.startswith(f"error: {named}"), done.err

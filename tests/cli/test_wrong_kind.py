@@ -48,7 +48,7 @@ WORDS = {
         *(("detect", "signature", given) for given in ("results", "machine")),
         *(("info -m", "machine", given) for given in WORDS if given != "machine"),
         *(("benchmark", "benchmark", given) for given in WORDS if given != "benchmark"),
-        *(("info", "recording", given) for given in ("signature", "results")),
+        *(("info", "recording", given) for given in ("signature", "results", "machine", "benchmark")),
     ],
 )
 def test_a_file_of_another_kind_is_named_by_its_kind(files, command, needed, given):
@@ -66,7 +66,8 @@ def test_a_file_of_another_kind_is_named_by_its_kind(files, command, needed, giv
     assert done.status == 2 and done.err.count("\n") == 1
     assert f"{file}: is " in done.err and WORDS[given] in done.err and "older" not in done.err
     if needed != "recording":
-        assert f"not a {needed} file" in done.err or "not TOML (give a machine file or benchmark file)" in done.err
+        assert f"not a {needed} file" in done.err
+    assert ("may be swapped with the signature" in done.err) == ((command, given) == ("info -m", "signature"))
 
 
 def _changed(values: dict[str, object], path: tuple[str | int, ...], value: object) -> dict[str, object]:

@@ -78,7 +78,7 @@ def read_force_limits(path: Path | None = None) -> dict[str, ForceProfile]:
     """
     file = _SHIPPED if path is None else path
     where = str(file) if path else "the shipped limits.toml"
-    root = Table(read_toml(file), where)
+    root = Table(read_toml(file, "a file of force limits"), where)
     profiles = {name: _profile(name, root.table(name)) for name in root.values}
     if not profiles:
         raise ConfigurationError(

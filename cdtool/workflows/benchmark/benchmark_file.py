@@ -119,7 +119,7 @@ def read_benchmark_file(
     `also_known`.
     """
     file = Path(path)
-    root = Table(read_toml(file), str(file))
+    root = Table(read_toml(file, "a benchmark file"), str(file))
     if isinstance(root.raw("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')

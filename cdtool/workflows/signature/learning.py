@@ -11,7 +11,7 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
-from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
+from cdtool.machine_file import MachineFile, fingerprint, machine_parameters, read_machine_file
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
@@ -145,6 +145,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
         operations=operations,
         plausible=runs.ranges,
         normal=normal_motions(fitted.used),
+        machine_parameters=machine_parameters(machine_file.machine),
     )
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
     return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), runs.findings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import Field, fields
 from typing import Any
 
@@ -18,6 +18,7 @@ from cdtool.thresholds.signature import Signature
 from cdtool.value_words import value_in_words
 
 _DEFAULT = "signature"
+_OPTIONS = {"alignment": "align"}  # of the command line, where their names differ from those of the settings
 
 
 def read_signature(table: Table, default_sides: str) -> Signature:
@@ -81,9 +82,21 @@ def rule_of(name: str, given: Sequence[str], signature: Mapping[str, Any], defau
         raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
     settings = dict(_setting(text) for text in given)
     if name == _DEFAULT:
-        return read_signature(Table({**signature, **settings}, "--set"), default_sides)
-    learned = read_signature(Table(signature, "--set"), default_sides)
+        return read_signature(_Options({**signature, **settings}, settings), default_sides)
+    learned = read_signature(_Options(signature, ()), default_sides)
     return read_threshold(Table({"threshold": {"name": name, **settings}}, "--set"), learned)[1]
+
+
+class _Options(Table):
+    """The settings of a command line: those in `by_set` were given by --set KEY=VALUE, the others by own options."""
+
+    def __init__(self, values: Mapping[str, Any], by_set: Collection[str]) -> None:
+        super().__init__(values, "")
+        self._by_set = by_set
+
+    def key(self, name: str) -> str:
+        """Return the option that the user gave."""
+        return f"--set: {name}" if name in self._by_set else f"--{_OPTIONS.get(name, name.replace('_', '-'))}"
 
 
 def _setting(text: str) -> tuple[str, Any]:

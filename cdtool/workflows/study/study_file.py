@@ -51,7 +51,7 @@ def read_study(
     for name, value in options.items():
         if not 0.0 < value < math.inf:
             raise UsageError(f"{name} is {value:g}", "give a number above 0")
-    root = Table(_merged(read_toml(Path(file)) if file else {}, options), str(file or "study"))
+    root = Table(_merged(read_toml(Path(file), "a study file") if file else {}, options), str(file or "study"))
     reader = StudyReader(root)
     part = _studied_joint(machine, joint, reader)
     case = _case(part, reader)
