@@ -5,7 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from cdtool.recording import FloatArray
+
+
+def as_float64(values: npt.ArrayLike) -> FloatArray:
+    """Return numbers of a file as a contiguous float64 array, without a copy if they are one.
+
+    Some NaN of 32 bits, such as those of damaged bytes, raise the processor's flag for an invalid operation as they are
+    converted: NumPy would warn of it.
+    """
+    with np.errstate(invalid="ignore"):
+        return np.ascontiguousarray(values, dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
+from cdtool.columns import as_float64
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.containers import ColumnLeftOut, RoundedColumn
@@ -74,7 +74,7 @@ def as_numbers(name: str, values: npt.NDArray[Any], findings: list[Finding]) -> 
         largest = max(abs(int(values.min())), abs(int(values.max())))
         if largest > _LARGEST_EXACT:
             findings.append(Finding(RoundedColumn(), name))
-    return np.ascontiguousarray(values, dtype=np.float64)
+    return as_float64(values)
 
 
 def left_out_finding(name: str, kind: str) -> Finding:

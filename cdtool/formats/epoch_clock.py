@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from cdtool.clock import EPOCH
 from cdtool.clock.plausible_unit import SECONDS, both_readings, contradicted_by_epoch
+from cdtool.columns import as_float64
 from cdtool.findings import Finding
 from cdtool.findings.clocks import FileUnitImplausible
 from cdtool.recording import FloatArray
@@ -46,7 +47,7 @@ class EpochClock:
         """Return times [s] after `origin`; NaN where the stamp is missing."""
         raw = self.read(start, end)
         if not origin or self.start is None:
-            times = np.asarray(raw, dtype=np.float64) * self.factor + float(self.base - origin)
+            times = as_float64(raw) * self.factor + float(self.base - origin)
         else:
             times = _since(raw, self.first or Fraction(0)) * self.factor + float(self.start - origin)
         if self.missing:
@@ -81,7 +82,7 @@ def _since(raw: npt.NDArray[Any], first: Fraction) -> FloatArray:
         return (raw.astype(np.uint64) - np.uint64(int(first))).view(np.int64).astype(np.float64)
     if raw.dtype.kind == "i":
         return (raw.astype(np.int64) - np.int64(int(first))).astype(np.float64)
-    return np.asarray(raw, dtype=np.float64) - float(first)
+    return as_float64(raw) - float(first)
 
 
 def _exact(stamp: Any) -> Fraction | None:

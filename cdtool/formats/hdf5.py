@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import ClocksWithoutUnit, UnusableClock
@@ -80,7 +81,8 @@ class Packing:
 
     def unpacked(self, raw: npt.NDArray[Any]) -> FloatArray:
         """Return the unpacked numbers; NaN where a number is missing."""
-        values = np.array(raw, dtype=np.float64)
+        values = as_float64(raw)
+        values = values.copy() if values is raw else values
         if self.scale != 1.0:
             values *= self.scale
         if self.offset != 0.0:
@@ -88,7 +90,7 @@ class Packing:
         if self.missing:
             # Compared in the file's own type: 0.1 in 32 bits differs from 0.1 in 64 bits.
             missing = self.missing if raw.dtype.kind != "f" else np.array(self.missing).astype(raw.dtype)
-            values[np.isin(raw.astype(np.float64), np.array(missing, dtype=np.float64))] = np.nan
+            values[np.isin(as_float64(raw), as_float64(missing))] = np.nan
         return values
 
     def finding(self, column: str) -> list[Finding]:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
-from cdtool.columns import Column
+from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.containers import RowsAsColumns, VariableLeftOut
@@ -62,7 +62,7 @@ class Mat:
                 findings.append(Finding(RowsAsColumns("variable", variable, *array.shape), severity="note"))
             for i, key in enumerate(_names(variable, shapes[variable])):
                 if key in keys:
-                    columns[key] = Column(key, np.ascontiguousarray(table[:, i], dtype=np.float64))
+                    columns[key] = Column(key, as_float64(table[:, i]))
         not_read = [key for key in keys if key not in columns]
         if wanted is not None and not_read:
             raise RecordingError(f"{path}: column '{not_read[0]}' is complex", "save its real part")

@@ -18,6 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap
+from cdtool.columns import as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.containers import NeverFinalised, ValuesCutOff
@@ -149,7 +150,7 @@ def _column(log: Any, key: str, group: int, index: int, findings: list[Finding])
         return SlicedColumn(key, rows, values, unit=first.unit or None)
 
     def time(start: int, end: int) -> FloatArray:
-        times = np.asarray(_signal(log, group, index, start, end).timestamps, dtype=np.float64)
+        times = as_float64(_signal(log, group, index, start, end).timestamps)
         return times if factor == 1.0 else times * factor
 
     return SlicedColumn(key, rows, values, str(group), time, first.unit or None)

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap
-from cdtool.columns import Column
+from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import NoStartTime
@@ -156,7 +156,7 @@ class _Channels:
 
     def _values(self, key: str, start: int, end: int) -> FloatArray:
         raw = self._channels[key][start:end]
-        values = np.ascontiguousarray(raw, dtype=np.float64)
+        values = as_float64(raw)
         self.rounded[key] += rounded_integers(values) if raw.dtype.kind in "iu" else 0
         if len(values) == end - start:
             return values

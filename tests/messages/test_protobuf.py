@@ -171,3 +171,11 @@ def test_elements_are_found_by_their_names_even_if_these_change():
 def test_damaged_descriptors_are_refused(data):
     with pytest.raises(UndecodableError, match=r"descriptors (are damaged|do not define)"):
         decoder_for("protobuf", "protobuf", "pkg.Outer", data)
+
+
+def test_a_float_that_signals_as_it_is_converted_is_read_without_a_warning():
+    decoder, kind = CASES["proto3"]
+    payload = bytearray(kind(one_float=math.inf).SerializeToString())
+    payload[1] = 1  # infinity with its last bit changed
+    values = decoder.decode(batch_of([bytes(payload)]), fields_of("one_float")).fields[0].values
+    assert np.isnan(values).all()

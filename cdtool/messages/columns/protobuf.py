@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.columns import as_float64
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import protobuf_kernel as kernel
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray, UndecodableError
@@ -171,8 +172,7 @@ class TagSlot:
             at = entries.astype(np.int64).reshape(-1)
             raw = np.empty((len(at), np.dtype(dtype).itemsize), dtype=np.uint8)
             fetch(self.data, at, 0, raw)
-            values: FloatArray = raw.view(dtype).reshape(entries.shape).astype(np.float64)
-            return values
+            return as_float64(raw.view(dtype).reshape(entries.shape))
         if wire == "bool":
             return np.asarray(entries != 0, dtype=np.float64)
         if wire in ("sint32", "sint64"):

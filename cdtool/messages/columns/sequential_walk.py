@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cdtool.columns import as_float64
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import walk_kernel
 from cdtool.messages.columns.decoded_batch import ByteArray, IntArray
@@ -51,7 +52,7 @@ class SequentialSlot:
         elif self.swapped is not None:
             swapped = self.swapped if rows is None else self.swapped[rows]
             raw = np.where(swapped[:, None] != 0, raw.byteswap(), raw)
-        return raw if raw.dtype == np.float64 else raw.astype(np.float64)
+        return as_float64(raw)
 
 
 @dataclass(frozen=True)

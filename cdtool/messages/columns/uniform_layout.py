@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.columns import as_float64
 from cdtool.messages.batch import Batch
 from cdtool.messages.columns import walk_kernel
 from cdtool.messages.columns.copy_kernel import WORD, compared_words, copy_uniform, words_of
@@ -50,7 +51,7 @@ class CopiedSlot:
         if words.shape[1] < width:  # no message has them, so that no rows are requested
             return np.empty((0, width))
         raw = _numbers_of(words if rows is None else words[rows], self.dtype)
-        return raw if raw.dtype == np.float64 else raw.astype(np.float64)
+        return as_float64(raw)
 
 
 @dataclass(frozen=True)
