@@ -151,7 +151,10 @@ def _differences(learned: Any, given: Any, name: str = "") -> Iterator[str]:
         for number, pair in enumerate(zip(learned, given, strict=True)):
             yield from _differences(*pair, f"{name}[{number}]" if len(given) > 1 else name)
     elif learned != given:
-        yield f"{name} was {value_in_words(learned)}, is {value_in_words(given)}"
+        was, now = value_in_words(learned), value_in_words(given)
+        if was == now:  # they differ in digits that are not shown
+            was, now = f"{learned!r:.40}", f"{given!r:.40}"
+        yield f"{name[:80]} was {was}, is {now}"
 
 
 def with_run(

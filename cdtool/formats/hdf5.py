@@ -82,7 +82,7 @@ class Packing:
     def unpacked(self, raw: npt.NDArray[Any]) -> FloatArray:
         """Return the unpacked numbers; NaN where a number is missing."""
         values = as_float64(raw)
-        values = values.copy() if values is raw else values
+        values = values.copy() if np.may_share_memory(values, raw) else values
         if self.scale != 1.0:
             values *= self.scale
         if self.offset != 0.0:

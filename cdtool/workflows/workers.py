@@ -24,7 +24,7 @@ import numpy as np
 from cdtool.errors import WorkerError
 
 if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures import Future, ProcessPoolExecutor
     from multiprocessing.context import BaseContext
 
 Item = TypeVar("Item")
@@ -113,22 +113,35 @@ def _without_earlier_garbage() -> Iterator[None]:
 
 def _by_processes(work: Callable[[Item], Made], items: Iterable[Item], jobs: int) -> Iterator[Made]:
     from concurrent.futures import ProcessPoolExecutor
-    from concurrent.futures.process import BrokenProcessPool
 
     waiting = iter(items)
     for item in islice(waiting, 1):
         yield work(item)
     with ProcessPoolExecutor(jobs, _context(), initializer=_begin, initargs=(work,)) as pool, _stopping(pool):
-        ahead = deque(pool.submit(_do, item) for item in islice(waiting, 2 * jobs))
+        ahead = deque(_submitted(pool, item) for item in islice(waiting, 2 * jobs))
         while ahead:
-            try:
+            with _ended_processes_named():
                 made = ahead.popleft().result()
-            except BrokenProcessPool as fault:
-                raise WorkerError(
-                    "a worker process ended before its result", "with too little memory, use a smaller --jobs"
-                ) from fault
             yield made
-            ahead.extend(pool.submit(_do, item) for item in islice(waiting, 1))
+            ahead.extend(_submitted(pool, item) for item in islice(waiting, 1))
+
+
+def _submitted(pool: ProcessPoolExecutor, item: Any) -> Future[Any]:
+    """Return the pool's work on an item; a pool whose process has ended refuses it."""
+    with _ended_processes_named():
+        return pool.submit(_do, item)
+
+
+@contextmanager
+def _ended_processes_named() -> Iterator[None]:
+    from concurrent.futures.process import BrokenProcessPool
+
+    try:
+        yield
+    except BrokenProcessPool as fault:
+        raise WorkerError(
+            "a worker process ended before its result", "with too little memory, use a smaller --jobs"
+        ) from fault
 
 
 def _context() -> BaseContext:

@@ -144,6 +144,12 @@ def test_a_packed_number_is_raw_times_scale_plus_offset(raw, scale, offset, miss
     assert np.array_equal(numbers, truth, equal_nan=True)
 
 
+def test_unpacking_leaves_the_raw_numbers_of_64_bits_as_they_are():
+    raw = np.arange(4.0, dtype=np.dtype("f8", metadata={"h5py": 1}))  # converted to float64 without a copy
+    assert np.array_equal(Packing(2.0, 1.0, (1.0, 3.0)).unpacked(raw), [1.0, np.nan, 5.0, np.nan], equal_nan=True)
+    assert raw.tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
 def test_a_fill_value_of_32_bits_is_compared_in_32_bits(saved):
     values = np.array([0.5, 0.1, 2.0], dtype=np.float32)
     source = survey(saved(x=(values, {"_FillValue": np.float32(0.1)})))

@@ -124,6 +124,14 @@ def test_a_killed_process_is_an_error_with_a_hint_at_memory():
     assert "--jobs" in raised.value.hint
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+def test_a_process_killed_while_results_are_used_is_the_same_error():
+    results = in_order(killed, range(20), 20, 2)
+    with pytest.raises(WorkerError):
+        for _ in results:
+            time.sleep(0.1)  # the pool learns of the end before the next item is submitted
+
+
 def public_errors():
     return [item for item in vars(errors).values() if isinstance(item, type) and issubclass(item, CdtoolError)]
 
