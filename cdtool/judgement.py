@@ -18,7 +18,7 @@ from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.base import FittedThreshold, is_per_run
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 
 _MATRIX = "Array(float64, 2, 'C', readonly=True)"
@@ -96,6 +96,8 @@ class Judgement:
 
     @cached_property
     def _shares(self) -> tuple[_Share, ...]:
+        if not self.classes and self.thresholds and is_per_run(self.thresholds[0]) and len(self.strokes) > 1:
+            return tuple(self._of_stroke(number) for number in range(len(self.strokes)))
         if not self.classes:
             everywhere = np.ones(len(self.signal.time), dtype=bool)
             rows = slice(0, len(self.signal.time))
@@ -103,6 +105,14 @@ class Judgement:
         judging = judging_classes(self.recording, self.classes, self.strokes, self.signal.time, self.hold)
         learned = [item for item in self.thresholds if class_of(item) is not None]
         return tuple(self._share(learned[item.motion], item.stroke, item.where) for item in judging)
+
+    def _of_stroke(self, number: int) -> _Share:
+        """Evaluate the threshold in one stroke alone."""
+        time, last = self.signal.time, number + 1 == len(self.strokes)
+        judges = time >= self.strokes[number].applies
+        if not last:
+            judges &= time < self.strokes[number + 1].applies
+        return self._share(self.thresholds[0], number, judges)
 
     def _share(self, threshold: FittedThreshold, number: int, judges: BoolArray) -> _Share:
         """Evaluate a class in a stroke, without other motions before it, so that its filters start there."""

@@ -49,11 +49,15 @@ def main() -> int:
         rule = with_context(THRESHOLDS.load(name)(), machine.default_sides, Signature(sides=machine.default_sides))
         found[name] = judge(impact, detector.name, signal, [rule.fit(pairs)], Activation())
     with drawing():
-        figure = new_figure(8.0, 9.0)
-        panels = figure.subplots(5, 2, sharex=True)
-        for axes, (name, detection) in zip(panels.flat, found.items(), strict=True):
+        rows = -(-len(found) // 2)
+        figure = new_figure(8.0, 1.8 * rows)
+        panels = figure.subplots(rows, 2, sharex=True).ravel()
+        for axes, (name, detection) in zip(panels, found.items(), strict=False):
             draw(axes, name, detection, onset)
-        for axes in panels[-1]:
+        for axes in panels[len(found) :]:
+            axes.set_visible(False)
+        for axes in panels[len(found) - 2 : len(found)]:
+            axes.tick_params(labelbottom=True)
             axes.set_xlabel("time from the onset of the contact / ms")
         save(figure, IMAGE)
     size = IMAGE.stat().st_size

@@ -26,6 +26,7 @@ from cdtool.cli.options import (
     RearmOption,
     SignatureOption,
     SynchronisationOption,
+    WarmUpOption,
     WindowOption,
     limits_of,
     listed,
@@ -48,6 +49,7 @@ class LogOptions:
     benchmark: BenchmarkOption = None
     signature: SignatureOption = None
     limit: LimitOption = ""
+    warm_up: WarmUpOption = None
     detector: DetectorOption = None
     joints: JointsOption = ""
     operations: OperationsOption = ""
@@ -88,6 +90,7 @@ class LogOptions:
             signature=self.signature,
             detector=self.detector,
             limit=limits,
+            warm_up=self.warm_up,
             joints=listed(self.joints),
             operations=self.operations or "whole",
             activation={

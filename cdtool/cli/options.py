@@ -42,7 +42,13 @@ SignatureOption = Annotated[
 LimitOption = Annotated[
     str, typer.Option("--limit", help="Fixed limit of |signal| instead: one value, or one per joint, as 40,inf,40.")
 ]
-DetectorOption = Annotated[str | None, typer.Option("--detector", "-d", help="Detector; required with --limit.")]
+WarmUpOption = Annotated[
+    float | None,
+    typer.Option("--warm-up", help="Limits from the run's own first seconds in motion instead: this many."),
+]
+DetectorOption = Annotated[
+    str | None, typer.Option("--detector", "-d", help="Detector; required with --limit or --warm-up.")
+]
 BenchmarkOption = Annotated[
     Path | None,
     typer.Option(

@@ -80,8 +80,10 @@ class Threshold(Protocol):
     Notes
     -----
     Optional: `by_class`, True if the rule learns each class of motion separately; what it fits then has `motion`, the
-    class it belongs to. A field `sides` that is None is set to the machine's, a field `signature` that is None to
-    [signature] of the benchmark file. docs/own-detector.md has a complete example.
+    class it belongs to. `per_run`, True, also of what it fits, if the limits are determined in each run itself: `fit`
+    needs no runs, and in a log that is cut each stroke is evaluated separately. A field `sides` that is None is set to
+    the machine's, a field `signature` that is None to [signature] of the benchmark file. docs/own-detector.md has a
+    complete example.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -113,6 +115,29 @@ class Threshold(Protocol):
             There are too few runs, or too few valid samples in them.
         """
         ...
+
+
+def is_per_run(threshold: Threshold | FittedThreshold | type) -> bool:
+    """Return whether a threshold determines its limits in each run itself, so that it needs no impact-free runs.
+
+    Parameters
+    ----------
+    threshold : Threshold, FittedThreshold or type
+        A rule, what it has fitted, or the class of one.
+
+    Returns
+    -------
+    bool
+        Its `per_run`, which is optional.
+
+    Examples
+    --------
+    >>> from cdtool.thresholds.baseline import Baseline
+    >>> from cdtool.thresholds.limit import Limit
+    >>> is_per_run(Baseline()), is_per_run(Limit())
+    (True, False)
+    """
+    return bool(getattr(threshold, "per_run", False))
 
 
 def exceedance(

@@ -21,6 +21,7 @@ from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.baseline import Baseline
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.contacts.matched_log import DetectedLog, match_log
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -67,7 +68,7 @@ class Detected:
 
 
 def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
-    """Run one detector over a log, with a signature or with fixed limits.
+    """Run one detector over a log: with a signature, with fixed limits, or with those of its first seconds in motion.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     Raises
     ------
     UsageError
-        No threshold is given, or two are.
+        No threshold is given, or more than one.
     SignatureError
         The signature belongs to another machine or to other gains.
     RecordingError
@@ -105,8 +106,10 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         return _detect_prepared(Path(log), benchmark)
     machine_file = options.machine_file()
     signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
-    if (signature is None) == (not limit):
-        raise UsageError("give either a signature or a limit", "give --signature FILE or --limit VALUE")
+    if [signature is not None, bool(limit), options.warm_up is not None].count(True) != 1:
+        raise UsageError(
+            "give a signature, a limit or a warm-up", "give one of --signature FILE, --limit VALUE, --warm-up SECONDS"
+        )
     thresholds: tuple[FittedThreshold, ...]
     learned: set[str] = set()
     ranges: PlausibleRanges | None = None
@@ -119,7 +122,9 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)
         if joints:
-            raise UsageError("joints require a limit", "a signature monitors the joints that it was learned for")
+            raise UsageError(
+                "joints require a limit or a warm-up", "a signature monitors the joints that it was learned for"
+            )
         thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
         learned = {run.sha256 for run in stored.runs}
         raised_by, described = stored.activation, stored.described
@@ -127,12 +132,20 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         notes = notes_on(stored)
     else:
         if detector is None:
-            raise UsageError("a limit requires a detector", "give --detector NAME; see cdtool list detectors")
+            what = "limit" if limit else "warm-up"
+            raise UsageError(f"a {what} requires a detector", "give --detector NAME; see cdtool list detectors")
         instance = machine_file.detector(detector)
         check_joints(joints, machine_file.machine)
-        thresholds = (Limit.given(limit),)
         raised_by = Activation()
-        described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
+        if options.warm_up is None:
+            thresholds = (Limit.given(limit),)
+            described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
+        else:
+            sides = machine_file.machine.default_sides
+            baseline = Baseline(warm_up=options.warm_up, sides=sides).fit([])
+            thresholds, normals = (baseline,), NormalMotions(absent=Absence.PER_RUN)
+            first = f"the first {digits(baseline.warm_up)} s in motion"
+            described = f"baseline of {first}, safety factor {baseline.safety_factor:g}"
     stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
     if raised_by != stored_one and signature is not None:
         described += ", with an activation different from the file's"

@@ -30,11 +30,15 @@ class DetectionOptions:
     signature : str or Path, optional
         A signature file, which contains detector, threshold and activation.
     detector : str, optional
-        Name or short name of the detector; needed with `limit`.
+        Name or short name of the detector; needed with `limit` or `warm_up`.
     limit : sequence of float, optional
         Limit |i| < limit in the signal's unit, one number or one per joint, in place of a signature.
+    warm_up : float, optional
+        Limits from the run's own first seconds in motion (threshold `baseline`), this long [s], in place of a
+        signature.
     joints : sequence of str, optional
-        With `limit`, the joints to monitor; all by default. A signature monitors those that it was learned for.
+        With `limit` or `warm_up`, the joints to monitor; all by default. A signature monitors those that it was learned
+        for.
     operations : str, optional
         How the log is cut into operations: whole, motion or trigger.
     activation : ActivationSettings, optional
@@ -50,6 +54,7 @@ class DetectionOptions:
     signature: str | Path | None = None
     detector: str | None = None
     limit: Sequence[float] = ()
+    warm_up: float | None = None
     joints: Sequence[str] = ()
     operations: str = "whole"
     activation: ActivationSettings | None = None
@@ -59,7 +64,8 @@ class DetectionOptions:
         """Return the benchmark, read and learned, or None; raises UsageError for settings combined with it."""
         if self.benchmark is None:
             return None
-        by_hand = self.limit or self.joints or self.operations != "whole" or self.activation or self.rules
+        own_threshold = self.limit or self.warm_up is not None
+        by_hand = own_threshold or self.joints or self.operations != "whole" or self.activation or self.rules
         if self.machine is not None or by_hand:
             raise UsageError("settings cannot be combined with a benchmark file", "set them in the benchmark file")
         if not isinstance(self.benchmark, str | Path):

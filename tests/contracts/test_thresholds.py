@@ -10,11 +10,12 @@ import pytest
 
 from cdtool.activation import Activation
 from cdtool.detectors.momentum import Momentum
+from cdtool.errors import SignatureError
 from cdtool.recording import CHANNELS, GROUND_TRUTH
 from cdtool.signature_file import FactorOrigin, SignatureFile
 from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds import THRESHOLDS
-from cdtool.thresholds.base import exceedance
+from cdtool.thresholds.base import exceedance, is_per_run
 
 NAMES = THRESHOLDS.names(plugins=True)
 
@@ -143,9 +144,13 @@ def test_its_limits_are_linear_in_the_safety_factor_and_decide_which_samples_are
         np.testing.assert_array_equal(outside[clear], ((met_at > factor) & again.valid)[clear])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if not is_per_run(THRESHOLDS.load(name))])
 def test_too_few_runs_are_refused(name, pairs):
-    from cdtool.errors import SignatureError
-
     with pytest.raises(SignatureError, match="1"):
         THRESHOLDS.load(name)().fit(pairs[:1])
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if is_per_run(THRESHOLDS.load(name))])
+def test_a_threshold_from_each_run_itself_needs_no_runs_and_learns_nothing_from_them(name, pairs):
+    rule = THRESHOLDS.load(name)()
+    assert rule.fit([]) == rule.fit(pairs) and is_per_run(rule.fit([]))

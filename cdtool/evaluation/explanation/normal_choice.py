@@ -24,6 +24,7 @@ class Absence(StrEnum):
     """Why there are no learned runs to compare with."""
 
     BY_HAND = "limits set by hand"
+    PER_RUN = "limits from the run itself"
     OLDER_FILE = "signature file without normal motions"
     FEW_RUNS = "too few runs learned from"
     NO_CLASS = "no learned class of motion fits"

@@ -20,6 +20,10 @@ _ABSENT = {
         "limits set by hand are not learned from runs",
         "learn a signature with cdtool learn-signature and give it with --signature",
     ),
+    Absence.PER_RUN: (
+        "the limits are those of the run's own first seconds, and nothing was learned",
+        "learn a signature with cdtool learn-signature and give it with --signature",
+    ),
     Absence.OLDER_FILE: (
         "the signature file has no normal motion",
         "relearn it with cdtool learn-signature",

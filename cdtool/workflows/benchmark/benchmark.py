@@ -13,7 +13,7 @@ from typing import Any
 from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
 from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
@@ -40,7 +40,7 @@ from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, out
 from cdtool.workflows.benchmark.scoring import detect_with, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import RunReading, load_runs, shown_path
-from cdtool.workflows.signature.normal_runs import normal_motions
+from cdtool.workflows.signature.normal_runs import normals_for
 from cdtool.workflows.signature.threshold_settings import set_by_hand
 from cdtool.workflows.workers import Progress
 
@@ -138,7 +138,7 @@ def benchmark(
     gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
     gathered.findings += [*learn.findings, *left_out, *learned.not_assessable]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-    normals = NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS)
+    normals = normals_for(learn.operations, setup.rule)
     scoring = _LogScoring(setup, tuple(used), learned.thresholds, learned.unusable, factors, learn.ranges, normals)
     gathered.score(scoring, work, jobs, progress)
     seconds = {"reading": seconds["reading"] + gathered.reading, "detecting": seconds["detecting"] + gathered.detecting}

@@ -21,7 +21,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
 from cdtool.plain_text import counted
 from cdtool.tables import Table, read_toml
-from cdtool.thresholds.base import Threshold
+from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
@@ -131,7 +131,8 @@ def read_benchmark_file(
         raise root.fault("detectors", "contains a detector twice", "list each detector once")
     signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
-    learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
+    needs_runs = learning and not is_per_run(rule)
+    learn = logs_of(root.table("learn", required=True), base) if needs_runs or "learn" in root else ()
     force = root.table("force")
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)

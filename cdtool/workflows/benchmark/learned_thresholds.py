@@ -13,7 +13,7 @@ from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut, DetectorUnassessable
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector
-from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.base import FittedThreshold, is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.left_out import LeftOut
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
@@ -45,10 +45,16 @@ def learn_thresholds(
 ) -> LearnedThresholds:
     """Learn each detector's threshold from impact-free runs; a budget also sets its safety factor on these runs.
 
+    A threshold that determines its limits in each run learns nothing, but a budget needs the runs.
+
     A detector with a missing channel does not stop the others. Raises SignatureError if nothing can be learned,
     UsageError if there are too few runs for the budget.
     """
     learned = LearnedThresholds({}, [], [], [], {}, set())
+    if is_per_run(setup.rule) and not setup.budget:
+        learned.thresholds.update((detector.name, (setup.rule.fit([]),)) for detector in detectors)
+        learned.unused.update(operation.name for operation in operations)
+        return learned
     fit = fitting(setup.rule)
     left_out = LeftOut()
     unused: list[set[str]] = []

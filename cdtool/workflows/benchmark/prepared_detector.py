@@ -9,16 +9,17 @@ from typing import Any
 
 from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
-from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
+from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.plain_text import counted
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
+from cdtool.thresholds.base import is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_log
 from cdtool.workflows.runs import RunReading, load_runs
-from cdtool.workflows.signature.normal_runs import normal_motions, normals_of, notes_on
+from cdtool.workflows.signature.normal_runs import normals_for, normals_of, notes_on
 
 
 @dataclass(frozen=True)
@@ -101,10 +102,11 @@ def prepare_benchmark(
     many = counted(len(used), "impact-free run")
     classes = len(fitted.thresholds[instance.name])
     many += f" of {classes} classes of motion" if classes > 1 else ""
-    described = f"threshold '{setup.threshold}' of {setup.path.name}, learned from {many}"
+    origin = "from each run itself" if is_per_run(setup.rule) else f"learned from {many}"
+    described = f"threshold '{setup.threshold}' of {setup.path.name}, {origin}"
     hashes = {operation.recording.digest: operation.recording.name for operation in used}
     run = detect_with(setup, [instance], fitted.thresholds, fitted.unusable)
-    normals = NormalMotions(normal_motions(used), Absence.FEW_RUNS)
+    normals = normals_for(used, setup.rule)
     return PreparedBenchmark(
         setup,
         instance.name,

@@ -12,6 +12,7 @@ from cdtool.findings import Finding, Remark
 from cdtool.motion import measured_class
 from cdtool.operations import Operation
 from cdtool.signature_file import SignatureFile
+from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.normal_motion import NormalMotion, learn_normal_motion
 from cdtool.workflows.signature.grouping import by_class
@@ -28,6 +29,11 @@ def normal_motions(operations: Sequence[Operation]) -> tuple[NormalMotion, ...]:
         if normal is not None:
             learned.append(normal)
     return tuple(learned)
+
+
+def normals_for(operations: Sequence[Operation], rule: Threshold) -> NormalMotions:
+    """Return the normal motions of the operations that a rule learned from, or why they are missing."""
+    return NormalMotions(normal_motions(operations), Absence.PER_RUN if is_per_run(rule) else Absence.FEW_RUNS)
 
 
 def normals_of(file: SignatureFile) -> NormalMotions:

@@ -1,0 +1,150 @@
+"""Limits from the run's own first seconds in motion: closed forms, restarts, and what is not assessable."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.detection import WHOLE_MACHINE, Signal, Status
+from cdtool.errors import RecordingError, UsageError
+from cdtool.recording import Recording, Series
+from cdtool.thresholds.baseline import Baseline, FittedBaseline
+
+RATE = 100.0
+
+
+def run_of(speed, values, time=None, status=None, joints=("axis",), names=()):
+    speed, values = (np.asarray(item, dtype=float).reshape(len(item), -1) for item in (speed, values))
+    time = np.arange(len(values)) / RATE if time is None else time
+    status = np.zeros(values.shape, dtype=np.uint8) if status is None else status
+    recording = Recording("run", "run.csv", joints, {"speed": Series(time, speed, "m/s")})
+    return recording, Signal(time, values, status, "N", joints=names)
+
+
+def evaluated(speed, values, warm_up=1.0, factor=8.0, **more):
+    statistic, band = FittedBaseline(warm_up, factor).evaluate(*run_of(speed, values, **more))
+    return statistic.status[:, 0], band.lower[:, 0], band.upper[:, 0]
+
+
+def first_valid(status):
+    return int(np.flatnonzero(status == Status.VALID)[0])
+
+
+def test_limits_are_median_and_quantile_distance_of_the_first_seconds():
+    rng = np.random.default_rng(3)
+    values = 5.0 + rng.standard_normal(400)
+    status, lower, upper = evaluated(np.full(400, 0.4), values)
+    first = first_valid(status)
+    used = values[first - 100 : first]  # 100 steps of 10 ms; each belongs to the sample at its end
+    low, middle, high = np.quantile(used, [0.158655, 0.5, 0.841345])
+    assert upper[first] == pytest.approx(middle + 4.0 * (high - low), rel=1e-12)
+    assert lower[first] == pytest.approx(middle - 4.0 * (high - low), rel=1e-12)
+    assert np.all(upper[first:] == upper[first]), "frozen"
+    assert np.all(status[:first] == Status.START_UP)
+
+
+def test_a_few_outliers_in_the_first_seconds_do_not_widen_the_limits():
+    values = 0.1 * np.random.default_rng(4).standard_normal(400)
+    plain = evaluated(np.full(400, 0.4), values)[2][-1]
+    values[[20, 50, 80]] = 1e6
+    assert evaluated(np.full(400, 0.4), values)[2][-1] < 1.3 * plain
+
+
+def test_rest_before_the_motion_is_not_part_of_it():
+    rng = np.random.default_rng(5)
+    speed = np.repeat([0.0, 0.5], [300, 300]) + 1e-4 * rng.standard_normal(600)
+    values = np.repeat([0.0, 20.0], [300, 300]) + np.repeat([0.01, 1.0], [300, 300]) * rng.standard_normal(600)
+    status, lower, upper = evaluated(speed, values)
+    first = first_valid(status)
+    assert 395 <= first <= 415
+    assert lower[-1] == pytest.approx(12.0, abs=3.0) and upper[-1] == pytest.approx(28.0, abs=3.0)
+
+
+def test_a_joint_that_moves_ten_times_as_fast_as_in_its_first_seconds_starts_again():
+    speed = np.repeat([0.02, 0.5], [300, 300])
+    values = np.repeat([1.0, 9.0], [300, 300]) + np.tile([-0.1, 0.1], 300)
+    status, _, upper = evaluated(speed, values)
+    assert status[250] == Status.VALID and status[320] == Status.START_UP and status[-1] == Status.VALID
+    assert upper[250] == pytest.approx(1.8) and upper[-1] == pytest.approx(9.8)
+
+
+def test_after_a_contact_has_stopped_the_joint_it_is_still_judged():
+    speed = np.repeat([0.5, 0.0], [200, 100])
+    status, _, upper = evaluated(speed, np.repeat([1.0, 50.0], [200, 100]) + np.tile([-0.1, 0.1], 150))
+    assert np.all(status[105:] == Status.VALID) and np.all(upper[105:] < 2.0)
+
+
+def test_a_signal_without_spread_has_no_limit_and_one_that_never_moves_never_starts():
+    status, _, upper = evaluated(np.full(300, 0.5), np.full(300, 2.0))
+    assert np.all(status[110:] == Status.NO_LIMIT) and np.isnan(upper).all()
+    status, _, _ = evaluated(np.zeros(300), np.arange(300.0))
+    assert np.all(status == Status.START_UP)
+
+
+def test_joints_have_their_own_motion_and_a_signal_of_the_whole_machine_that_of_the_fastest():
+    speed = np.zeros((400, 2))
+    speed[:, 0], speed[200:, 1] = 0.5, 0.5
+    values = np.tile([[-1.0, -2.0], [1.0, 2.0]], (200, 1))
+    run = run_of(speed, values, joints=("one", "two"))
+    statistic, band = FittedBaseline(1.0, 8.0).evaluate(*run)
+    assert first_valid(statistic.status[:, 0]) < 110 < 300 < first_valid(statistic.status[:, 1]) < 320
+    assert band.upper[-1].tolist() == [8.0, 16.0]
+    _, only_two = run_of(speed, values[:, 1], joints=("one", "two"), names=("two",))
+    statistic, _ = FittedBaseline(1.0, 8.0).evaluate(run[0], only_two)
+    assert first_valid(statistic.status[:, 0]) > 300
+    _, whole = run_of(speed, values[:, 0], joints=("one", "two"), names=WHOLE_MACHINE)
+    statistic, _ = FittedBaseline(1.0, 8.0).evaluate(run[0], whole)
+    assert first_valid(statistic.status[:, 0]) < 110
+
+
+def test_missing_samples_of_speed_or_signal_only_delay_it():
+    rng = np.random.default_rng(6)
+    values, status = rng.standard_normal(600), np.zeros((600, 1), dtype=np.uint8)
+    status[40:60] = Status.GAP
+    values[40:60] = np.nan
+    speed = np.full(600, 0.5)
+    speed[80:200] = np.nan
+    found, _, _ = evaluated(speed, values, status=status)
+    assert np.all(found[40:60] == Status.GAP) and 220 < first_valid(found) < 260
+    values[300] = np.nan  # without a status
+    assert evaluated(speed, values, status=status)[0][300] == Status.GAP
+
+
+def test_the_time_counts_not_the_number_of_samples_on_an_irregular_clock():
+    rng = np.random.default_rng(7)
+    time = np.cumsum(rng.uniform(1 / 60, 1 / 30, 300))
+    status, _, _ = evaluated(np.full(300, 0.3), rng.standard_normal(300), time=time, warm_up=2.0)
+    assert 2.0 < time[first_valid(status)] - time[0] < 2.3
+
+
+@given(st.integers(50, 400), st.integers(0, 2**32 - 1))
+def test_a_later_sample_never_changes_the_limits(cut, seed):
+    rng = np.random.default_rng(seed)
+    speed = np.where(np.arange(400) < rng.integers(0, 300), 0.01, 0.6) + 0.01 * rng.standard_normal(400)
+    values = np.where(rng.random(400) < 0.05, np.nan, rng.standard_normal(400))
+    whole = evaluated(speed, values, warm_up=0.5)
+    part = evaluated(speed[:cut], values[:cut], warm_up=0.5)
+    for ours, theirs in zip(part, whole, strict=True):
+        np.testing.assert_array_equal(ours, theirs[:cut])
+
+
+def test_one_side_is_that_on_which_an_obstacle_opposes_the_present_motion():
+    speed = np.repeat([0.5, 0.0, -0.5], 150)
+    recording, signal = run_of(speed, np.tile([-1.0, 1.0], 225))
+    _, band = FittedBaseline(1.0, 8.0, "one").evaluate(recording, signal)
+    assert np.isneginf(band.lower[120:300]).all() and np.all(band.upper[120:300] == 8.0)
+    assert np.isposinf(band.upper[320:]).all() and np.all(band.lower[320:] == -8.0)
+    _, unsigned = FittedBaseline(1.0, 8.0, "one").evaluate(recording, signal.changed(signed=False))
+    assert np.isneginf(unsigned.lower[120:]).all() and np.all(unsigned.upper[120:] == 8.0)
+
+
+@pytest.mark.parametrize("setting", [{"sides": "left"}, {"warm_up": 0.0}, {"warm_up": -1.0}, {"safety_factor": 0.0}])
+def test_settings_must_be_above_zero(setting):
+    with pytest.raises(UsageError):
+        Baseline(**setting)
+
+
+def test_without_a_speed_it_is_an_error_that_names_the_channel():
+    _, signal = run_of(np.full(10, 0.5), np.zeros(10))
+    with pytest.raises(RecordingError, match="speed"):
+        FittedBaseline(1.0, 8.0).evaluate(Recording("run", "", ("axis",), {}), signal)
