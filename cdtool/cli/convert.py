@@ -9,7 +9,7 @@ import typer
 
 from cdtool.cli.console import leave_with, plain, print_json, with_findings
 from cdtool.cli.late_progress import late_progress
-from cdtool.cli.options import JsonOption
+from cdtool.cli.options import FromOption, JsonOption, ToOption, section_of
 from cdtool.plain_text import counted
 
 
@@ -23,6 +23,8 @@ def convert(
         Path | None,
         typer.Option("--machine", "-m", help="Machine file: write its channels in SI units. Default: all columns."),
     ] = None,
+    from_: FromOption = None,
+    to: ToOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -34,7 +36,8 @@ def convert(
     from cdtool.workflows.convert.converting import convert as write
 
     with late_progress("converting") as advance:
-        done = write(source, output, machine=machine, force=force, progress=advance)
+        section = section_of(from_, to)
+        done = write(source, output, machine=machine, section=section, force=force, progress=advance)
     if as_json:
         print_json(with_findings(done))
     else:

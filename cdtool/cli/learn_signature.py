@@ -11,6 +11,7 @@ import typer
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress, table
 from cdtool.cli.options import (
     DebounceOption,
+    FromOption,
     HysteresisOption,
     JobsOption,
     JointsOption,
@@ -20,7 +21,9 @@ from cdtool.cli.options import (
     OnsetAboveOption,
     OperationsOption,
     RearmOption,
+    ToOption,
     listed,
+    section_of,
 )
 
 if TYPE_CHECKING:
@@ -44,6 +47,12 @@ def learn_signature(
     false_alarm_budget: Annotated[
         str | None,
         typer.Option("--false-alarm-budget", help="Set the safety factor for this rate, as 1/300op or 0.1/h."),
+    ] = None,
+    from_: FromOption = None,
+    to: ToOption = None,
+    guard: Annotated[
+        float | None,
+        typer.Option("--guard", help="Also learn from logs with contacts: up to this many seconds before the first."),
     ] = None,
     operations: OperationsOption = "whole",
     rule: Annotated[
@@ -102,6 +111,8 @@ def learn_signature(
             detector,
             rule=rule_of(threshold, settings or (), own, machine_file.machine.default_sides),
             joints=listed(joints),
+            section=section_of(from_, to),
+            guard=guard,
             operations=operations,
             activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
             false_alarm_budget=false_alarm_budget,

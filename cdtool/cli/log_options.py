@@ -10,6 +10,7 @@ from cdtool.cli.options import (
     BenchmarkOption,
     DebounceOption,
     DetectorOption,
+    FromOption,
     HysteresisOption,
     JointsOption,
     LabelsOption,
@@ -26,10 +27,12 @@ from cdtool.cli.options import (
     RearmOption,
     SignatureOption,
     SynchronisationOption,
+    ToOption,
     WarmUpOption,
     WindowOption,
     limits_of,
     listed,
+    section_of,
 )
 from cdtool.errors import UsageError
 
@@ -50,6 +53,8 @@ class LogOptions:
     signature: SignatureOption = None
     limit: LimitOption = ""
     warm_up: WarmUpOption = None
+    from_: FromOption = None
+    to: ToOption = None
     detector: DetectorOption = None
     joints: JointsOption = ""
     operations: OperationsOption = ""
@@ -92,6 +97,7 @@ class LogOptions:
             limit=limits,
             warm_up=self.warm_up,
             joints=listed(self.joints),
+            section=section_of(self.from_, self.to),
             operations=self.operations or "whole",
             activation={
                 "debounce": self.debounce,
@@ -105,7 +111,7 @@ class LogOptions:
     def _refuse_beside(self, benchmark: Path) -> None:
         for item in fields(self):
             if item.name not in _WITH_BENCHMARK and getattr(self, item.name) not in (None, ""):
-                option = f"--{item.name.replace('_', '-')}"
+                option = f"--{item.name.strip('_').replace('_', '-')}"
                 raise UsageError(
                     f"{option} cannot be combined with --benchmark", f"set it in {benchmark}, or omit one of the two"
                 )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdtool.errors import UsageError
+
+if TYPE_CHECKING:
+    from cdtool.log_section import LogSection
 
 MachineOption = Annotated[Path, typer.Option("--machine", "-m", help="Machine file (TOML); see docs/machine-file.md.")]
 MachineUnlessBenchmarkOption = Annotated[
@@ -86,6 +89,11 @@ WindowOption = Annotated[
 MassBeforeCellOption = Annotated[
     float | None, typer.Option("--mass-before-cell", help="Mass between load cell and contact [kg]. Default: 0.")
 ]
+FromOption = Annotated[
+    str | None,
+    typer.Option("--from", help="Use the log from here: a time on its clock as 1.5s, or a distance travelled as 0.2m."),
+]
+ToOption = Annotated[str | None, typer.Option("--to", help="Use the log up to here: a time or a distance travelled.")]
 OutputOption = Annotated[
     list[Path] | None,
     typer.Option(
@@ -102,6 +110,19 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 def listed(text: str) -> tuple[str, ...]:
     """Return the names in a comma-separated list."""
     return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def section_of(begin: str | None, end: str | None) -> LogSection:
+    """Return the part of a log that --from and --to describe; raises UsageError."""
+    from cdtool.log_section import LogSection, Mark
+
+    marks: list[Mark | None] = []
+    for option, text in (("--from", begin), ("--to", end)):
+        try:
+            marks.append(None if text is None else Mark.parse(text))
+        except UsageError as fault:
+            raise UsageError(f"{option} {fault.message}", fault.hint) from fault
+    return LogSection(*marks)
 
 
 def limits_of(text: str) -> tuple[float, ...]:

@@ -135,6 +135,16 @@ class DetectorUnassessable(TemplateFact):
 
 
 @frozen
+class NothingLearnedWithout(TemplateFact):
+    """A log's own part is needed to learn a detector's threshold, so that the log cannot be scored with the others'."""
+
+    detector: str
+    reason: str
+
+    words = "{detector} is not assessable: nothing can be learned from the other recordings: {reason}"
+
+
+@frozen
 class RecordingsWithoutRow(Fact):
     """Recordings without a row for a detector in a trigger file: they are `left_out`, or count as without an alarm."""
 

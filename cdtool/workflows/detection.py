@@ -16,6 +16,7 @@ from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import Matching, belongs, windows
 from cdtool.evaluation.truth.missing_samples import longest_step
 from cdtool.motion.applicable import HOLD
+from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
@@ -28,7 +29,7 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import absent_truth, check_joints, load_operations
+from cdtool.workflows.runs import absent_truth, check_joints, read_named
 
 if TYPE_CHECKING:
     from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
@@ -149,11 +150,14 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
     if raised_by != stored_one and signature is not None:
         described += ", with an activation different from the file's"
-    recording, parts = load_operations(Path(log), machine_file, options.operations, ranges=ranges)
+    whole = read_named(Path(log), machine_file, ranges=ranges)
+    recording = options.section.of(whole)
+    parts = operations_of(recording, options.operations)
     rules = options.rules or ScoringRules()
     hold = max(HOLD, rules.window)
     detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
-    contacts = any_contacts(recording, rules)
+    contacts = any_contacts(whole, rules)
+    contacts = list(options.section.contacts_of(whole, contacts)) if options.section else contacts
     detected = DetectedLog(recording, parts, options.operations, contacts, [[item] for item in detections])
     matched = match_log(detected, "", rules, raised_by.wait)
     return Detected(

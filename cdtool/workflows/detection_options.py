@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdtool.activation import ActivationSettings
 from cdtool.errors import UsageError
+from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
@@ -39,6 +40,8 @@ class DetectionOptions:
     joints : sequence of str, optional
         With `limit` or `warm_up`, the joints to monitor; all by default. A signature monitors those that it was learned
         for.
+    section : LogSection, optional
+        The part of the log that is used; the whole log by default.
     operations : str, optional
         How the log is cut into operations: whole, motion or trigger.
     activation : ActivationSettings, optional
@@ -56,6 +59,7 @@ class DetectionOptions:
     limit: Sequence[float] = ()
     warm_up: float | None = None
     joints: Sequence[str] = ()
+    section: LogSection = field(default_factory=LogSection)
     operations: str = "whole"
     activation: ActivationSettings | None = None
     rules: ScoringRules | None = None
@@ -65,7 +69,8 @@ class DetectionOptions:
         if self.benchmark is None:
             return None
         own_threshold = self.limit or self.warm_up is not None
-        by_hand = own_threshold or self.joints or self.operations != "whole" or self.activation or self.rules
+        cut = self.section or self.operations != "whole"
+        by_hand = own_threshold or cut or self.joints or self.activation or self.rules
         if self.machine is not None or by_hand:
             raise UsageError("settings cannot be combined with a benchmark file", "set them in the benchmark file")
         if not isinstance(self.benchmark, str | Path):

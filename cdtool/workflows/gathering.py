@@ -173,7 +173,7 @@ class Gathering:
             raise ConfigurationError(
                 f"{self.setup.path}: {recording.recording} and {before} have identical content", "score each log once"
             )
-        if recording.sha256 and recording.sha256 in self.learned:
+        if recording.sha256 and self.learned.get(recording.sha256, recording.recording) != recording.recording:
             raise ConfigurationError(
                 f"{self.setup.path}: {recording.recording} has the same content as {self.learned[recording.sha256]}, "
                 "which is used for learning",

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from cdtool.errors import ConfigurationError
+from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.truth.labels import Labels, read_labels
 from cdtool.evaluation.truth.named_rows import by_recording
+from cdtool.log_section import MARK_HINT, LogSection, Mark
 from cdtool.tables import Table
+from cdtool.value_words import value_in_words
 from cdtool.workflows.runs import find_logs, shown_path
 
 
@@ -17,6 +19,48 @@ def logs_of(table: Table, base: Path) -> tuple[Path, ...]:
     logs = tuple(find_logs(table.texts("logs"), base, table.key("logs")))
     table.finish()
     return logs
+
+
+def sectioned_logs(table: Table, base: Path) -> dict[Path, LogSection]:
+    """Return the files that `logs` names below `base`, with the part of each that is used.
+
+    `from` and `to` of the table are for all of them; an entry `{ path = "...", from = "...", to = "..." }` has its own.
+    Raises ConfigurationError for no match, for unknown keys, and for a log with two different parts.
+    """
+    common = _section(table)
+    entries = table.raw("logs")
+    found: dict[Path, LogSection] = {}
+    for number, entry in enumerate(entries if isinstance(entries, list) else [entries]):
+        section, pattern = common, entry
+        if isinstance(entry, dict):
+            own = Table(entry, table.where, f"{table.prefix}logs[{number}].")
+            pattern, section = own.text("path"), _section(own).within(common)
+            own.finish()
+        paths = find_logs(Table({"logs": pattern}, table.where, table.prefix).texts("logs"), base, table.key("logs"))
+        for path in paths:
+            if found.setdefault(path, section) != section:
+                raise table.fault("logs", f"names {path} with two different parts", "name each log once")
+    table.finish()
+    return found
+
+
+def _section(table: Table) -> LogSection:
+    """Return `from` and `to` of a table."""
+    begin, end = (_mark(table, name) for name in ("from", "to"))
+    try:
+        return LogSection(begin, end)
+    except UsageError as fault:
+        raise table.fault("to", fault.message, fault.hint) from fault
+
+
+def _mark(table: Table, name: str) -> Mark | None:
+    text = table.raw(name)
+    if text is not None and not isinstance(text, str):
+        raise table.fault(name, f"is {value_in_words(text)}", f"{MARK_HINT}, in quotes")
+    try:
+        return None if text is None else Mark.parse(text)
+    except UsageError as fault:
+        raise table.fault(name, fault.message, fault.hint) from fault
 
 
 def named_logs(table: Table, base: Path, scored: Sequence[Path]) -> dict[Path, str]:

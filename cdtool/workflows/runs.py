@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import Recording
+from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
 from cdtool.workflows.workers import Progress, in_order
@@ -86,8 +86,15 @@ def load_operations(
     ranges: PlausibleRanges | None = None,
 ) -> tuple[Recording, list[Operation]]:
     """Return one log's recording, named by its path below `base`, and its operations; CdtoolError names the file."""
-    recording = replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
+    recording = read_named(path, machine_file, base, ranges)
     return recording, operations_of(recording, how)
+
+
+def read_named(
+    path: Path, machine_file: MachineFile, base: Path | None = None, ranges: PlausibleRanges | None = None
+) -> Recording:
+    """Return one log's recording, named by its path below `base`; CdtoolError names the file."""
+    return replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
 
 
 @dataclass(frozen=True)
@@ -111,17 +118,24 @@ def _with_channels(path: Path, recording: Recording) -> Recording:
     return recording
 
 
+# Returns the part of a log, given by its path and recording, that is learned from, and the contacts in it. Raises
+# RecordingError if no part of it is usable.
+PartOfLog = Callable[[Path, Recording], tuple[Recording, Sequence[Contact]]]
+
+
 @dataclass(frozen=True)
 class RunReading:
     """How impact-free logs are read: cut by `operations`, contacts refused by the `onset` rule, named below `base`.
 
-    `jobs` logs are read in parallel; `progress` is called after each.
+    `part` returns the part of a log that is learned from and the contacts in it; None: the whole log. `jobs` logs are
+    read in parallel; `progress` is called after each.
     """
 
     operations: str
     _: KW_ONLY
     onset: OnsetRule | None = None
     base: Path | None = None
+    part: PartOfLog | None = None
     jobs: int = 1
     progress: Progress | None = None
 
@@ -151,6 +165,9 @@ def load_runs(
                 raise item
             recording = item.on_load_side(machine_file.machine, known, to_learn=True)
             recording = replace(recording, name=shown_path(path, base))
+            contacts: Sequence[Contact] | None = None
+            if reading.part:
+                recording, contacts = reading.part(path, recording)
             parts = operations_of(recording, reading.operations)
         except CdtoolError as fault:
             skipped.append(unread(path, base, fault))
@@ -159,7 +176,7 @@ def load_runs(
         if first != recording.name:
             skipped.append(Skipped(recording.name, f"has the same content as {first}: used once"))
             continue
-        contacts = contacts_shown(recording, rule)
+        contacts = contacts_shown(recording, rule) if contacts is None else contacts
         free, touched = without_contacts(parts, contacts)
         operations.extend(free)
         skipped.extend(touched)

@@ -600,6 +600,10 @@ SENTENCES: list[tuple[Fact, str]] = [
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
     (scoring.DetectorUnassessable("nothing is valid"), "not assessable: nothing is valid"),
     (
+        scoring.NothingLearnedWithout("momentum", "9 impact-free runs of one class"),
+        "momentum is not assessable: nothing can be learned from the other recordings: 9 impact-free runs of one class",
+    ),
+    (
         scoring.RecordingsWithoutRow("plc", 2, 9, True, "stiff/01.csv"),
         "plc: 2 of 9 recordings without a row: left out; first stiff/01.csv",
     ),

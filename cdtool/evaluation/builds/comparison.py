@@ -45,6 +45,7 @@ _RULES = {
     "watched_joints": "joints",
     "mass_before_cell_kg": "[force] mass_before_cell_kg",
     "force_profiles": "[force] limits or profile",
+    "sections": "from and to of the logs",
 }
 _BY_GROUP = ("window_s", "force_profiles")
 _UNDER_TEST = (
@@ -55,6 +56,7 @@ _UNDER_TEST = (
     "threshold",
     "threshold_rule",
     "safety_factor_set",
+    "learned_until",
     "signature_rule",
     "debounce_samples",
     "rearm_s",

@@ -34,6 +34,10 @@ _NAMES = {
     "machine_sha256": "SHA-256 of the machine file",
     "plugins": "plug-ins",
     "learned_runs": "operations learned from",
+    "learned_until": "learned from each log until",
+    "learned_sections": "parts of logs learned from",
+    "scored_without_own_part": "scored with thresholds learned from the other recordings",
+    "sections": "parts of logs scored",
 }
 # Entries that have tables of their own, are part of another, or are the same in every report.
 _OTHER_TABLES = ("tool", "gains", "signature_sha256", "learned_sha256", "units", "short_names", "force_profiles")

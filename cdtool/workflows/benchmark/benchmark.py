@@ -35,11 +35,11 @@ from cdtool.workflows.benchmark.benchmark_file import (
     with_detectors,
     with_only,
 )
-from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds, that_can_run
+from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds, that_can_run
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
 from cdtool.workflows.benchmark.scoring import detect_with, score_log
 from cdtool.workflows.gathering import Gathering
-from cdtool.workflows.runs import RunReading, load_runs, shown_path
+from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normals_for
 from cdtool.workflows.signature.threshold_settings import set_by_hand
 from cdtool.workflows.workers import Progress
@@ -117,8 +117,7 @@ def benchmark(
     used = [machine_file.detector(name) for name in setup.detectors]
     compile_loaded()
     begin = perf_counter()
-    base = setup.path.parent
-    learn = load_runs(setup.learn, machine_file, RunReading(setup.operations, onset=setup.onset, base=base, jobs=jobs))
+    learn = load_runs(setup.learn, machine_file, setup.run_reading(jobs))
     seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
     left_out: list[RecordingFinding] = []
     if list(detectors) == ["all"]:
@@ -139,7 +138,8 @@ def benchmark(
     gathered.findings += [*learn.findings, *left_out, *learned.not_assessable]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     normals = normals_for(learn.operations, setup.rule)
-    scoring = _LogScoring(setup, tuple(used), learned.thresholds, learned.unusable, factors, learn.ranges, normals)
+    thresholds = ThresholdsByLog.of(setup, learned)
+    scoring = _LogScoring(setup, tuple(used), thresholds, learned.unusable, factors, learn.ranges, normals)
     gathered.score(scoring, work, jobs, progress)
     seconds = {"reading": seconds["reading"] + gathered.reading, "detecting": seconds["detecting"] + gathered.detecting}
     provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))
@@ -154,15 +154,17 @@ class _LogScoring:
 
     setup: BenchmarkFile
     detectors: tuple[Detector, ...]
-    thresholds: Mapping[str, tuple[FittedThreshold, ...]]
+    thresholds: ThresholdsByLog
     unusable: Mapping[str, str]
     factors: Mapping[str, FloatArray]
     ranges: PlausibleRanges
     normals: NormalMotions
 
     def __call__(self, group: str, path: Path, wanted: WantedTraces) -> LogOutcome:
-        detect = detect_with(self.setup, self.detectors, self.thresholds, self.unusable)
+        thresholds, findings = self.thresholds.without(path)
+        detect = detect_with(self.setup, self.detectors, thresholds, self.unusable)
         scored = score_log(self.setup, group, path, detect, self.factors, self.ranges)
+        scored.findings += findings
         return outcome_of(scored, self.setup, self.normals, wanted)
 
 
@@ -196,6 +198,7 @@ def _provenance(
         },
         "signature_sha256": {name: _digest(items) for name, items in thresholds.items()},
         "learned_runs": [operation.name for operation in learned],
+        **setup.learned_parts,
         "safety_factor_set": "by budget" if setup.budget else "by hand" if set_by_hand(setup.rule) else "by default",
         **setup.activation.described,
         **setup.scoring,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +18,25 @@ from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
+from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import HOW_TO_CUT
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, digits
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.signature import Signature
+from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.named_logs import labels_of, logs_of, named_logs
+from cdtool.workflows.named_logs import labels_of, named_logs, sectioned_logs
+from cdtool.workflows.runs import RunReading, shown_path
 from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
 
 HOLDOUT = "holdout"
+
+# Where a log that is learned from ends.
+_UNTIL = ("end", "onset")
+# How long before its first contact a log is no longer learned from [s].
+_GUARD = 0.2
 
 
 @dataclass(frozen=True)
@@ -45,7 +54,8 @@ class BenchmarkFile:
 
     `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock.
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
-    versions were read.
+    versions were read. `sections` are the parts of scored logs that are used, `learned_sections` those of the logs
+    learned from, which end `guard` [s] before their first contact; None: they have no contact.
     """
 
     path: Path
@@ -70,6 +80,9 @@ class BenchmarkFile:
     digest: str
     window: float = 1.0
     migrated: tuple[str, ...] = ()
+    sections: Mapping[Path, LogSection] = field(default_factory=dict)
+    learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
+    guard: float | None = None
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -89,7 +102,37 @@ class BenchmarkFile:
             "synchronisation_s": self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
+            "sections": self._in_words(self.sections),
         }
+
+    @property
+    def learned_parts(self) -> dict[str, Any]:
+        """Return which parts of the logs are learned from, for provenance."""
+        until = None if self.guard is None else f"{digits(self.guard)} s before the first contact of each log"
+        others = [shown_path(path, self.path.parent) for path in self.both]
+        return {
+            "learned_until": until,
+            "learned_sections": self._in_words(self.learned_sections),
+            "scored_without_own_part": others,
+        }
+
+    @cached_property
+    def both(self) -> tuple[Path, ...]:
+        """Return the scored logs whose parts are also learned from: each is scored with what was learned from the others."""
+        learned = {path.resolve() for path in self.learn}
+        return tuple(path for group in self.impacts.values() for path in group.logs if path.resolve() in learned)
+
+    def _in_words(self, sections: Mapping[Path, LogSection]) -> dict[str, str]:
+        return {shown_path(path, self.path.parent): str(section) for path, section in sections.items()}
+
+    def run_reading(self, jobs: int = 1) -> RunReading:
+        """Return how the logs to learn from are read."""
+        rules = ScoringRules(self.onset, self.window, self.labels, self.synchronisation, self.mass_before_cell)
+        part = PartToLearnFrom(rules, self.learned_sections, self.guard)
+        needed = self.guard is not None or self.learned_sections
+        return RunReading(
+            self.operations, onset=self.onset, base=self.path.parent, part=part if needed else None, jobs=jobs
+        )
 
     def rules_of(self, group: str) -> ScoringRules:
         """Return the settings that determine the results of a log in that group, or in no group."""
@@ -132,11 +175,13 @@ def read_benchmark_file(
     signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
     needs_runs = learning and not is_per_run(rule)
-    learn = logs_of(root.table("learn", required=True), base) if needs_runs or "learn" in root else ()
+    learn_table = root.table("learn", required=needs_runs)
+    guard = _guard(learn_table)
+    learn = sectioned_logs(learn_table, base) if needs_runs or "learn" in root else {}
     force = root.table("force")
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
-    impacts = _groups(root, base, window, force)
+    impacts, sections = _groups(root, base, window, force)
     onset = root.table("onset")
     migrated = migrated_onset(onset)
     benchmark = BenchmarkFile(
@@ -150,11 +195,11 @@ def read_benchmark_file(
         signature=signature,
         rule=rule,
         activation=_read_activation(root.table("activation")),
-        labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
+        labels=labels_of(onset, base, [*_scored(impacts, HOLDOUT), *(learn if guard is not None else ())]),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=read_onset(onset),
         mass_before_cell=mass_before_cell,
-        learn=learn,
+        learn=tuple(learn),
         impacts=impacts,
         campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
         points=named_logs(root.table("points"), base, _scored(impacts)),
@@ -164,6 +209,9 @@ def read_benchmark_file(
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
         window=window,
         migrated=migrated,
+        sections=sections,
+        learned_sections={path: section for path, section in learn.items() if section},
+        guard=guard,
     )
     root.finish()
     if benchmark.points and not any(group.force for group in impacts.values()):
@@ -203,8 +251,19 @@ def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
     return replace(setup, detectors=tuple(detectors), limits=limits)
 
 
-def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, ImpactGroup]:
-    """Return the groups of impacts, then the hold-out."""
+def _guard(learn: Table) -> float | None:
+    """Return how long before its first contact a log is no longer learned from [s]; None if it is used to its end."""
+    if learn.choice("until", _UNTIL, "end") == "end":
+        if "guard_s" in learn:
+            raise learn.fault("guard_s", "is given without until", 'set until = "onset", or remove it')
+        return None
+    return learn.number("guard_s", _GUARD, minimum=0.0)
+
+
+def _groups(
+    root: Table, base: Path, window: float, force: Table
+) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
+    """Return the groups of impacts, then the hold-out, and the sections of their logs."""
     tables = root.table("impacts")
     if HOLDOUT in tables.values:
         raise tables.fault(
@@ -215,6 +274,7 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, I
     if profile:
         _profile(profiles, force, "profile", force)
     groups = {}
+    sections: dict[Path, LogSection] = {}
     for name in tables.values:
         if name.strip() in ("", ALL):
             raise tables.fault(name, "is not a valid group name", f"choose another name; {ALL} stands for every group")
@@ -223,16 +283,20 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, I
         if profile and "force_profile" not in table:
             limits = profiles[profile]
         own = table.number("window_s", window, above=0.0)
-        groups[name] = ImpactGroup(logs_of(table, base), own, limits)
+        logs = sectioned_logs(table, base)
+        sections |= logs
+        groups[name] = ImpactGroup(tuple(logs), own, limits)
     if HOLDOUT in root:
-        groups[HOLDOUT] = ImpactGroup(logs_of(root.table(HOLDOUT), base), window)
+        logs = sectioned_logs(root.table(HOLDOUT), base)
+        sections |= logs
+        groups[HOLDOUT] = ImpactGroup(tuple(logs), window)
     if "limits" in force and not any(group.force for group in groups.values()):
         raise force.fault(
             "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"
         )
     if not groups:
         raise root.fault("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")
-    return groups
+    return groups, {path: section for path, section in sections.items() if section}
 
 
 def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:
@@ -273,17 +337,23 @@ def _refuse_overlap(benchmark: BenchmarkFile) -> None:
     scored: dict[Path, str] = {}
     for name, path in ((name, path) for name, group in benchmark.impacts.items() for path in group.logs):
         true = path.resolve()
-        if true in learned:
-            raise ConfigurationError(
-                f"{benchmark.path}: {path} is both learned from and scored",
-                "use a recording either in [learn] or for scoring",
-            )
+        if true in learned and (name == HOLDOUT or not _ends_early(benchmark, true)):
+            hint = "use a recording either in [learn] or for scoring"
+            if name != HOLDOUT:
+                hint += ', or learn from what is before its contact: [learn] until = "onset"'
+            raise ConfigurationError(f"{benchmark.path}: {path} is both learned from and scored", hint)
         if true in scored:
             where = f"in {scored[true]} and in {name}" if scored[true] != name else f"twice in {name}"
             raise ConfigurationError(
                 f"{benchmark.path}: {path} is scored {where}", "list a recording in one group only, under one path"
             )
         scored[true] = name
+
+
+def _ends_early(benchmark: BenchmarkFile, log: Path) -> bool:
+    """Return whether only a part of a log is learned from that ends before the log does."""
+    ends = {path.resolve() for path, section in benchmark.learned_sections.items() if section.end}
+    return benchmark.guard is not None or log in ends
 
 
 def _read_budget(table: Table) -> Budget | None:

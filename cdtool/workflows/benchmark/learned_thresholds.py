@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from cdtool.dynamics import Machine
-from cdtool.errors import CdtoolError, NothingValidError, SignatureError
+from cdtool.errors import CdtoolError, NothingValidError, SignatureError, UsageError
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
 from cdtool.findings import Finding
-from cdtool.findings.scoring import DetectorLeftOut, DetectorUnassessable
+from cdtool.findings.scoring import DetectorLeftOut, DetectorUnassessable, NothingLearnedWithout
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector
 from cdtool.thresholds.base import FittedThreshold, is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.left_out import LeftOut
+from cdtool.workflows.runs import shown_path
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
-from cdtool.workflows.signature.fitting import NoUsableRunError, fitting, signals_of, with_left_out
+from cdtool.workflows.signature.fitting import NoUsableRunError, Pair, fitting, signals_of, with_left_out
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class LearnedThresholds:
     """Each detector's thresholds, runs left out, detectors that were not assessable, and how factors were set.
 
     `unusable` maps the detectors that could not be used on any run to the reason; they have no threshold. `unused`: the
-    runs that every other detector left out.
+    runs that every other detector left out. `pairs` are the runs by detector.
     """
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
@@ -34,6 +36,7 @@ class LearnedThresholds:
     calibration: list[CalibrationResult]
     unusable: dict[str, str]
     unused: set[str]
+    pairs: dict[str, list[Pair]]
 
     def learned_from(self, operations: Sequence[Operation]) -> list[Operation]:
         """Return the operations that at least one detector learned from."""
@@ -45,24 +48,22 @@ def learn_thresholds(
 ) -> LearnedThresholds:
     """Learn each detector's threshold from impact-free runs; a budget also sets its safety factor on these runs.
 
-    A threshold that determines its limits in each run learns nothing, but a budget needs the runs.
-
-    A detector with a missing channel does not stop the others. Raises SignatureError if nothing can be learned,
-    UsageError if there are too few runs for the budget.
+    A threshold that determines its limits in each run learns nothing, but a budget needs the runs. A detector with a
+    missing channel does not stop the others. Raises SignatureError if nothing can be learned, UsageError if there are
+    too few runs for the budget.
     """
-    learned = LearnedThresholds({}, [], [], [], {}, set())
+    learned = LearnedThresholds({}, [], [], [], {}, set(), {})
     if is_per_run(setup.rule) and not setup.budget:
         learned.thresholds.update((detector.name, (setup.rule.fit([]),)) for detector in detectors)
         learned.unused.update(operation.name for operation in operations)
         return learned
-    fit = fitting(setup.rule)
     left_out = LeftOut()
     unused: list[set[str]] = []
     for detector in detectors:
         try:
             pairs, unusable = signals_of(operations, setup.machine_file.machine, detector, setup.watched, unread)
             pairs = in_fixed_order(pairs)
-            fitted = with_left_out(fit, [*unread, *unusable])(pairs)
+            made = _learn(setup, detector.name, pairs, [*unread, *unusable])
         except NothingValidError as fault:
             learned.thresholds[detector.name] = ()
             unassessable = Finding(DetectorUnassessable(fault.message))
@@ -72,23 +73,70 @@ def learn_thresholds(
             learned.thresholds[detector.name] = ()
             learned.unusable[detector.name] = fault.reason
             continue
-        left_out.add(detector.name, [*unusable, *fitted.skipped])
-        unused.append({item.recording for item in [*unusable, *fitted.skipped]})
-        thresholds = fitted.thresholds
-        if setup.budget:
-            made = calibrate(setup.budget, detector.name, kept(pairs, fitted.skipped), fit, setup.activation)
-            thresholds = tuple(item.with_safety_factor(made.factor) for item in thresholds)
-            learned.calibration.append(
-                CalibrationResult(
-                    detector.name, str(setup.budget), made.factor, made.operations, made.hours, made.alarms
-                )
-            )
-        learned.thresholds[detector.name] = thresholds
+        left_out.add(detector.name, [*unusable, *made.skipped])
+        unused.append({item.recording for item in [*unusable, *made.skipped]})
+        learned.calibration.extend(made.calibration)
+        learned.thresholds[detector.name] = made.thresholds
+        learned.pairs[detector.name] = pairs
     learned.skipped.extend(left_out.combined())
     learned.unused.update(set.intersection(*unused) if unused else ())
     if learned.unusable and len(learned.unusable) == len(detectors):
         raise _none_usable(learned.unusable, known=bool(operations))
     return learned
+
+
+@dataclass(frozen=True)
+class _Made:
+    thresholds: tuple[FittedThreshold, ...]
+    skipped: tuple[Skipped, ...]
+    calibration: tuple[CalibrationResult, ...] = ()
+
+
+def _learn(setup: BenchmarkFile, detector: str, pairs: Sequence[Pair], left_out: Sequence[Skipped] = ()) -> _Made:
+    """Learn one detector's thresholds from runs; a budget sets their safety factor on the same runs."""
+    fit = fitting(setup.rule)
+    fitted = with_left_out(fit, left_out)(pairs)
+    if not setup.budget:
+        return _Made(fitted.thresholds, fitted.skipped)
+    made = calibrate(setup.budget, detector, kept(pairs, fitted.skipped), fit, setup.activation)
+    result = CalibrationResult(detector, str(setup.budget), made.factor, made.operations, made.hours, made.alarms)
+    thresholds = tuple(item.with_safety_factor(made.factor) for item in fitted.thresholds)
+    return _Made(thresholds, fitted.skipped, (result,))
+
+
+@dataclass(frozen=True)
+class ThresholdsByLog:
+    """The thresholds that apply to each log: for a log in `setup.both`, those learned from the other logs.
+
+    `pairs` are the runs by detector.
+    """
+
+    setup: BenchmarkFile
+    all_runs: Mapping[str, tuple[FittedThreshold, ...]]
+    pairs: Mapping[str, Sequence[Pair]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, setup: BenchmarkFile, learned: LearnedThresholds) -> ThresholdsByLog:
+        """Return the thresholds; the runs are kept only if they are needed again."""
+        return cls(setup, learned.thresholds, learned.pairs if setup.both else {})
+
+    def without(self, log: Path) -> tuple[Mapping[str, tuple[FittedThreshold, ...]], list[RecordingFinding]]:
+        """Return the thresholds for a log, which it did not teach, by detector, and why some are missing."""
+        if log not in self.setup.both:
+            return self.all_runs, []
+        name = shown_path(log, self.setup.path.parent)
+        thresholds, findings = dict(self.all_runs), []
+        for detector, pairs in self.pairs.items():
+            others = [pair for pair in pairs if pair[0].whole.name != name]
+            if len(others) == len(pairs):
+                continue
+            try:
+                thresholds[detector] = _learn(self.setup, detector, others).thresholds
+            except (SignatureError, UsageError) as fault:
+                thresholds[detector] = ()
+                reason = Finding(NothingLearnedWithout(detector, fault.message))
+                findings.append(RecordingFinding.of(name, reason))
+        return thresholds, findings
 
 
 def _none_usable(unusable: Mapping[str, str], known: bool) -> SignatureError:

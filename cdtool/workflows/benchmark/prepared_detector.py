@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,9 +16,9 @@ from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
-from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds
+from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_log
-from cdtool.workflows.runs import RunReading, load_runs
+from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normals_for, normals_of, notes_on
 
 
@@ -35,7 +35,7 @@ class PreparedBenchmark:
     detector: str
     described: str
     learned: Mapping[str, str]
-    run: Detect
+    run: Callable[[Path], tuple[Detect, list[RecordingFinding]]]
     ranges: PlausibleRanges | None
     normals: NormalMotions
     notes: tuple[RecordingFinding, ...] = ()
@@ -45,7 +45,10 @@ class PreparedBenchmark:
     def score(self, log: Path) -> Scored:
         """Return the log's rows as in a benchmark, with the window of its group if it has one. Raises nothing."""
         group, path = self._listed(log)
-        return score_log(self.setup, group, path, self.run, {}, self.ranges)
+        detect, findings = self.run(path)
+        scored = score_log(self.setup, group, path, detect, {}, self.ranges)
+        scored.findings += findings
+        return scored
 
     def window(self, log: Path) -> float:
         """Return how long after its onset a contact of the log may be detected [s]."""
@@ -82,7 +85,7 @@ def prepare_benchmark(
             raise UsageError(f"the signature monitors {names[0]}, {file} {names[1]}", "learn it for the same joints")
         thresholds: Mapping[str, Any] = {instance.name: stored.current}
         learned = {run.sha256: "" for run in stored.runs}
-        run = detect_with(setup, [instance], thresholds, {})
+        run = _running(ThresholdsByLog(setup, thresholds), instance, {})
         return PreparedBenchmark(
             setup,
             instance.name,
@@ -95,8 +98,7 @@ def prepare_benchmark(
         )
     setup = with_detectors(setup, [_chosen(setup, detector)])
     instance = machine_file.detector(setup.detectors[0])
-    reading = RunReading(setup.operations, onset=setup.onset, base=setup.path.parent)
-    runs = load_runs(setup.learn, machine_file, reading)
+    runs = load_runs(setup.learn, machine_file, setup.run_reading())
     fitted = learn_thresholds(setup, runs.operations, [instance], runs.skipped)
     used = fitted.learned_from(runs.operations)
     many = counted(len(used), "impact-free run")
@@ -104,8 +106,9 @@ def prepare_benchmark(
     many += f" of {classes} classes of motion" if classes > 1 else ""
     origin = "from each run itself" if is_per_run(setup.rule) else f"learned from {many}"
     described = f"threshold '{setup.threshold}' of {setup.path.name}, {origin}"
-    hashes = {operation.recording.digest: operation.recording.name for operation in used}
-    run = detect_with(setup, [instance], fitted.thresholds, fitted.unusable)
+    others = {shown_path(path, setup.path.parent) for path in setup.both}
+    hashes = {item.recording.digest: item.recording.name for item in used if item.whole.name not in others}
+    run = _running(ThresholdsByLog.of(setup, fitted), instance, fitted.unusable)
     normals = normals_for(used, setup.rule)
     return PreparedBenchmark(
         setup,
@@ -118,6 +121,18 @@ def prepare_benchmark(
         skipped=(*runs.skipped, *fitted.skipped),
         losses=tuple(item for item in runs.findings if item.is_loss),
     )
+
+
+def _running(
+    thresholds: ThresholdsByLog, detector: Any, unusable: Mapping[str, str]
+) -> Callable[[Path], tuple[Detect, list[RecordingFinding]]]:
+    """Return how a log is detected: with thresholds that it did not teach."""
+
+    def detection_of(log: Path) -> tuple[Detect, list[RecordingFinding]]:
+        own, findings = thresholds.without(log)
+        return detect_with(thresholds.setup, [detector], own, unusable), findings
+
+    return detection_of
 
 
 def _chosen(setup: BenchmarkFile, detector: str | None) -> str:

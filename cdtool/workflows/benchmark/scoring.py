@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from cdtool.errors import CdtoolError
+from cdtool.errors import CdtoolError, RecordingError
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.verdict import ForceVerdict, assess_force
 from cdtool.evaluation.results import (
@@ -22,8 +22,9 @@ from cdtool.evaluation.results import (
 from cdtool.evaluation.sweep import sweep_operation
 from cdtool.findings import Finding
 from cdtool.findings.scoring import ForceUnassessable
+from cdtool.log_section import LogSection
 from cdtool.motion.applicable import HOLD
-from cdtool.operations import Operation
+from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Contact, FloatArray, Recording
@@ -36,7 +37,9 @@ from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import DetectedLog, MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.runs import absent_truth, load_operations, lost, unread
+from cdtool.workflows.runs import absent_truth, lost, read_named, unread
+
+_WHOLE = LogSection()
 
 
 @dataclass
@@ -123,11 +126,17 @@ def score_log(
     rules = setup.rules_of(group)
     begin = perf_counter()
     try:
-        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent, ranges)
-        if group:
-            contacts = true_contacts(recording, rules, path) if group != HOLDOUT else []
-        else:
-            contacts = any_contacts(recording, rules)
+        whole = read_named(path, setup.machine_file, setup.path.parent, ranges)
+        section = setup.sections.get(path, _WHOLE)
+        recording = section.of(whole)
+        operations = operations_of(recording, setup.operations)
+        contacts: Sequence[Contact] = ()
+        if group != HOLDOUT:
+            contacts = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
+        if section and contacts:
+            contacts = section.contacts_of(whole, contacts)
+            if not contacts:
+                raise RecordingError(f"{path}: no contact {section}", "change from and to, or move it to [holdout]")
     except CdtoolError as fault:
         scored.skipped.append(unread(path, setup.path.parent, fault))
         scored.reading = perf_counter() - begin
@@ -136,7 +145,8 @@ def score_log(
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
     scored.findings += lost(recording)
     if group == HOLDOUT:
-        unwanted = unwanted_contacts(recording, rules)
+        unwanted = unwanted_contacts(whole, rules)
+        unwanted = section.contacts_of(whole, unwanted) if section else unwanted
         operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]

@@ -20,10 +20,12 @@ from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer, WrittenNames
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.parts import join_digests
 from cdtool.ingest.reading import LogFolder, log_parts
+from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.recording import UNITLESS
 from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
+from cdtool.workflows.convert.section_rows import Rows, SectionRows
 from cdtool.workflows.log_rows import LogRows
 
 if TYPE_CHECKING:
@@ -39,6 +41,7 @@ _WRITERS = {
     ".mf4": "cdtool.formats.mdf:write_mdf",
     ".tdms": "cdtool.formats.tdms:write_tdms",
 }
+_WHOLE = LogSection()
 _ONE_CLOCK = (".csv",)
 _HEADER = re.compile(r"^\s*\[\[?\s*(?P<name>[^\[\]]+?)\s*\]\]?\s*(#.*)?$")
 _URDF = re.compile(r"^(\s*urdf\s*=\s*).*$", re.MULTILINE)
@@ -61,6 +64,7 @@ def convert(
     output: str | Path,
     *,
     machine: str | Path | MachineFile | None = None,
+    section: LogSection = _WHOLE,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Converted:
@@ -75,6 +79,8 @@ def convert(
         is written to its own file, with `.1`, `.2` before the suffix.
     machine : str, Path or MachineFile, optional
         Maps the channels; they are written as logged, in SI units, with a machine file for each file written.
+    section : LogSection, optional
+        The part of the log that is written; the whole log by default. A distance travelled needs `machine`.
     force : bool, optional
         Replace existing files.
     progress : callable, optional
@@ -108,14 +114,15 @@ def convert(
     machine_file = (
         None if machine is None else machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     )
-    rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
+    rows: Rows = channel_rows(log, machine_file) if machine_file else LogRows(log)
     if not rows.groups:
         raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
+    rows = SectionRows(log, rows, section, machine_file) if section else rows
     pieces = _pieces(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
     _check_free([*names, *companions], parts, force)
-    provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
+    provenance = _provenance(log, parts, rows, machine_file, section)
     row_progress = _RowProgress(log, sum(group.rows for group in rows.groups), progress)
     with replaced(*names, *companions) as temporary:  # all or none
         for i, (path, part) in enumerate(pieces):
@@ -183,7 +190,7 @@ def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[
 
 
 def _provenance(
-    log: Path, parts: Sequence[Path], origin: float, machine_file: MachineFile | None, findings: Sequence[Finding]
+    log: Path, parts: Sequence[Path], rows: Rows, machine_file: MachineFile | None, section: LogSection
 ) -> Mapping[str, str]:
     """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
     if log.is_dir():
@@ -193,13 +200,15 @@ def _provenance(
         "source": log.name or log.resolve().name,
         "sha256": join_digests(list(digests.values())),
         "version": __version__,
-        "origin_s": repr(origin),
+        "origin_s": repr(rows.origin),
     }
     if log.is_dir():
         told["parts"] = "; ".join(f"{name} {digest}" for name, digest in digests.items())
-    if lost := [str(finding) for finding in findings if finding.severity == "loss"]:
+    if section:
+        told["section"] = str(section)
+    if lost := [str(finding) for finding in rows.findings if finding.severity == "loss"]:
         told["lost"] = "; ".join(lost)
-    if unverified := [finding.message for finding in findings if isinstance(finding.fact, Unverified)]:
+    if unverified := [finding.message for finding in rows.findings if isinstance(finding.fact, Unverified)]:
         told[UNVERIFIED] = "; ".join(unverified)
     if machine_file is not None:
         told |= {"machine": machine_file.machine.name, "machine_fingerprint": fingerprint(machine_file.machine)}

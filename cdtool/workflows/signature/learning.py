@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass, field
 from pathlib import Path
 
 from cdtool.activation import Activation, ActivationSettings
@@ -11,14 +11,17 @@ from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, machine_parameters, read_machine_file
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
+from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import RunReading, check_joints, load_runs
+from cdtool.workflows.runs import PartOfLog, RunReading, check_joints, load_runs
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.signature.normal_runs import normal_motions
@@ -50,6 +53,11 @@ class LearningOptions:
         Any threshold with its settings; by default a `Signature`.
     joints : sequence of str, optional
         The joints to monitor; all by default.
+    section : LogSection, optional
+        The part of each log that is learned from; the whole log by default.
+    guard : float, optional
+        Learn from each log up to this long [s] before its first contact on the load cell, label or event; by default a
+        run with a contact is left out.
     operations : str, optional
         How the logs are cut into operations: whole, motion or trigger.
     activation : ActivationSettings, optional
@@ -69,6 +77,8 @@ class LearningOptions:
     _: KW_ONLY
     rule: Threshold | None = None
     joints: Sequence[str] = ()
+    section: LogSection = field(default_factory=LogSection)
+    guard: float | None = None
     operations: str = "whole"
     activation: ActivationSettings | None = None
     false_alarm_budget: str | None = None
@@ -119,8 +129,10 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
     _refuse_by_hand(wanted, budget)
     instance = machine_file.detector(options.detector)
-    reading = RunReading(operations, onset=options.onset, jobs=options.jobs, progress=options.progress)
-    runs = load_runs([Path(log) for log in logs], machine_file, reading)
+    paths = [Path(log) for log in logs]
+    part = _part(paths, options)
+    reading = RunReading(operations, onset=options.onset, part=part, jobs=options.jobs, progress=options.progress)
+    runs = load_runs(paths, machine_file, reading)
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
     fit = fitting(wanted)
     fitted = with_left_out(fit, [*runs.skipped, *skipped])(pairs)
@@ -149,6 +161,16 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     )
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
     return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), runs.findings)
+
+
+def _part(paths: Sequence[Path], options: LearningOptions) -> PartOfLog | None:
+    """Return which part of a log is learned from; None: the whole of it."""
+    if options.guard is not None and not options.guard >= 0.0:
+        raise UsageError(f"guard is {options.guard:g} s", "give 0 s or more")
+    if options.guard is None and not options.section:
+        return None
+    rules = ScoringRules(options.onset or OnsetRule())
+    return PartToLearnFrom(rules, dict.fromkeys(paths, options.section), options.guard)
 
 
 learn_signature = by_keywords(LearningOptions, learn)

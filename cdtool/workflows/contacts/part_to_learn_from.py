@@ -1,0 +1,63 @@
+"""The part of a log that is learned from: a given section, and what is before the first contact."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cdtool.errors import RecordingError
+from cdtool.log_section import LogSection
+from cdtool.plain_text import digits
+from cdtool.recording import GROUND_TRUTH, Contact, Recording
+from cdtool.workflows.contacts.impact_free import contacts_shown
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.contacts.true_contacts import any_contacts
+
+# The shortest part that is learned from [s]: detectors start up in less.
+_SHORTEST = 0.5
+
+
+@dataclass(frozen=True)
+class PartToLearnFrom:
+    """Selects the section of each log, up to `guard` [s] before its first contact; None: contacts are not looked for.
+
+    The onset is that of the `rules`, as for scoring: from a label file that names the log, or from its load cell.
+    """
+
+    rules: ScoringRules
+    sections: Mapping[Path, LogSection] = field(default_factory=dict)
+    guard: float | None = None
+
+    def __call__(self, path: Path, recording: Recording) -> tuple[Recording, Sequence[Contact]]:
+        """Return the part of a log and the contacts in it; raises RecordingError if there is no such part."""
+        section = self.sections.get(path, LogSection())
+        if self.guard is None:
+            part = section.of(recording)
+            return part, contacts_shown(part, self.rules.onset)
+        contacts = any_contacts(recording, self.rules)
+        if not contacts and not self._is_known(recording):
+            raise RecordingError(
+                f"{path}: no ground truth: until = 'onset' needs a load cell, a label or an event",
+                "map one in [channels], name the log in the label file, or give the part by from and to",
+            )
+        if any(item.in_progress for item in contacts):
+            raise RecordingError(f"{path}: a contact is in progress at its start: nothing before it to learn from")
+        first = min((item.start - item.uncertainty for item in contacts), default=math.inf)
+        begin, end = section.times(recording)
+        end = min(end, first - self.guard)
+        part = recording.between(begin, end)
+        if not part.channels or not part.duration >= _SHORTEST:
+            left = max(0.0, end - max(begin, recording.start))
+            raise RecordingError(
+                f"{path}: {digits(left)} s before the contact at {digits(first)} s (guard {digits(self.guard)} s "
+                f"included): at least {digits(_SHORTEST)} s are needed",
+                "reduce guard_s, or leave the log out of [learn]",
+            )
+        return part, ()
+
+    def _is_known(self, recording: Recording) -> bool:
+        labels = self.rules.labels
+        named = labels is not None and labels.name_of(recording.name) is not None
+        return named or any(channel in recording for channel in GROUND_TRUTH)

@@ -1,0 +1,94 @@
+"""A part of a log on the command line: detect, convert and learn-signature with --from and --to."""
+
+import json
+
+import pytest
+
+import cdtool as api
+from tests.command import cdtool, one_line
+
+
+@pytest.fixture
+def log(gate_folder):
+    return gate_folder / "stiff" / "01.csv"
+
+
+@pytest.fixture
+def machine(gate_folder):
+    return gate_folder / "machine.toml"
+
+
+def detected(log, machine, *arguments):
+    done = cdtool("detect", log, "-m", machine, "-d", "gm", "--limit", "400", "--json", *arguments)
+    (row,) = json.loads(done.out)
+    return row
+
+
+def test_detect_uses_only_the_part(log, machine):
+    whole = detected(log, machine)
+    (alarm,) = whole["alarms"][:1]
+    part = detected(log, machine, "--from", "1s", "--to", f"{alarm['time_s'] + 0.3:.3f}s")
+    assert part["alarms"][0]["time_s"] == pytest.approx(alarm["time_s"], abs=0.002)
+    before = detected(log, machine, "--to", f"{1000 * alarm['time_s'] - 400:.0f} ms")
+    assert before["verdict"] == "no alarm" and not before["alarms"]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".mcap", ".h5"])
+@pytest.mark.parametrize("mapped", [True, False])
+def test_convert_writes_only_the_rows_of_the_part_with_their_times(log, machine, tmp_path, suffix, mapped):
+    output = tmp_path / f"part{suffix}"
+    arguments = ("-m", machine) if mapped else ()
+    done = cdtool("convert", log, output, "--from", "1.5s", "--to", "3.2s", *arguments)
+    assert done.status == 0, done.err
+    companion = tmp_path / f"part{suffix}.machine.toml" if mapped else machine
+    if not mapped and suffix != ".csv":
+        return
+    speed = api.read(output, companion)["speed"]
+    whole = api.read(log, machine)["speed"].between(1.5, 3.2)
+    assert speed.time.tolist() == whole.time.tolist()
+    assert speed.values.tolist() == whole.values.tolist()
+
+
+def test_convert_cuts_by_the_distance_travelled_with_a_machine_file(log, machine, tmp_path):
+    done = cdtool("convert", log, tmp_path / "way.csv", "--from", "0.1m", "--to", "50cm", "-m", machine)
+    assert done.status == 0, done.err
+    position = api.read(tmp_path / "way.csv", tmp_path / "way.csv.machine.toml")["position"].values
+    assert position[0] == pytest.approx(0.1, abs=1e-3) and position[-1] == pytest.approx(0.5, abs=1e-3)
+    alone = cdtool("convert", log, tmp_path / "x.csv", "--from", "0.1m")
+    assert alone.status == 2 and "pass a machine file with -m" in one_line(alone.err)
+    assert "# cdtool.section: from 0.1 m of travel to 0.5 m of travel" in (tmp_path / "way.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--from", "3s", "--to", "2s"), "the end, 2 s, is not after the begin, 3 s"),
+        (("--to", "2"), "--to is '2' (give a number with its unit"),
+        (("--from", "99s"), "no sample from 99 s"),
+        (("--to", "1rad"), "1 rad of travel"),
+    ],
+)
+def test_a_wrong_part_is_one_line(log, machine, tmp_path, arguments, words):
+    for command in (("detect", log, "-d", "gm", "--limit", "400"), ("convert", log, tmp_path / "x.csv")):
+        done = cdtool(*command, "-m", machine, *arguments)
+        assert done.status == 2 and words in one_line(done.err) and "Traceback" not in done.err
+    assert not (tmp_path / "x.csv").exists()
+
+
+def test_a_signature_is_learned_from_what_is_before_the_contacts(gate_folder, machine, tmp_path):
+    logs = [*sorted((gate_folder / "free").glob("*.csv")), gate_folder / "stiff" / "01.csv"]
+    plain = cdtool("learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "a.json", "--json")
+    assert plain.status == 3 and "--guard" in one_line(plain.err)
+    guarded = cdtool(
+        "learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "b.json", "--json", "--guard", "0.2"
+    )
+    assert guarded.status == 0, guarded.err
+    runs = [json.loads(done.out)["classes"][0]["runs"] for done in (plain, guarded)]
+    assert runs[1] == runs[0] + 1
+    negative = cdtool("learn-signature", *logs, "-m", machine, "-d", "gm", "-o", tmp_path / "c.json", "--guard", "-1")
+    assert negative.status == 2 and "guard is -1 s" in one_line(negative.err)
+
+
+def test_a_part_cannot_be_combined_with_a_benchmark_file(gate_folder, log):
+    done = cdtool("detect", log, "-b", gate_folder / "benchmark.toml", "-d", "gm", "--from", "1s")
+    assert done.status == 2 and "--from cannot be combined with --benchmark" in one_line(done.err)

@@ -1,0 +1,193 @@
+"""Learning from what is before the contacts, with every log scored by what was learned from the others."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import cdtool
+from cdtool.errors import ConfigurationError
+from cdtool.evaluation.results_file import to_json
+from cdtool.workflows.benchmark.benchmark import benchmark
+from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
+from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
+from cdtool.workflows.runs import load_runs
+
+HEAD = 'machine = "machine.toml"\ndetectors = ["gm"]\nthreshold = "limit"\n'
+LEARN = '[learn]\nuntil = "onset"\nlogs = ["stiff/*.csv", "soft/*.csv"]\n'
+ONSET = "[onset]\nabove_n = 20.0\nback_to_n = 8.0\n"
+GROUPS = '[impacts.stiff]\nlogs = ["stiff/*.csv"]\n[impacts.soft]\nlogs = ["soft/*.csv"]\n'
+
+
+@pytest.fixture(scope="module")
+def gate(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("gate")
+    cdtool.simulate_gate(folder, {"free": 2, "stiff": 4, "soft": 3}, seed=5)
+    return folder
+
+
+def setup_of(folder, *parts):
+    file = folder / "b.toml"
+    file.write_text("".join(parts), encoding="utf-8")
+    return read_benchmark_file(file)
+
+
+def learned_of(setup):
+    runs = load_runs(setup.learn, setup.machine_file, setup.run_reading())
+    detectors = [setup.machine_file.detector(name) for name in setup.detectors]
+    return runs, learn_thresholds(setup, runs.operations, detectors, runs.skipped)
+
+
+def test_all_contacts_are_detected_and_nothing_before_them_is_an_alarm(gate):
+    done = benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
+    assert [row.outcome for row in done.results.contacts] == ["detected"] * 7
+    assert not done.results.false_alarms and not done.results.skipped
+    provenance = done.results.provenance
+    assert provenance["learned_until"] == "0.2 s before the first contact of each log"
+    assert sorted(provenance["scored_without_own_part"]) == sorted(provenance["learned_runs"])
+
+
+def test_what_is_learned_ends_before_the_onset_by_the_guard(gate):
+    plain = benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS)).results
+    onsets = {row.recording: row.onset_s for row in plain.contacts}
+    for guard in (0.0, 0.2, 1.5):
+        runs, _ = learned_of(setup_of(gate, HEAD, LEARN, f"guard_s = {guard}\n", ONSET, GROUPS))
+        for operation in runs.operations:
+            end = operation.recording.end
+            assert onsets[operation.name] - guard - 0.012 < end <= onsets[operation.name] - guard
+
+
+def test_no_log_judges_itself(gate):
+    """A log with an extreme signal before its contact: it would widen its own limit, and does widen the others'."""
+    folder = gate.parent / "odd"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    log = folder / "stiff" / "01.csv"
+    header, *rows = log.read_text(encoding="utf-8").splitlines()
+    column = header.split(",").index("i_motor")
+    for i in range(3000, 3200):
+        cells = rows[i].split(",")
+        cells[column] = str(float(cells[column]) * 3.0)
+        rows[i] = ",".join(cells)
+    log.write_text("\n".join([header, *rows]), encoding="utf-8")
+    setup = setup_of(folder, HEAD, LEARN, ONSET, GROUPS)
+    _, learned = learned_of(setup)
+    by_log = ThresholdsByLog.of(setup, learned)
+    own, _ = by_log.without(log)
+    other, _ = by_log.without(folder / "stiff" / "02.csv")
+    assert own["momentum"][0].upper[0] < 0.5 * other["momentum"][0].upper[0]
+    done = benchmark(setup).results
+    assert [item.recording for item in done.false_alarms] == ["stiff/01.csv"]
+
+
+def test_the_limits_of_a_log_are_those_learned_from_the_others_alone(gate):
+    setup = setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
+    _, learned = learned_of(setup)
+    log = gate / "soft" / "02.csv"
+    own, findings = ThresholdsByLog.of(setup, learned).without(log)
+    assert not findings
+    others = HEAD, LEARN.replace("soft/*.csv", 'soft/01.csv", "soft/03.csv'), ONSET, GROUPS
+    _, alone = learned_of(setup_of(gate, *others))
+    assert own["momentum"] == alone.thresholds["momentum"]
+
+
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_the_results_do_not_depend_on_the_number_of_jobs(gate, jobs):
+    setup = setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
+    assert to_json(benchmark(setup).evaluated) == to_json(benchmark(setup, jobs=jobs).evaluated)
+
+
+def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate):
+    setup = setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
+    rows = {row.recording: row.latency_ms for row in benchmark(setup).results.contacts}
+    prepared = prepare_benchmark(setup.path)
+    for log in sorted(gate.glob("s*/*.csv")):
+        (row,) = prepared.score(log).contacts
+        assert row.latency_ms == rows[row.recording]
+        assert not cdtool.detect(log, benchmark=prepared).learned, "scored with what was learned from the others"
+
+
+def test_a_threshold_that_needs_the_logs_own_part_leaves_it_not_assessable_with_the_reason(gate):
+    few = setup_of(gate, HEAD, LEARN.replace("*.csv", "01.csv"), ONSET, GROUPS.replace("*.csv", "01.csv"))
+    done = benchmark(few).results
+    assert {row.outcome for row in done.contacts} == {"not_assessable"}
+    assert any(
+        "nothing can be learned from the other recordings: a limit needs at least 2" in str(item.reason)
+        for item in done.findings
+    )
+
+
+def test_sections_limit_what_is_learned_and_what_is_scored(gate):
+    groups = '[impacts.stiff]\nfrom = "1s"\nlogs = ["stiff/0[12].csv", { path = "stiff/0[34].csv", to = "6.9s" }]\n'
+    learn = '[learn]\nto = "0.5m"\nlogs = ["free/*.csv", { path = "soft/*.csv", from = "500ms" }]\n'
+    setup = setup_of(gate, HEAD, learn, ONSET, groups)
+    runs, _ = learned_of(setup)
+    for operation in runs.operations:
+        travel = operation.recording["position"].values[-1, 0]
+        assert travel <= 0.501 and operation.recording.end < 4.0
+        assert operation.recording.start == (0.5 if operation.name.startswith("soft") else 0.0)
+    done = benchmark(setup).results
+    assert {row.outcome for row in done.contacts} == {"detected"}
+    seconds = {row.recording: row.seconds for row in done.recordings}
+    assert seconds["stiff/03.csv"] == pytest.approx(5.9, abs=0.01)
+    assert seconds["stiff/01.csv"] > 6.0
+    assert done.provenance["sections"]["stiff/03.csv"] == "from 1 s to 6.9 s"
+    assert done.provenance["learned_sections"]["soft/01.csv"] == "from 0.5 s to 0.5 m of travel"
+
+
+def test_a_section_without_the_contact_leaves_the_log_out_by_name(gate):
+    groups = '[impacts.stiff]\nlogs = ["stiff/01.csv", { path = "stiff/02.csv", to = "3s" }]\n'
+    done = benchmark(setup_of(gate, HEAD, LEARN, ONSET, groups)).results
+    assert [(item.recording, item.reason) for item in done.skipped] == [
+        ("stiff/02.csv", "no contact to 3 s (change from and to, or move it to [holdout])")
+    ]
+
+
+def test_a_log_learned_from_up_to_a_mark_may_be_scored_as_well(gate):
+    learn = '[learn]\nlogs = ["free/*.csv", { path = "stiff/*.csv", to = "4s" }]\n'
+    setup = setup_of(gate, HEAD, learn, ONSET, '[impacts.stiff]\nlogs = ["stiff/*.csv"]\n')
+    assert len(setup.both) == 4 and {row.outcome for row in benchmark(setup).results.contacts} == {"detected"}
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ((HEAD, LEARN.replace('until = "onset"\n', ""), GROUPS), 'both learned from and scored .*until = "onset"'),
+        ((HEAD, LEARN, '[holdout]\nlogs = ["stiff/*.csv"]\n'), "both learned from and scored"),
+        ((HEAD, LEARN.replace("onset", "contact"), GROUPS), "learn.until: is 'contact'"),
+        ((HEAD, LEARN.replace('until = "onset"', "guard_s = 0.1"), GROUPS), "learn.guard_s: is given without until"),
+        ((HEAD, LEARN, "guard_s = -0.1\n", GROUPS), "learn.guard_s: is -0.1"),
+        ((HEAD, LEARN, "to = 3.2\n", GROUPS), "learn.to: is 3.2 .*in quotes"),
+        ((HEAD, LEARN, 'to = "3.2"\n', GROUPS), "learn.to: is '3.2'"),
+        ((HEAD, LEARN, 'from = "3s"\nto = "2s"\n', GROUPS), "learn.to: the end, 2 s, is not after"),
+        (
+            (HEAD, LEARN, GROUPS, '[impacts.x]\nlogs = [{ path = "free/01.csv", too = "3s" }]\n'),
+            r"logs\[0\].too: unknown",
+        ),
+        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [{ to = '3s' }]\n"), r"impacts.x.logs\[0\].path: is missing"),
+        ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [3]\n"), "impacts.x.logs: is 3"),
+        (
+            (HEAD, LEARN, '[impacts.x]\nlogs = ["free/*.csv", { path = "free/01.csv", to = "3s" }]\n'),
+            "names .*01.csv with two different parts",
+        ),
+    ],
+)
+def test_a_wrong_key_is_named(gate, parts, words):
+    with pytest.raises(ConfigurationError, match=words):
+        setup_of(gate, *parts)
+
+
+def test_a_log_without_ground_truth_or_with_too_little_before_the_contact_is_left_out_by_name(gate):
+    machine = (gate / "machine.toml").read_text(encoding="utf-8").splitlines()
+    blind = [line for line in machine if not line.startswith("force =")]
+    assert len(blind) == len(machine) - 2, "of the CSV table and of the MCAP topics"
+    (gate / "blind.toml").write_text("\n".join(blind), encoding="utf-8")
+    setup = setup_of(gate, HEAD.replace("machine.toml", "blind.toml"), LEARN, ONSET, GROUPS)
+    runs = load_runs(setup.learn, setup.machine_file, setup.run_reading())
+    assert len(runs.skipped) == 7 and not runs.operations
+    assert all("no ground truth: until = 'onset' needs a load cell" in item.reason for item in runs.skipped)
+    runs, _ = learned_of(setup_of(gate, HEAD, LEARN.replace("soft/", "free/"), "guard_s = 5.6\n", ONSET, GROUPS))
+    left_out = {item.recording: item.reason for item in runs.skipped}
+    assert left_out and all(name.startswith("stiff") for name in left_out)
+    assert all("s before the contact at" in reason and "at least 0.5 s" in reason for reason in left_out.values())
+    assert {operation.name for operation in runs.operations} >= {"free/01.csv", "free/02.csv"}
