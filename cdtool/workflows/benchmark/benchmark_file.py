@@ -118,7 +118,7 @@ class BenchmarkFile:
 
     @cached_property
     def both(self) -> tuple[Path, ...]:
-        """Return the scored logs whose parts are also learned from: each is scored with what was learned from the others."""
+        """Return the scored logs that are also learned from: each is scored with what the others gave."""
         learned = {path.resolve() for path in self.learn}
         return tuple(path for group in self.impacts.values() for path in group.logs if path.resolve() in learned)
 
