@@ -18,6 +18,7 @@ _TABLE = {
     "energy": ("eo", "cdtool.detectors.energy:Energy"),
     "velocity": ("vo", "cdtool.detectors.velocity:Velocity"),
     "kalman_momentum": ("kmo", "cdtool.detectors.kalman_momentum:KalmanMomentum"),
+    "torque_deviation": ("td", "cdtool.detectors.torque_deviation:TorqueDeviation"),
 }
 
 DETECTORS = Registry(

@@ -42,6 +42,8 @@ class FittedBaseline:
         Number of spreads from the median to the limit.
     sides : {"one", "two"}
         "one" monitors the side on which an obstacle opposes the present motion; at rest, the last one.
+    widen : bool
+        The limits widen with the square root of the time since the warm-up.
 
     Examples
     --------
@@ -58,6 +60,7 @@ class FittedBaseline:
     warm_up: float
     safety_factor: float
     sides: str = "two"
+    widen: bool = False
 
     per_run: ClassVar[bool] = True
 
@@ -81,7 +84,8 @@ class FittedBaseline:
             usable = (status[:, j] == Status.VALID) & np.isfinite(values)
             status[(status[:, j] == Status.VALID) & ~usable, j] = Status.GAP
             column = np.empty((2, shape[0]))
-            _first_seconds(signal.time, values, usable, np.abs(speeds[j]), self.warm_up, column[0], column[1])
+            speed = np.abs(speeds[j])
+            _first_seconds(signal.time, values, usable, speed, self.warm_up, self.widen, column[0], column[1])
             opposed[:, j] = _last_direction(speeds[j]) if signal.signed else 1.0
             centre[:, j], spread[:, j] = column
             status[usable & np.isnan(column[0]), j] = Status.START_UP
@@ -100,7 +104,9 @@ class FittedBaseline:
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """Return the threshold that `to_dict` has written."""
-        return cls(float(values["warm_up"]), float(values["safety_factor"]), str(values["sides"]))
+        return cls(
+            float(values["warm_up"]), float(values["safety_factor"]), str(values["sides"]), bool(values["widen"])
+        )
 
 
 @dataclass(frozen=True)
@@ -116,6 +122,9 @@ class Baseline:
         How long a joint has to move before its limits are known [s]. Until then it is not assessable.
     sides : {"one", "two"}, optional
         "one" monitors the side on which an obstacle opposes the present motion; None: both.
+    widen : bool
+        Multiply the spread by sqrt(1 + time since the warm-up / `warm_up`), as the deviation of a random walk grows:
+        fewer false alarms of a signal that wanders, and later alarms.
 
     Raises
     ------
@@ -134,12 +143,13 @@ class Baseline:
     Examples
     --------
     >>> Baseline(warm_up=0.5).fit([])
-    FittedBaseline(warm_up=0.5, safety_factor=8.0, sides='two')
+    FittedBaseline(warm_up=0.5, safety_factor=8.0, sides='two', widen=False)
     """
 
     safety_factor: float = 8.0
     warm_up: float = 1.0
     sides: str | None = None
+    widen: bool = False
 
     name: ClassVar[str] = "baseline"
     needs: ClassVar[tuple[str, ...]] = ("speed",)
@@ -152,7 +162,7 @@ class Baseline:
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedBaseline:  # noqa: ARG002  the contract's
         """Return the threshold; it needs no runs."""
-        return FittedBaseline(self.warm_up, self.safety_factor, self.sides or "two")
+        return FittedBaseline(self.warm_up, self.safety_factor, self.sides or "two", self.widen)
 
 
 def _last_direction(speed: FloatArray) -> FloatArray:
@@ -179,30 +189,33 @@ def _speeds(recording: Recording, signal: Signal) -> list[FloatArray]:
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {READ_ONLY}, float64, "
+    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {READ_ONLY}, float64, b1, "
     "float64[::1], float64[::1])",
     rare=True,
 )
-def _first_seconds(
+def _first_seconds(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by one
     time: FloatArray,
     values: FloatArray,
     usable: BoolArray,
     level: FloatArray,
     warm_up: float,
+    widen: bool,
     centre: FloatArray,
     spread: FloatArray,
 ) -> None:
     """Fill median and spread (n,) of the first `warm_up` [s] in motion before each sample; NaN where unknown.
 
-    A slower sample is dropped once the joint has moved faster.
+    A slower sample is dropped once the joint has moved faster. With `widen` the spread grows with the time since then.
     """
     picked = np.empty(len(time))
     picked_level = np.empty(len(time))
     picked_step = np.empty(len(time))
     count, seconds, highest = 0, 0.0, 0.0
-    middle, width = math.nan, math.nan
+    middle, width, since = math.nan, math.nan, 0.0
     for k in range(len(time)):
         centre[k], spread[k] = middle, width
+        if widen:
+            spread[k] = width * math.sqrt(1.0 + (time[k] - since) / warm_up)
         if not math.isnan(middle):
             if level[k] <= highest / _SHARE:
                 continue
@@ -230,4 +243,5 @@ def _first_seconds(
         if seconds >= warm_up - _ROUNDING and count >= _FEWEST:
             middle = quantile_of(picked[:count].copy(), count, 0.5)
             low = quantile_of(picked[:count].copy(), count, _BELOW)
+            since = time[k]
             width = 0.5 * (quantile_of(picked[:count].copy(), count, _ABOVE) - low)

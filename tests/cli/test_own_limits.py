@@ -36,7 +36,12 @@ def test_a_benchmark_needs_no_runs_to_learn_from_and_ignores_them_for_the_limits
     results = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
     outcomes = [row["outcome"] for row in results["contacts"]]
     assert outcomes and set(outcomes) == {"detected"} and results["false_alarms"] == []
-    assert results["provenance"]["threshold_rule"] == {"safety_factor": 8.0, "warm_up": 0.8, "sides": "one"}
+    assert results["provenance"]["threshold_rule"] == {
+        "safety_factor": 8.0,
+        "warm_up": 0.8,
+        "sides": "one",
+        "widen": False,
+    }
     assert bool(results["provenance"]["learned_runs"]) is False
 
 

@@ -61,7 +61,8 @@ def cut(recording: Recording, end: float) -> Recording:
 
 def needed(detector: Any, machine: Any) -> tuple[str, ...]:
     """A model of coupled joints needs their pose as well."""
-    more = ("position",) if machine.coupled and len(detector.needs) > 1 and "torque" in detector.needs else ()
+    has_model = "torque" in detector.needs and not {"speed", "position"}.isdisjoint(detector.needs)
+    more = ("position",) if machine.coupled and has_model else ()
     return tuple(dict.fromkeys((*detector.needs, *more)))
 
 
@@ -296,6 +297,7 @@ def test_at_rest_it_finds_nothing_or_says_that_it_cannot_judge(name, subject):
     units = machine.load_units
     torque = machine.required_torque(pose, still, still)
     values = {"torque": torque, "speed": still, "position": pose, "acceleration": still, "reference_position": pose}
+    values["reference_torque"] = torque
     channels = {n: Series(time, v, units[n.removeprefix("reference_")]) for n, v in values.items()}
     signal = DETECTORS.load(name)().signal(Recording("rest", "rest", machine.joints, channels), machine)
     assert set(np.unique(signal.status)) <= {Status.VALID, Status.START_UP, Status.NOT_APPLICABLE, Status.GAP}

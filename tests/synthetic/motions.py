@@ -27,8 +27,8 @@ def moving_recording(
     """Return a recording in which all joints oscillate after `rest` s at standstill.
 
     From `contact_at` [s] on, the drives also apply the contact torque `contact` (J,) [N m], which does not change the
-    motion. Torque, speed, position and acceleration are exact except for `noise`, as a share of each channel's standard
-    deviation.
+    motion, and which the reference torque does not contain. Torque, speed, position and acceleration are exact except
+    for `noise`, as a share of each channel's standard deviation.
     """
     joints = len(machine.joints)
     rng = np.random.default_rng(seed)
@@ -40,9 +40,9 @@ def moving_recording(
     position = start + amplitude * sine**3
     speed = 3.0 * amplitude * rates * sine**2 * cosine
     acceleration = 3.0 * amplitude * rates**2 * (2.0 * sine * cosine**2 - sine**3)
-    torque = machine.required_torque(position, speed, acceleration)
+    required = torque = machine.required_torque(position, speed, acceleration)
     if len(contact):
-        torque = torque + np.where(time[:, np.newaxis] >= contact_at, np.asarray(contact), 0.0)
+        torque = required + np.where(time[:, np.newaxis] >= contact_at, np.asarray(contact), 0.0)
     units = machine.load_units
     channels = {}
     for name, values, unit in (
@@ -52,6 +52,7 @@ def moving_recording(
         ("acceleration", acceleration, units["acceleration"]),
         ("reference_position", position, units["position"]),
         ("reference_speed", speed, units["speed"]),
+        ("reference_torque", required, units["torque"]),
     ):
         measured = values
         if noise and not name.startswith("reference"):
@@ -68,8 +69,10 @@ def resting_recording(
     zeros = np.zeros((len(time), len(machine.joints)))
     units = machine.load_units
     pose = Series(time, zeros + np.asarray(position), units["position"])
+    drive = Series(time, zeros + np.asarray(torque), units["torque"])
     channels = {
-        "torque": Series(time, zeros + np.asarray(torque), units["torque"]),
+        "torque": drive,
+        "reference_torque": drive,
         "position": pose,
         "reference_position": pose,
         "speed": Series(time, zeros, units["speed"]),

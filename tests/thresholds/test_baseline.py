@@ -138,6 +138,16 @@ def test_one_side_is_that_on_which_an_obstacle_opposes_the_present_motion():
     assert np.isneginf(unsigned.lower[120:]).all() and np.all(unsigned.upper[120:] == 8.0)
 
 
+def test_widening_limits_follow_the_square_root_of_the_time_since_the_warm_up():
+    recording, signal = run_of(np.full(600, 0.5), np.tile([-1.0, 1.0], 300))
+    _, plain = FittedBaseline(1.0, 8.0).evaluate(recording, signal)
+    _, band = FittedBaseline(1.0, 8.0, widen=True).evaluate(recording, signal)
+    first = int(np.flatnonzero(np.isfinite(plain.upper[:, 0]))[0])
+    elapsed = signal.time[first:] - signal.time[first - 1]
+    np.testing.assert_allclose(band.upper[first:, 0], 8.0 * np.sqrt(1.0 + elapsed), rtol=1e-12)
+    np.testing.assert_allclose(band.lower[first:, 0], -8.0 * np.sqrt(1.0 + elapsed), rtol=1e-12)
+
+
 @pytest.mark.parametrize("setting", [{"sides": "left"}, {"warm_up": 0.0}, {"warm_up": -1.0}, {"safety_factor": 0.0}])
 def test_settings_must_be_above_zero(setting):
     with pytest.raises(UsageError):
