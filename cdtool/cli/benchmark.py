@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import plain, print_skipped, progress
 from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption, listed
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
@@ -19,7 +20,11 @@ def benchmark(
     force: ForceOption = False,
     detectors: Annotated[
         str | None,
-        typer.Option("--detectors", help="Detectors instead of the file's, as gm,vo,eo; all: all that the logs allow."),
+        typer.Option(
+            "--detectors",
+            help="Detectors instead of the file's, as gm,vo,eo; all: all that the logs allow.",
+            autocompletion=completions.detector_list,
+        ),
     ] = None,
     false_alarm_budget: Annotated[
         str | None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress, table
 from cdtool.cli.options import (
     DebounceOption,
@@ -35,10 +36,22 @@ def learn_signature(
     machine: MachineOption,
     output: Annotated[Path, typer.Option("--output", "-o", help="Signature file to write (.json).")],
     detector: Annotated[
-        str, typer.Option("--detector", "-d", help="Detector: feekf, gm, igm, pi, pt; see cdtool list detectors.")
+        str,
+        typer.Option(
+            "--detector",
+            "-d",
+            help="Detector: feekf, gm, igm, pi, pt; see cdtool list detectors.",
+            autocompletion=completions.detectors,
+        ),
     ],
     threshold: Annotated[
-        str, typer.Option("--threshold", "-t", help="What to learn: signature, cusum ...; see cdtool list thresholds.")
+        str,
+        typer.Option(
+            "--threshold",
+            "-t",
+            help="What to learn: signature, cusum ...; see cdtool list thresholds.",
+            autocompletion=completions.thresholds,
+        ),
     ] = "signature",
     settings: Annotated[
         list[str] | None,
@@ -56,7 +69,12 @@ def learn_signature(
     ] = None,
     operations: OperationsOption = "whole",
     rule: Annotated[
-        str, typer.Option("--rule", help="Signature: pooled, or thesis (mean + 1 std: alarms in almost every run).")
+        str,
+        typer.Option(
+            "--rule",
+            help="Signature: pooled, or thesis (mean + 1 std: alarms in almost every run).",
+            autocompletion=completions.rules,
+        ),
     ] = "pooled",
     safety_factor: Annotated[
         float | None,
@@ -65,12 +83,19 @@ def learn_signature(
     sides: Annotated[
         str | None,
         typer.Option(
-            "--sides", help="one (that opposes the motion) or two. Default: one for an axis, two for a robot."
+            "--sides",
+            help="one (that opposes the motion) or two. Default: one for an axis, two for a robot.",
+            autocompletion=completions.sides,
         ),
     ] = None,
     joints: JointsOption = "",
     align: Annotated[
-        str, typer.Option("--align", help="time_then_position (time while accelerating), time, or position.")
+        str,
+        typer.Option(
+            "--align",
+            help="time_then_position (time while accelerating), time, or position.",
+            autocompletion=completions.alignments,
+        ),
     ] = "time_then_position",
     debounce: DebounceOption = None,
     rearm: RearmOption = None,

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from cdtool.cli.completions import one_of
 from cdtool.cli.console import leave, number, print_json, print_skipped, table
 from cdtool.cli.options import JsonOption
 from cdtool.errors import UsageError, nearest
@@ -15,7 +16,12 @@ _KINDS = ("detectors", "thresholds", "machines", "formats", "writers")
 
 
 def list_known(
-    kind: Annotated[str, typer.Argument(help="detectors, thresholds, machines, formats or writers.", metavar="KIND")],
+    kind: Annotated[
+        str,
+        typer.Argument(
+            help="detectors, thresholds, machines, formats or writers.", metavar="KIND", autocompletion=one_of(_KINDS)
+        ),
+    ],
     as_json: JsonOption = False,
 ) -> None:
     """List the available detectors (with gains), thresholds, machines, formats or report writers, including plug-ins.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.errors import UsageError
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ OperationsOption = Annotated[
     typer.Option(
         "--operations",
         help="How to divide a log into operations: whole (one per file), motion, or trigger (a channel).",
+        autocompletion=completions.operations,
     ),
 ]
 JointsOption = Annotated[
@@ -50,7 +52,13 @@ WarmUpOption = Annotated[
     typer.Option("--warm-up", help="Limits from the run's own first seconds in motion instead: this many."),
 ]
 DetectorOption = Annotated[
-    str | None, typer.Option("--detector", "-d", help="Detector; required with --limit or --warm-up.")
+    str | None,
+    typer.Option(
+        "--detector",
+        "-d",
+        help="Detector; required with --limit or --warm-up.",
+        autocompletion=completions.detectors,
+    ),
 ]
 BenchmarkOption = Annotated[
     Path | None,

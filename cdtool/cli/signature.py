@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
 from cdtool.cli.options import ForceOption, JobsOption, JsonOption, MachineOption, OnsetAboveOption, figure_name
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
@@ -33,7 +34,12 @@ def _signature() -> None:
 
 FileArgument = Annotated[Path, typer.Argument(help="Signature file from cdtool learn-signature.", metavar="SIGNATURE")]
 CutOption = Annotated[
-    str | None, typer.Option("--operations", help="How to divide a log into operations. Default: as for learning.")
+    str | None,
+    typer.Option(
+        "--operations",
+        help="How to divide a log into operations. Default: as for learning.",
+        autocompletion=completions.operations,
+    ),
 ]
 PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF file to draw.")]
 

@@ -31,6 +31,7 @@ _HEADINGS = {
 
 def show_table(evaluated: Evaluated) -> None:
     """Print the thesis's table 5.1 for each group, with the notes needed to read its numbers."""
+    from cdtool.evaluation.conclusion import partly_unassessed
     from cdtool.evaluation.results import onset_words
     from cdtool.report.few_contacts import explained, latency_columns
 
@@ -59,6 +60,8 @@ def show_table(evaluated: Evaluated) -> None:
             f"{item.detector}: safety factor {item.safety_factor:.3g} for a budget of {item.budget}: "
             f"{item.alarms} {_what(item)} {item.operations} operations ({item.hours:.3g} h) used to set it"
         )
+    for line in partly_unassessed(evaluated.results, evaluated.summaries)[:_SHOWN]:
+        say(line)
     show_truth(evaluated)
     _show_bounds(evaluated)
     _show_forces(evaluated.results)

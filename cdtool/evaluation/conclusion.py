@@ -185,6 +185,34 @@ def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult
     )
 
 
+def partly_unassessed(results: Results, summaries: Sequence[Summary]) -> list[str]:
+    """Return for each detector and group with some contacts that were not assessable the reasons, in words.
+
+    Parameters
+    ----------
+    results : Results
+        The rows of the benchmark.
+    summaries : sequence of Summary
+        One for each detector and group.
+
+    Returns
+    -------
+    list of str
+        One line each; none for a pair without an assessable contact, which is a reason of the conclusion.
+
+    Examples
+    --------
+    >>> partly_unassessed(Results({}, (), ()), [])
+    []
+    """
+    partly = [item for item in summaries if 0 < item.not_assessable < item.contacts]
+    lines = []
+    for item in partly:
+        what = f"{item.not_assessable} of {counted(item.contacts, 'contact')} not assessable"
+        lines.append(plain(f"{item.detector}, {item.group}: {what}: {_reasons_in_words(results, item)}"))
+    return lines
+
+
 def limits_words(results: Results) -> str:
     """Return whether the limits are met, in a few words."""
     limits = results.limits
@@ -278,6 +306,11 @@ def _reasons(
 
 
 def _why_unassessed(results: Results, item: Summary) -> str:
+    what = f"{item.contacts} contacts" if item.contacts else f"{item.operations} operations"
+    return f"none of {what} could be assessed: {_reasons_in_words(results, item)}"
+
+
+def _reasons_in_words(results: Results, item: Summary) -> str:
     own: list[ContactResult] = [
         row for row in results.contacts if (row.detector, row.group) == (item.detector, item.group)
     ]
@@ -286,6 +319,5 @@ def _why_unassessed(results: Results, item: Summary) -> str:
     reasons = reasons or [
         f"{name} {100.0 * share:.0f} %" for row in exposures for name, share in row.not_judged.items()
     ]
-    what = f"{item.contacts} contacts" if item.contacts else f"{item.operations} operations"
     more = f"; and {len(reasons) - _REASONS} more reasons" if len(reasons) > _REASONS else ""
-    return f"none of {what} could be assessed: {'; '.join(reasons[:_REASONS]) or 'unknown reason'}{more}"
+    return f"{'; '.join(reasons[:_REASONS]) or 'unknown reason'}{more}"

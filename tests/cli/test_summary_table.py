@@ -52,3 +52,14 @@ def test_ten_contacts_show_the_mean_with_its_interval_next_to_a_small_group(caps
     alone = shown(capsys, {"momentum": [25.0 + i for i in range(10)]})
     assert not any("range" in line and "ms" in line for line in alone[:2])
     assert not any(line.startswith("Fewer than 10") for line in alone)
+
+
+def test_contacts_that_are_not_assessable_have_their_reason_below_the_table(capsys):
+    base = ContactResult("", "stiff", "momentum", "gate", 5.0, 0.001, 5.0, None, "detected", 25.0, None, watched_ms=1e3)
+    blind = replace(base, outcome="not_assessable", latency_ms=None, reason="start-up 100 %")
+    rows = [replace(base, recording="1.csv"), replace(blind, recording="2.csv"), replace(blind, recording="3.csv")]
+    rows.append(replace(blind, recording="4.csv", reason="missing samples 60 %"))
+    exposure = (ExposureResult("stiff", "momentum", 4, 4, 0.5),)
+    show_table(evaluate(Results({"onset": "x"}, ("momentum",), ("stiff",), tuple(rows), (), exposure)))
+    words = " ".join(capsys.readouterr().out.split())
+    assert "momentum, stiff: 3 of 4 contacts not assessable: start-up 100 %; missing samples 60 %" in words
