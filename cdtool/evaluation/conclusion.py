@@ -202,7 +202,7 @@ def partly_unassessed(results: Results, summaries: Sequence[Summary]) -> list[st
 
     Examples
     --------
-    >>> partly_unassessed(Results({}, (), ()), [])
+    >>> partly_unassessed(Results({}, (), (), (), (), ()), [])
     []
     """
     partly = [item for item in summaries if 0 < item.not_assessable < item.contacts]
