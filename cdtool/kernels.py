@@ -256,7 +256,7 @@ def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[...
                 warnings.warn(
                     f"no writable folder for compiled kernels ({fault}); they are compiled in every process. "
                     "Set NUMBA_CACHE_DIR to a writable folder to avoid the wait.",
-                    RuntimeWarning,
+                    UserWarning,
                     stacklevel=4,
                 )
             compiled: Callable[..., Any] = numba.njit(signature, **options)(function)
