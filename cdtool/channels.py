@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, TypeVar
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
@@ -14,6 +14,8 @@ from cdtool.units import RAW_UNITS, unit
 from cdtool.value_words import value_in_words
 
 _CLOCKS = ("log", "publish", "header")
+# The axes of a force vector, in the order of its columns.
+AXES = ("x", "y", "z")
 
 AcceptedUnits = Callable[[str], tuple[str, ...]]
 
@@ -52,13 +54,37 @@ class ChannelSource:
     most: float = math.inf
     duty: Duty | None = None
     keys: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
+    direction: tuple[float, ...] = ()
 
     @property
     def described(self) -> str:
         """Return its name in the machine file, for messages."""
         if self.topic:
-            return f"{self.topic} {self.field}"
+            return f"{self.topic} {', '.join(self.fields) or self.field}"
         return ", ".join(str(column) for column in self.columns)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Return the names of the axes of a force vector in the machine file; empty for any other channel."""
+        if self.channel != "force" or len(self.factor) == 1:
+            return ()
+        return self.fields or tuple(str(column) for column in self.columns)
+
+    @property
+    def reduction(self) -> str:
+        """Return how the axes of a force become one number, in words; empty for any other channel."""
+        if not self.axes:
+            return ""
+        names = ", ".join(self.axes)
+        if not self.direction:
+            return f"magnitude of {names}"
+        return f"component of {names} along ({', '.join(f'{part:g}' for part in self.direction)})"
+
+    @property
+    def by_axis(self) -> tuple[ChannelSource, ...]:
+        """Return one source per axis of a vector of fields, so that a reader of topics finds each; otherwise itself."""
+        return tuple(replace(self, field=field, fields=()) for field in self.fields) or (self,)
 
 
 @dataclass(frozen=True)
@@ -172,16 +198,17 @@ def _source(
     count = 1 if channel in (*GROUND_TRUTH, *TRIGGER) else len(joints)
     columns: tuple[str | int, ...] = ()
     topic = field = ""
+    fields: tuple[str, ...] = ()
     if topics:
-        topic, field = table.text("topic"), table.text("field")
+        topic = table.text("topic")
+        if channel == "force" and "fields" in table:
+            fields = _field_axes(table)
+            count = len(fields)
+        else:
+            field = table.text("field")
     else:
-        given = table.raw("columns")
-        if given is not None and "column" in table:
-            raise table.fault("columns", "cannot be combined with 'column'", "remove one of the two")
-        listed = given if isinstance(given, list) else [table.raw("column")]
-        columns = tuple(_column(table, item, "column" if given is None else "columns") for item in listed)
-        if len(columns) != count:
-            raise table.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
+        columns = _columns(table, channel, count)
+        count = len(columns)
     kind = table.choice("kind", ("measured", "duty"), "measured")
     duty = _duty(table, channel) if kind == "duty" else None
     stated, si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
@@ -199,9 +226,64 @@ def _source(
         least=least,
         most=most,
         duty=duty,
+        fields=fields,
+        direction=_direction(table, count) if channel == "force" and "direction" in table else (),
     )
     table.finish()
     return source
+
+
+def _columns(table: Table, channel: str, count: int) -> tuple[str | int, ...]:
+    """Return the columns of a channel: `count`, or for a force up to one per axis."""
+    given = table.raw("columns")
+    if given is not None and "column" in table:
+        raise table.fault("columns", "cannot be combined with 'column'", "remove one of the two")
+    listed = given if isinstance(given, list) else [table.raw("column")]
+    columns = tuple(_column(table, item, "column" if given is None else "columns") for item in listed)
+    if channel == "force" and given is not None:
+        return _distinct_axes(table, "columns", columns)
+    if len(columns) != count:
+        raise table.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
+    return columns
+
+
+def _field_axes(table: Table) -> tuple[str, ...]:
+    if "field" in table:
+        raise table.fault("fields", "cannot be combined with 'field'", "remove one of the two")
+    fields = _distinct_axes(table, "fields", table.texts("fields"))
+    for name in fields:
+        if "[:]" in name:
+            raise table.fault("fields", f"names '{name}', a whole array", "name one element per axis, e.g. data[0]")
+    return fields
+
+
+_Name = TypeVar("_Name", str, "str | int")
+
+
+def _distinct_axes(table: Table, key: str, names: tuple[_Name, ...]) -> tuple[_Name, ...]:
+    if not 1 <= len(names) <= len(AXES):
+        raise table.fault(key, f"names {len(names)} axes", "give up to three: the axes of the force")
+    if len(set(names)) < len(names):
+        raise table.fault(key, "names an axis twice", "name each axis once")
+    return names
+
+
+def _direction(table: Table, count: int) -> tuple[float, ...]:
+    """Return the unit vector (axes,) of `direction`: the name of an axis, perhaps with a minus, or one number each."""
+    value = table.raw("direction")
+    known = [f"{sign}{axis}" for axis in AXES[:count] for sign in ("", "-")]
+    if count == 1:
+        raise table.fault("direction", "needs a force with several columns", "reverse one column with scale = -1")
+    if isinstance(value, str):
+        axis = table.choice("direction", known)
+        return tuple((-1.0 if axis[0] == "-" else 1.0) * (name == axis[-1]) for name in AXES[:count])
+    if not isinstance(value, list):
+        raise table.fault("direction", f"is {value_in_words(value)}", f"give {count} numbers, or one of {known}")
+    numbers = table.numbers("direction", count)
+    length = math.hypot(*numbers)
+    if length == 0.0 or not math.isfinite(length):
+        raise table.fault("direction", "has no length", "give a vector other than 0, e.g. [0, 0, -1]")
+    return tuple(number / length for number in numbers)
 
 
 def _unit_factor(

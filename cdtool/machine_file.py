@@ -32,6 +32,12 @@ class MachineFile(StoresDerived):
     gains: Mapping[str, Mapping[str, Gain]]
     digest: str
 
+    @property
+    def force_reduction(self) -> str:
+        """Return how the axes of a force become one number, in words; empty if no force has several axes."""
+        sources = (*self.columns.sources, *self.topics.sources)
+        return " or ".join(dict.fromkeys(item.reduction for item in sources if item.reduction))
+
     def detector(self, name: str) -> Any:
         """Return the detector of that (full or short) name with this file's gains."""
         registry = _registry("cdtool.detectors", "DETECTORS")

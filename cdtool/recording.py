@@ -25,6 +25,8 @@ TRIGGER = ("trigger",)
 # High or low, or one sample per event: without a unit.
 UNITLESS = ("label", "event", "trigger")
 CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
+# A load cell measures up to three axes, whatever the number of joints.
+_MOST_AXES = 3
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ class Recording(StoresDerived):
             if name not in CHANNELS:
                 raise RecordingError(f"{self.name}: unknown channel '{name}'", nearest(name, CHANNELS))
             expected = (1,) if name in (*GROUND_TRUTH, *TRIGGER) else (len(self.joints),)
-            if series.joint_count not in expected:
+            if series.joint_count not in expected and not (name == "force" and series.joint_count <= _MOST_AXES):
                 raise RecordingError(
                     f"{self.name}: channel '{name}' has {series.joint_count} columns for {len(self.joints)} joints",
                     "give one column per joint in [channels], in the order of machine.joints",

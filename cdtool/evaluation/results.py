@@ -43,6 +43,7 @@ def onset_words(provenance: Mapping[str, Any]) -> str:
     'load cell above 20 N for 3 ms; label file labels.csv'
     """
     rule, labels = provenance.get("onset") or "rule not stated", provenance.get("label_file")
+    rule = f"{rule}; force: {provenance['force']}" if provenance.get("force") else rule
     return f"{rule}; label file {PureWindowsPath(str(labels)).name}" if labels else str(rule)
 
 

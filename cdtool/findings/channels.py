@@ -212,3 +212,18 @@ class LinkAccelerations(TemplateFact):
     """Specific forces on the links became their angular accelerations."""
 
     words = "specific forces [m/s2] became link accelerations [rad/s2], gravity taken off"
+
+
+@frozen
+class AxesHeld(Fact):
+    """The axes of a force have clocks of their own: held on that of the `slowest`, up to `age` [s] old."""
+
+    slowest: str
+    age: float
+
+    def sentence(self) -> str:
+        """Return the clock and the age."""
+        return (
+            f"its axes have clocks of their own: each is held on the clock of {self.slowest}, "
+            f"up to {1e3 * self.age:.3g} ms old"
+        )

@@ -93,3 +93,18 @@ class InProgress(TemplateFact):
     end: float
 
     words = "a contact is in progress when it begins, until {end:.3f} s: its onset is not recorded"
+
+
+@frozen
+class ForceMagnitudeUsed(Fact):
+    """A force vector is reduced to its magnitude; `rest` [N] is the level of each axis when the log begins."""
+
+    rest: tuple[float, ...]
+
+    def sentence(self) -> str:
+        """Return the rest level of each axis."""
+        levels = ", ".join(_rounded(level, 3) for level in self.rest)
+        return (
+            f"magnitude of {len(self.rest)} axes, the rest level of each removed (at first {levels} N): "
+            "it cannot tell pushing from pulling; direction in [channels] selects a component"
+        )

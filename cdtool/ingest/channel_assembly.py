@@ -139,9 +139,9 @@ class _Assembly:
         scaled, masked = convert_to_si(item, self._select(item, values, clean.keep))
         self.findings += masked_findings(masked, item, self.channels.joints)
         self.findings += [replace(finding, channel=item.channel) for finding in gaps]
-        series = clock.with_values(scaled, item.unit)
         absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
         self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
+        series = clock.with_values(component_along(item.direction, scaled) if item.direction else scaled, item.unit)
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
     def _topic_clock(self, stamps: FloatArray, item: ChannelSource) -> _TopicClock:
@@ -221,20 +221,34 @@ def check_width(path: Path, item: ChannelSource, width: int) -> None:
     if width != len(item.factor):
         raise RecordingError(
             f"{path}: channel '{item.channel}' ({item.described}) has {width} values "
-            f"per sample for {len(item.factor)} joints",
-            "name one element per joint, in the order of machine.joints",
+            f"per sample for {len(item.factor)} {'axes' if item.axes else 'joints'}",
+            "name one element per axis" if item.axes else "name one element per joint, in the order of machine.joints",
             channel=item.channel,
         )
 
 
 def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
-    """Return the findings on masked values by joint; `masked` (3, J) are the counts of convert_to_si."""
+    """Return the findings on masked values by joint, or by axis of a force; `masked` (3, J): as of convert_to_si."""
+    if item.axes:
+        return [
+            Finding(kind(count, ""), f"{item.channel} {item.axes[j]}", severity)
+            for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
+            for j, count in enumerate(counts)
+            if count
+        ]
     return [
         Finding(kind(count, joint_name(joints, j, len(counts))), item.channel, severity)
         for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
         for j, count in enumerate(counts)
         if count
     ]
+
+
+def component_along(direction: Sequence[float], values: FloatArray) -> FloatArray:
+    """Return the component (n, 1) of vectors (n, axes) along a unit vector; NaN where an axis that it needs is NaN."""
+    used = np.flatnonzero(direction)
+    along: FloatArray = values[:, used] @ np.array(direction)[used]
+    return along[:, np.newaxis]
 
 
 def joint_name(joints: Sequence[str], joint: int, count: int) -> str:

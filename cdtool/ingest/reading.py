@@ -21,6 +21,7 @@ from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source, in_words
 from cdtool.ingest.channel_assembly import assemble_recording
+from cdtool.ingest.force_axes import fields_by_axis, join_axes, join_fields
 from cdtool.ingest.header_units import unit_findings
 from cdtool.ingest.parts import (
     Span,
@@ -237,8 +238,9 @@ def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, Channe
     """
     file_format = choose_format(path)
     channels = _map_for(file_format, machine_file, path)
-    source, resolved = resolve_columns(file_format.columns(path, channels), channels)
-    return with_own_clocks(source, resolved)
+    asked = fields_by_axis(channels)
+    source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+    return with_own_clocks(*join_fields(source, resolved, channels))
 
 
 def has_topics(file_format: Format) -> bool:
@@ -341,17 +343,22 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
             f"{source.path}: its own clock is in s, but [channels] time states another unit",
             'time = { column = "time", unit = "s" }',
         )
-    joined = {item.channel: _joined(source, item) for item in channels.sources}
+    joined, notes = dict[str, Column](), list[Finding]()
+    for item in channels.sources:
+        joined[item.channel], of_axes = _joined(source, item)
+        notes += of_axes
     sources = tuple(replace(item, columns=(item.channel,), keys=(item.channel,)) for item in channels.sources)
     names = tuple(joined)
     # The units are compared here, as joined columns have no unit.
-    findings = (*source.findings, *unit_findings(source, channels))
+    findings = (*source.findings, *unit_findings(source, channels), *notes)
     source = replace(source, columns=joined, names=names, findings=findings)
     return source, replace(channels, sources=sources, topics=True)
 
 
-def _joined(source: Source, item: ChannelSource) -> Column:
+def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]:
     parts = [source.columns[key] for key in item.keys]
+    if item.axes and all(part.time is not None for part in parts):
+        return join_axes(source.path, item, parts)
     time = parts[0].time
     for part in parts:
         if part.time is None or time is None:
@@ -366,4 +373,4 @@ def _joined(source: Source, item: ChannelSource) -> Column:
                 "all joints of a channel must have the same clock",
                 channel=item.channel,
             )
-    return Column(item.channel, np.column_stack([part.values for part in parts]), time)
+    return Column(item.channel, np.column_stack([part.values for part in parts]), time), []

@@ -136,8 +136,8 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
     if raised_by != stored_one and signature is not None:
         described += ", with an activation different from the file's"
-    recording, parts = load_operations(Path(log), machine_file, options.operations, ranges=ranges)
     rules = options.rules or ScoringRules()
+    recording, parts = load_operations(Path(log), machine_file, options.operations, ranges=ranges, onset=rules.onset)
     hold = max(HOLD, rules.window)
     detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
     contacts = any_contacts(recording, rules)

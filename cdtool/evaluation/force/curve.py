@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from cdtool.errors import RecordingError, UsageError
+from cdtool.evaluation.truth.force_vector import ForceMagnitude
 from cdtool.evaluation.truth.missing_samples import PERIODS, CellClock, cell_samples, longest_step
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
@@ -170,7 +171,7 @@ def force_time_curve(
             f"{recording.name}: no load-cell sample after the onset at {contact.start:.3f} s",
             "check the force limits of contacts on the load cell",
         )
-    rest = contact.rest if np.isfinite(contact.rest) else rest_before(whole, samples.force, contact.start)
+    rest = contact.rest if np.isfinite(contact.rest) else _rest(recording, contact)
     time, over = whole[first:last], samples.force[first:last] - rest
     pressing = (time <= contact.end) | (contact.end <= contact.start)
     largest = int(np.argmax(np.where(pressing, np.abs(over), -1.0)))
@@ -192,6 +193,14 @@ def force_time_curve(
         hole=contact.hole,
         uncertainty=contact.uncertainty if contact.hole else 0.0,
     )
+
+
+def _rest(recording: Recording, contact: Contact) -> float:
+    """Return the reading at rest before a contact that the load cell did not show; 0 of a magnitude."""
+    if isinstance(recording["force"], ForceMagnitude):
+        return 0.0
+    samples = cell_samples(recording["force"])
+    return rest_before(samples.time, samples.force, contact.start)
 
 
 def force_at(curve: ForceTimeCurve, time: float) -> float:

@@ -1,8 +1,8 @@
 """Ground truth: the contacts of a recording, by the load cell, by labels or by events.
 
 Conventions: a contact begins where the force, followed back from the first sample of a stay above the upper level, left
-the lower level over the cell's rest level. State the rule in every report: in soft impacts the cell responds to the
-contact tens of milliseconds after touch.
+the lower level over the cell's rest level; of a force with several axes, its magnitude over their rest levels. State
+the rule in every report: in soft impacts the cell responds to the contact tens of milliseconds after touch.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdtool.errors import RecordingError
+from cdtool.evaluation.truth.force_vector import ForceMagnitude, force_magnitude, magnitude_contacts
 from cdtool.evaluation.truth.load_cell import load_cell_contacts
 from cdtool.evaluation.truth.onset_rule import OnsetRule as OnsetRule
 from cdtool.recording import Contact, Recording
@@ -49,7 +50,10 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
     (1, 1.0, 100.0)
     """
     if "force" in recording:
-        return load_cell_contacts(recording["force"], rule, steps)
+        force = recording["force"] if recording["force"].joint_count == 1 else force_magnitude(recording["force"], rule)
+        if isinstance(force, ForceMagnitude):
+            return magnitude_contacts(force, rule, steps)
+        return load_cell_contacts(force, rule, steps)
     if "label" in recording:
         return _from_label(recording)
     if "event" in recording:

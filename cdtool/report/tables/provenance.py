@@ -26,6 +26,7 @@ _NAMES = {
     "hysteresis": "hysteresis, share of the safety factor",
     "latch": "alarms latch",
     "onset": "onset of a contact",
+    "force": "force from several axes",
     "separation_s": "separation of contacts [s]",
     "label_file": "label file",
     "synchronisation_s": "synchronisation of the load cell [s]",

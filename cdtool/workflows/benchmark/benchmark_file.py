@@ -79,8 +79,10 @@ class BenchmarkFile:
     @property
     def scoring(self) -> dict[str, Any]:
         """Return the settings that determine the results, for provenance; only results with equal settings compare."""
+        reduction = self.machine_file.force_reduction
         return {
             "onset": self.onset.described,
+            **({"force": reduction} if reduction else {}),
             "separation_s": self.onset.separation,
             "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
             "operations": self.operations,

@@ -123,7 +123,9 @@ def score_log(
     rules = setup.rules_of(group)
     begin = perf_counter()
     try:
-        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent, ranges)
+        recording, operations = load_operations(
+            path, setup.machine_file, setup.operations, setup.path.parent, ranges, rules.onset
+        )
         if group:
             contacts = true_contacts(recording, rules, path) if group != HOLDOUT else []
         else:

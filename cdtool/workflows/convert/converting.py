@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdtool.bounded_loading import ContentError, parse_toml, read_text
+from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.files import replaced
 from cdtool.findings import Finding
@@ -231,7 +232,7 @@ def _channels(log: Path, groups: Sequence[Group], names: WrittenNames, corner: f
         for column, places in zip(group.columns, of_group, strict=True):
             if topics:
                 topic, _, field = places[0].partition(" ")
-                where = f"topic = {_text(topic)}, field = {_text(field)}"
+                where = f"topic = {_text(topic)}, {_field(field, column)}"
             elif len(places) == 1:
                 where = f"column = {_text(places[0])}"
             else:
@@ -239,6 +240,14 @@ def _channels(log: Path, groups: Sequence[Group], names: WrittenNames, corner: f
             unit = "" if column.name in UNITLESS else f", unit = {_text(column.unit or '1')}"
             lines.append(f"{column.name} = {{ {where}{unit} }}")
     return "\n".join(lines) + "\n"
+
+
+def _field(field: str, column: Column) -> str:
+    """Return the field of a channel in [channels.mcap]; the axes of a force are elements of an array."""
+    if column.name != "force" or column.values.ndim == 1:
+        return f"field = {_text(field)}"
+    elements = [_text(field.replace("[:]", f"[{axis}]")) for axis in range(column.values.shape[1])]
+    return f"fields = [{', '.join(elements)}]"
 
 
 def _without_channels(text: str) -> str:
