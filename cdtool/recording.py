@@ -87,11 +87,37 @@ class Series(StoresDerived):
 
 
 @dataclass(frozen=True)
+class TableRows:
+    """The rows of a table on its clock: `time` (n,) [s] of those that are kept; `kept` (m,), None if all are."""
+
+    time: FloatArray
+    kept: BoolArray | None = None
+
+    @property
+    def count(self) -> int:
+        """Return the number of rows."""
+        return len(self.time) if self.kept is None else len(self.kept)
+
+    def time_of(self, row: int) -> tuple[float, float]:
+        """Return the time of a row [s], twice; of one that was dropped, those of the next row and of the one before.
+
+        NaN for a row that does not exist, or after which none is kept.
+        """
+        if not 0 <= row < self.count:
+            return math.nan, math.nan
+        at = row if self.kept is None else int(np.count_nonzero(self.kept[:row]))
+        if at >= len(self.time):
+            return math.nan, math.nan
+        is_kept = self.kept is None or bool(self.kept[row]) or at == 0
+        return float(self.time[at]), float(self.time[at if is_kept else at - 1])
+
+
+@dataclass(frozen=True)
 class Recording(StoresDerived):
     """One log: its channels as Series, on the load side, each at its own rate.
 
     `origin` is added to every time to obtain the source's own clock [s] (0 unless that is an epoch). A missing channel
-    is missing, never zeros.
+    is missing, never zeros. `rows` are those of its table; None without a table with one clock.
     """
 
     name: str
@@ -101,6 +127,7 @@ class Recording(StoresDerived):
     origin: float = 0.0
     findings: tuple[Finding, ...] = ()
     digest: str = ""
+    rows: TableRows | None = None
 
     def __post_init__(self) -> None:
         for name, series in self.channels.items():

@@ -222,7 +222,7 @@ class LimitResult:
 
     limit: str = meant("key in [limits]")
     detector: str = meant("full name of the detector")
-    group: str = meant("the benchmark's group")
+    group: str = meant("the benchmark's group; of one kind of contacts GROUP/KIND")
     figure: str = meant("name of the figure")
     value: float | None = meant("the figure; null where it is not known or not finite")
     least: float | None = meant("smallest value allowed")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.frozen import frozen
-from cdtool.plain_text import digits
+from cdtool.plain_text import counted, digits
 
 
 def _rounded(value: float, significant: int) -> str:
@@ -108,3 +108,26 @@ class ForceMagnitudeUsed(Fact):
             f"magnitude of {len(self.rest)} axes, the rest level of each removed (at first {levels} N): "
             "it cannot tell pushing from pulling; direction in [channels] selects a component"
         )
+
+
+@frozen
+class LabelsWithoutZone(TemplateFact):
+    """The dates of a label file have no zone."""
+
+    words = (
+        "the dates have no zone: read as UTC, like dates without a zone in a log. If the logs state a zone, set "
+        "labels_zone, e.g. '+02:00'"
+    )
+
+
+@frozen
+class KindsExcluded(Fact):
+    """Labels that are no contacts, because of their `kinds`."""
+
+    count: int
+    kinds: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """Return how many, and what follows."""
+        kinds = ", ".join(self.kinds)
+        return f"{counted(self.count, 'label')} of kind {kinds} are not contacts: an alarm there is a false alarm"

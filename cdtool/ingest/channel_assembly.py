@@ -28,7 +28,7 @@ from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.plausible import IMPOSSIBLE
-from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series
+from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 # A file of at most this many bytes is read at once for its digest.
@@ -77,6 +77,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine) -
             ),
         ),
         digest=file_digest(source.path),
+        rows=work.rows,
     )
 
 
@@ -113,6 +114,13 @@ class _Assembly:
         if not channels.topics:
             self.table = self._table_clock()
             self.findings += unit_findings(source, channels)
+
+    @property
+    def rows(self) -> TableRows | None:
+        """Return the rows of the table on its clock; None for channels with clocks of their own."""
+        if self.table is None or self.clock is None:
+            return None
+        return TableRows(self.clock.time, None if self.table.keep.all() else self.table.keep)
 
     def drop_columns(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
         """Remove the columns of a channel that no later channel needs."""

@@ -154,7 +154,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         rules.window,
         matched.contacts,
         matched.not_scored,
-        (*matched.findings, *notes),
+        (*matched.findings, *rules.findings, *notes),
         normals,
         rules.onset.described,
     )
@@ -186,7 +186,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         benchmark.window(log),
         tuple(rows for _, rows in judged),
         matched.not_scored,
-        (*matched.findings, *benchmark.notes),
+        (*matched.findings, *benchmark.setup.rules_of("").findings, *benchmark.notes),
         benchmark.normals,
         benchmark.setup.onset.described,
     )

@@ -73,6 +73,7 @@ class Gathering:
         self.outcomes: list[LogOutcome] = []
         self.skipped: list[Skipped] = []
         self.findings = [RecordingFinding.of(str(setup.path), Finding(Remark(words))) for words in setup.migrated]
+        self.findings += setup.rules_of("").findings
         # By detector: the unit of the value compared with the limits, which may differ from that of the signal.
         self.units: dict[str, str] = {}
         self._exposure: dict[tuple[str, str], Exposure] = {}

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cdtool.errors import ConfigurationError
-from cdtool.evaluation.truth.labels import Labels, read_labels
+from cdtool.evaluation.truth.labels import CLOCKS, Labels, read_labels
 from cdtool.evaluation.truth.named_rows import by_recording
 from cdtool.tables import Table
 from cdtool.workflows.runs import find_logs, shown_path
@@ -44,10 +44,15 @@ def labels_of(onset: Table, base: Path, scored: Sequence[Path]) -> Labels | None
 
     Raises ConfigurationError for a row that matches no log, or for a file name that matches several.
     """
+    settings = {"clock": onset.choice("labels_clock", CLOCKS, "recording"), "zone": onset.text("labels_zone", "")}
+    not_contacts = onset.texts("not_contacts", ())
     if "labels" not in onset:
+        for key in ("labels_clock", "labels_zone", "not_contacts"):
+            if key in onset:
+                raise onset.fault(key, "is only for a label file", "name one: labels")
         return None
     path = base / onset.text("labels")
-    labels = read_labels(path)
+    labels = read_labels(path, not_contacts=not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
     recordings = [shown_path(log, base) for log in scored]
     for name, recording in by_recording(path, labels.contacts, set(recordings)).items():
         if recording is None:

@@ -40,6 +40,7 @@ _RULES = {
     "separation_s": "[onset] separation_s",
     "force": "machine file's [channels] force",
     "label_file": "[onset] labels",
+    "not_contacts": "[onset] not_contacts",
     "synchronisation_s": "[onset] synchronisation_s",
     "window_s": "window_s",
     "operations": "operations",

@@ -29,6 +29,7 @@ _NAMES = {
     "force": "force from several axes",
     "separation_s": "separation of contacts [s]",
     "label_file": "label file",
+    "not_contacts": "kinds of labels that are not contacts",
     "synchronisation_s": "synchronisation of the load cell [s]",
     "mass_before_cell_kg": "mass before the load cell [kg]",
     "benchmark_sha256": "SHA-256 of the benchmark file",

@@ -15,6 +15,7 @@ from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
+from cdtool.evaluation.summary import kind_group
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
 from cdtool.machine_file import MachineFile, read_machine_file
@@ -88,6 +89,7 @@ class BenchmarkFile:
             "operations": self.operations,
             "watched_joints": ", ".join(self.watched) or None,
             "label_file": self.labels.source if self.labels else None,
+            **({"not_contacts": list(self.labels.not_contacts)} if self.labels and self.labels.not_contacts else {}),
             "synchronisation_s": self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
@@ -140,6 +142,7 @@ def read_benchmark_file(
     impacts = _groups(root, base, window, force)
     onset = root.table("onset")
     migrated = migrated_onset(onset)
+    labels = labels_of(onset, base, _scored(impacts, HOLDOUT))
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
@@ -151,7 +154,7 @@ def read_benchmark_file(
         signature=signature,
         rule=rule,
         activation=_read_activation(root.table("activation")),
-        labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
+        labels=labels,
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=read_onset(onset),
         mass_before_cell=mass_before_cell,
@@ -160,7 +163,10 @@ def read_benchmark_file(
         campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
         points=named_logs(root.table("points"), base, _scored(impacts)),
         limits=read_limits(
-            root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
+            root.table("limits"),
+            [*_names(machine_file, names), *((name, name) for name in also_known)],
+            tuple(impacts),
+            [kind_group(group, kind) for group in impacts for kind in (*labels.kinds, "")] if labels else (),
         ),
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
         window=window,

@@ -126,6 +126,7 @@ def score_log(
         recording, operations = load_operations(
             path, setup.machine_file, setup.operations, setup.path.parent, ranges, rules.onset
         )
+        unwanted = unwanted_contacts(recording, rules) if group == HOLDOUT else ()
         if group:
             contacts = true_contacts(recording, rules, path) if group != HOLDOUT else []
         else:
@@ -138,7 +139,6 @@ def score_log(
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
     scored.findings += lost(recording)
     if group == HOLDOUT:
-        unwanted = unwanted_contacts(recording, rules)
         operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
