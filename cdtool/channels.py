@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal, TypeVar
 
 from cdtool.errors import ConfigurationError, nearest
@@ -16,6 +18,8 @@ from cdtool.value_words import value_in_words
 _CLOCKS = ("log", "publish", "header")
 # The axes of a force vector, in the order of its columns.
 AXES = ("x", "y", "z")
+# What stands for the log in the name of a file beside it.
+_PLACEHOLDERS = ("{stem}", "{name}", "{folder}")
 
 AcceptedUnits = Callable[[str], tuple[str, ...]]
 
@@ -31,6 +35,34 @@ class Duty:
     resistance: float
     back_emf_constant: float
     torque_constant: float
+
+
+Alignment = Literal["offset", "epoch", "trigger"]
+
+
+@dataclass(frozen=True)
+class OwnFile:
+    """The file of a load cell that is not in the log, and how its clock is aligned with the log's.
+
+    `pattern` is relative to the log's folder, with {stem}, {name} and {folder} of the log. "offset": the times differ
+    by the channel's `time_offset`. "epoch": both count from 1970. "trigger": `log_trigger` and `file_trigger` are
+    columns, in the log or a topic and its field, that rise at the same time.
+    """
+
+    pattern: str
+    time: TimeSource
+    align: Alignment
+    log_trigger: str | int = ""
+    file_trigger: str | int = ""
+
+    def path_for(self, log: Path) -> Path:
+        """Return the file that belongs to a log."""
+        whole = log.resolve()
+        parts = {"{stem}": whole.stem if whole.suffix else whole.name, "{name}": whole.name}
+        name = self.pattern
+        for placeholder, text in (parts | {"{folder}": whole.parent.name}).items():
+            name = name.replace(placeholder, text)
+        return log.parent / name
 
 
 @dataclass(frozen=True)
@@ -56,6 +88,7 @@ class ChannelSource:
     keys: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
     direction: tuple[float, ...] = ()
+    own_file: OwnFile | None = None
 
     @property
     def described(self) -> str:
@@ -126,7 +159,8 @@ class TablePins:
 class ChannelMap:
     """All channels of a log; `topics` distinguishes the MCAP map from the map of columns, `pins` is for text tables.
 
-    `named`: the machine file names its joints. Otherwise a single joint has the machine's name.
+    `named`: the machine file names its joints. Otherwise a single joint has the machine's name. `beside` are the
+    channels in files of their own, which are not among the `sources`.
     """
 
     time: TimeSource
@@ -136,6 +170,7 @@ class ChannelMap:
     speed_low_pass: float = 50.0
     pins: TablePins = TablePins()
     named: bool = True
+    beside: tuple[ChannelSource, ...] = ()
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -162,7 +197,9 @@ def read_channel_map(table: Table, joints: tuple[str, ...], accepted: AcceptedUn
         except ConfigurationError as fault:
             fault.channel = name
             raise
-    return ChannelMap(time, tuple(sources), joints, topics, low_pass)
+    in_log = tuple(source for source in sources if source.own_file is None)
+    beside = tuple(source for source in sources if source.own_file is not None)
+    return ChannelMap(time, in_log, joints, topics, low_pass, beside=beside)
 
 
 def _time_source(table: Table, topics: bool) -> TimeSource:
@@ -173,7 +210,11 @@ def _time_source(table: Table, topics: bool) -> TimeSource:
         return TimeSource(clock=clock)  # type: ignore[arg-type]
     if not table.values or set(table.values) == {"mcap"}:
         return TimeSource()
-    part = table.table("time", required=True)
+    return _column_time(table.table("time", required=True))
+
+
+def _column_time(part: Table) -> TimeSource:
+    """Return the clock of a table: a column, a rate, or both."""
     if "rate_hz" in part:
         rate = part.number("rate_hz", above=0.0)
         counter = part.raw("column")
@@ -199,6 +240,8 @@ def _source(
     columns: tuple[str | int, ...] = ()
     topic = field = ""
     fields: tuple[str, ...] = ()
+    own_file = _own_file(table, topics) if channel == "force" and "file" in table else None
+    topics = topics and own_file is None
     if topics:
         topic = table.text("topic")
         if channel == "force" and "fields" in table:
@@ -228,9 +271,38 @@ def _source(
         duty=duty,
         fields=fields,
         direction=_direction(table, count) if channel == "force" and "direction" in table else (),
+        own_file=own_file,
     )
     table.finish()
     return source
+
+
+def _own_file(table: Table, topics: bool) -> OwnFile:
+    """Return the file of a load cell beside the log; raises ConfigurationError if its clock is not aligned."""
+    pattern = table.text("file")
+    placeholders = re.findall(r"\{[^{}]*\}", pattern)
+    if not pattern or not placeholders:
+        raise table.fault("file", f"is '{pattern}'", "name the log in it, e.g. cell_{stem}.csv")
+    for name in placeholders:
+        if name not in _PLACEHOLDERS:
+            raise table.fault("file", f"has {name}", f"use {', '.join(_PLACEHOLDERS)}")
+    given = [key for key in ("trigger", "clock") if key in table]
+    if len(given) == 2 or not (given or "time_offset" in table):
+        raise table.fault(
+            "file", "the clocks are not aligned", 'give time_offset, clock = "epoch" or trigger = { log = , file = }'
+        )
+    time = _column_time(table.table("time", required=True))
+    if "clock" in given:
+        table.choice("clock", ("epoch",))
+        return OwnFile(pattern, time, "epoch")
+    if not given:
+        return OwnFile(pattern, time, "offset")
+    part = table.table("trigger")
+    log, file = (_column(part, part.raw(key), key) for key in ("log", "file"))
+    if topics and (not isinstance(log, str) or " " not in log.strip()):
+        raise part.fault("log", f"is {value_in_words(log)}", 'give topic and field, e.g. "/sync data"')
+    part.finish()
+    return OwnFile(pattern, time, "trigger", log, file)
 
 
 def _columns(table: Table, channel: str, count: int) -> tuple[str | int, ...]:

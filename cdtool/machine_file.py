@@ -35,8 +35,14 @@ class MachineFile(StoresDerived):
     @property
     def force_reduction(self) -> str:
         """Return how the axes of a force become one number, in words; empty if no force has several axes."""
-        sources = (*self.columns.sources, *self.topics.sources)
+        maps = (self.columns, self.topics)
+        sources = [source for each in maps for source in (*each.sources, *each.beside)]
         return " or ".join(dict.fromkeys(item.reduction for item in sources if item.reduction))
+
+    def files_beside(self, log: Path) -> tuple[Path, ...]:
+        """Return the files that belong to a log, whether they exist or not."""
+        sources = (*self.columns.beside, *self.topics.beside)
+        return tuple(dict.fromkeys(item.own_file.path_for(log) for item in sources if item.own_file))
 
     def detector(self, name: str) -> Any:
         """Return the detector of that (full or short) name with this file's gains."""

@@ -117,7 +117,8 @@ class Recording(StoresDerived):
     """One log: its channels as Series, on the load side, each at its own rate.
 
     `origin` is added to every time to obtain the source's own clock [s] (0 unless that is an epoch). A missing channel
-    is missing, never zeros. `rows` are those of its table; None without a table with one clock.
+    is missing, never zeros. `rows` are those of its table; None without a table with one clock. `beside`: the
+    name and the SHA-256 of each file beside the log with a channel; `truth_clock` [s]: how far its clock may be off.
     """
 
     name: str
@@ -128,6 +129,8 @@ class Recording(StoresDerived):
     findings: tuple[Finding, ...] = ()
     digest: str = ""
     rows: TableRows | None = None
+    beside: tuple[tuple[str, str], ...] = ()
+    truth_clock: float = 0.0
 
     def __post_init__(self) -> None:
         for name, series in self.channels.items():

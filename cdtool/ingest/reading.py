@@ -21,6 +21,7 @@ from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source, in_words
 from cdtool.ingest.channel_assembly import assemble_recording
+from cdtool.ingest.file_beside import add_files_beside
 from cdtool.ingest.force_axes import fields_by_axis, join_axes, join_fields
 from cdtool.ingest.header_units import unit_findings
 from cdtool.ingest.parts import (
@@ -35,7 +36,7 @@ from cdtool.ingest.parts import (
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import Recording
+from cdtool.recording import Recording, Series
 
 # Opens a file of a format, for some or all of its columns.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
@@ -166,6 +167,27 @@ def read_as_logged(
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
+    logged = _read_log_itself(path, machine_file, unread)
+    if not (machine_file.columns.beside or machine_file.topics.beside):
+        return logged
+    by_topics = has_topics(choose_format(log_parts(path)[0]))
+    channels = machine_file.topics if by_topics else machine_file.columns
+
+    def read_trigger(name: str | int) -> Series:
+        source = ChannelSource("trigger", columns=(name,))
+        if by_topics:
+            topic, _, field = str(name).rpartition(" ")
+            source = ChannelSource("trigger", topic=topic, field=field)
+        only = replace(channels, sources=(source,), beside=())
+        return _read_log_itself(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
+
+    recording = logged.recording
+    recording = add_files_beside(recording, path, channels, machine_file.machine, _resolved_source, read_trigger)
+    return replace(logged, recording=recording)
+
+
+def _read_log_itself(path: Path, machine_file: MachineFile, unread: Literal["error", "loss"]) -> LoggedRecording:
+    """Return one log without the channels in files beside it."""
     if not path.is_dir():
         return read_parts([path], machine_file, path.stem)
     if unread == "loss":
@@ -236,8 +258,14 @@ def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, Channe
 
     A mapped load cell or label that is not in the file is left out of the map, with a note.
     """
+    return _resolved_source(path, _map_for(choose_format(path), machine_file, path))
+
+
+def _resolved_source(path: Path, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+    """Return the columns of one file that a map names, and the map for them; raises RecordingError."""
     file_format = choose_format(path)
-    channels = _map_for(file_format, machine_file, path)
+    if has_topics(file_format) and not channels.topics:
+        raise RecordingError(f"{path}: contains topics, but columns are mapped", "give a file of columns")
     asked = fields_by_axis(channels)
     source, resolved = resolve_columns(file_format.columns(path, asked), asked)
     return with_own_clocks(*join_fields(source, resolved, channels))

@@ -8,18 +8,23 @@ from pathlib import Path
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.truth.labels import CLOCKS, Labels, read_labels
 from cdtool.evaluation.truth.named_rows import by_recording
+from cdtool.machine_file import MachineFile
 from cdtool.tables import Table
 from cdtool.workflows.runs import find_logs, shown_path
 
 
-def logs_of(table: Table, base: Path) -> tuple[Path, ...]:
-    """Return the files that `logs` names below `base`; raises ConfigurationError for no match and for unknown keys."""
-    logs = tuple(find_logs(table.texts("logs"), base, table.key("logs")))
+def logs_of(table: Table, base: Path, machine_file: MachineFile) -> tuple[Path, ...]:
+    """Return the files that `logs` names below `base`; raises ConfigurationError for no match and for unknown keys.
+
+    A file that belongs to another one of them, as that of its load cell, is not a log.
+    """
+    logs = find_logs(table.texts("logs"), base, table.key("logs"))
     table.finish()
-    return logs
+    beside = {path.resolve() for log in logs for path in machine_file.files_beside(log)}
+    return tuple(log for log in logs if not beside or log.resolve() not in beside)
 
 
-def named_logs(table: Table, base: Path, scored: Sequence[Path]) -> dict[Path, str]:
+def named_logs(table: Table, base: Path, scored: Sequence[Path], machine_file: MachineFile) -> dict[Path, str]:
     """Return the campaign or test point of each of the `scored` logs, independent of how its path is written.
 
     Raises ConfigurationError for a log that is not scored, or that belongs to two of them.
@@ -29,7 +34,7 @@ def named_logs(table: Table, base: Path, scored: Sequence[Path]) -> dict[Path, s
     for name in table.values:
         if not name.strip():
             raise table.fault(name, "has no name", "give it a name")
-        for log in logs_of(table.table(name), base):
+        for log in logs_of(table.table(name), base, machine_file):
             path = known.get(log.resolve())
             if path is None:
                 raise table.fault(name, f"names {log}, which is not in a group of [impacts]", "name only scored logs")

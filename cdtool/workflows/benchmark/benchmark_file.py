@@ -103,9 +103,10 @@ class BenchmarkFile:
     @property
     def inputs(self) -> tuple[Path, ...]:
         """Return every file that is read for the benchmark; none of them may be overwritten."""
-        logs = (path for group in self.impacts.values() for path in group.logs)
+        logs = (*self.learn, *(path for group in self.impacts.values() for path in group.logs))
         labels = (Path(self.labels.source),) if self.labels else ()
-        return (self.path, self.machine_file.path, *self.learn, *logs, *labels)
+        beside = (path for log in logs for path in self.machine_file.files_beside(log))
+        return (self.path, self.machine_file.path, *logs, *labels, *beside)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -135,11 +136,11 @@ def read_benchmark_file(
         raise root.fault("detectors", "contains a detector twice", "list each detector once")
     signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
-    learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
+    learn = logs_of(root.table("learn", required=True), base, machine_file) if learning or "learn" in root else ()
     force = root.table("force")
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
-    impacts = _groups(root, base, window, force)
+    impacts = _groups(root, base, window, force, machine_file)
     onset = root.table("onset")
     migrated = migrated_onset(onset)
     labels = labels_of(onset, base, _scored(impacts, HOLDOUT))
@@ -160,8 +161,8 @@ def read_benchmark_file(
         mass_before_cell=mass_before_cell,
         learn=learn,
         impacts=impacts,
-        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
-        points=named_logs(root.table("points"), base, _scored(impacts)),
+        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT), machine_file),
+        points=named_logs(root.table("points"), base, _scored(impacts), machine_file),
         limits=read_limits(
             root.table("limits"),
             [*_names(machine_file, names), *((name, name) for name in also_known)],
@@ -210,7 +211,7 @@ def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
     return replace(setup, detectors=tuple(detectors), limits=limits)
 
 
-def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, ImpactGroup]:
+def _groups(root: Table, base: Path, window: float, force: Table, machine_file: MachineFile) -> dict[str, ImpactGroup]:
     """Return the groups of impacts, then the hold-out."""
     tables = root.table("impacts")
     if HOLDOUT in tables.values:
@@ -230,9 +231,9 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, I
         if profile and "force_profile" not in table:
             limits = profiles[profile]
         own = table.number("window_s", window, above=0.0)
-        groups[name] = ImpactGroup(logs_of(table, base), own, limits)
+        groups[name] = ImpactGroup(logs_of(table, base, machine_file), own, limits)
     if HOLDOUT in root:
-        groups[HOLDOUT] = ImpactGroup(logs_of(root.table(HOLDOUT), base), window)
+        groups[HOLDOUT] = ImpactGroup(logs_of(root.table(HOLDOUT), base, machine_file), window)
     if "limits" in force and not any(group.force for group in groups.values()):
         raise force.fault(
             "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"

@@ -49,11 +49,14 @@ def contact_rows(
     curves: Mapping[int, ForceTimeCurve],
     synchronisation: float,
 ) -> list[ContactResult]:
-    """Return a row for each contact and detector; `synchronisation` [s]: largest offset of the load cell's clock."""
+    """Return a row for each contact and detector; `synchronisation` [s]: largest offset of the load cell's clock.
+
+    To this is added how far the clock of a load cell in a file of its own may be off.
+    """
     numbers = {contact: number for number, contact in enumerate(contacts, 1)}
     rows = []
     for detection, matching in zip(judged.detections, judged.matchings, strict=True):
-        own = detection.statistic.period + synchronisation
+        own = detection.statistic.period + synchronisation + recording.truth_clock
         for found in matching.matches:
             number = numbers[found.contact]
             resolution = own + _resolution_of_onset(recording, found.contact)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -115,8 +115,11 @@ def convert(
     pieces = _pieces(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
-    _check_free([*names, *companions], parts, force)
+    beside = [path for path in machine_file.files_beside(log) if path.is_file()] if machine_file else []
+    _check_free([*names, *companions], [*parts, *beside], force)
     provenance = _provenance(log, parts, rows.origin, machine_file, rows.findings)
+    if beside:
+        provenance |= {"load_cell": "; ".join(f"{path.name} {file_digest(path)}" for path in beside)}
     row_progress = _RowProgress(log, sum(group.rows for group in rows.groups), progress)
     with replaced(*names, *companions) as temporary:  # all or none
         for i, (path, part) in enumerate(pieces):
@@ -170,7 +173,7 @@ def _check_apart(target: Path, log: Path, parts: Sequence[Path]) -> None:
 def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> None:
     for path in paths:
         if path.exists() and any(path.samefile(part) for part in parts):
-            raise UsageError(f"{path}: is the log itself", "choose another name")
+            raise UsageError(f"{path}: is the log itself, or its load cell", "choose another name")
         if path.exists() and not force:
             raise UsageError(f"{path}: already exists", "choose another name, or overwrite it with --force")
 
@@ -185,7 +188,7 @@ def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[
 
 def _provenance(
     log: Path, parts: Sequence[Path], origin: float, machine_file: MachineFile | None, findings: Sequence[Finding]
-) -> Mapping[str, str]:
+) -> dict[str, str]:
     """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
     if log.is_dir():
         parts = LogFolder.of(log).files  # in order of time
