@@ -71,6 +71,10 @@ class ChannelSource:
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
     `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns).
+
+    A force may be a vector: `columns`, or `fields` of one topic, are then its axes. `direction` (axes,) is a unit
+    vector: the force is the component along it; without one it is the magnitude. It may be in a file of its own. Of a
+    label, `kinds` are the values that are contacts, each with its kind; without them, all above 0.5 are.
     """
 
     channel: str
@@ -89,6 +93,7 @@ class ChannelSource:
     fields: tuple[str, ...] = ()
     direction: tuple[float, ...] = ()
     own_file: OwnFile | None = None
+    kinds: tuple[tuple[float, str], ...] = ()
 
     @property
     def described(self) -> str:
@@ -272,9 +277,30 @@ def _source(
         fields=fields,
         direction=_direction(table, count) if channel == "force" and "direction" in table else (),
         own_file=own_file,
+        kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
     )
     table.finish()
     return source
+
+
+def _kinds(table: Table) -> tuple[tuple[float, str], ...]:
+    """Return the values of a label that are contacts, each with its kind: { 1 = "hard", 2 = "soft" }."""
+    part = table.table("kinds")
+    kinds = []
+    for value in part.values:
+        try:
+            code = float(value)
+        except ValueError:
+            code = math.nan
+        if not math.isfinite(code):
+            raise part.fault(value, "is not a number", 'give values of the column: kinds = { 1 = "hard", 2 = "soft" }')
+        kind = part.text(value).strip()
+        if not kind:
+            raise part.fault(value, "has no name", "name the kind; leave out values that are not contacts")
+        kinds.append((code, kind))
+    if not kinds or len({code for code, _ in kinds}) < len(kinds):
+        raise table.fault("kinds", "is empty, or has a value twice", 'give each value once: { 1 = "hard", 2 = "soft" }')
+    return tuple(kinds)
 
 
 def _own_file(table: Table, topics: bool) -> OwnFile:

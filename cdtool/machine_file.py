@@ -39,6 +39,12 @@ class MachineFile(StoresDerived):
         sources = [source for each in maps for source in (*each.sources, *each.beside)]
         return " or ".join(dict.fromkeys(item.reduction for item in sources if item.reduction))
 
+    @property
+    def label_kinds(self) -> tuple[str, ...]:
+        """Return the kinds of contacts that a label channel distinguishes."""
+        sources = (*self.columns.sources, *self.topics.sources)
+        return tuple(dict.fromkeys(kind for item in sources for _, kind in item.kinds))
+
     def files_beside(self, log: Path) -> tuple[Path, ...]:
         """Return the files that belong to a log, whether they exist or not."""
         sources = (*self.columns.beside, *self.topics.beside)

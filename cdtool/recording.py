@@ -119,6 +119,7 @@ class Recording(StoresDerived):
     `origin` is added to every time to obtain the source's own clock [s] (0 unless that is an epoch). A missing channel
     is missing, never zeros. `rows` are those of its table; None without a table with one clock. `beside`: the
     name and the SHA-256 of each file beside the log with a channel; `truth_clock` [s]: how far its clock may be off.
+    `label_kinds` are the values of the label channel that are contacts, each with its kind; empty: all above 0.5 are.
     """
 
     name: str
@@ -131,6 +132,7 @@ class Recording(StoresDerived):
     rows: TableRows | None = None
     beside: tuple[tuple[str, str], ...] = ()
     truth_clock: float = 0.0
+    label_kinds: tuple[tuple[float, str], ...] = ()
 
     def __post_init__(self) -> None:
         for name, series in self.channels.items():

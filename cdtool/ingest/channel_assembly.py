@@ -78,6 +78,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine) -
         ),
         digest=file_digest(source.path),
         rows=work.rows,
+        label_kinds=next((item.kinds for item in channels.sources if item.channel == "label"), ()),
     )
 
 

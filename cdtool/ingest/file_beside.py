@@ -45,6 +45,10 @@ def add_files_beside(
         own = item.own_file
         assert own is not None
         path = own.path_for(log)
+        if path.resolve() == log.resolve():
+            itself = AbsentFile("file", path.as_posix(), reason="it is the log itself: map its column without 'file'")
+            recording = _without(recording, item, itself)
+            continue
         if not path.exists():
             recording = _without(recording, item, AbsentFile("file", path.as_posix()))
             continue

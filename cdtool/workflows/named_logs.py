@@ -20,8 +20,8 @@ def logs_of(table: Table, base: Path, machine_file: MachineFile) -> tuple[Path, 
     """
     logs = find_logs(table.texts("logs"), base, table.key("logs"))
     table.finish()
-    beside = {path.resolve() for log in logs for path in machine_file.files_beside(log)}
-    return tuple(log for log in logs if not beside or log.resolve() not in beside)
+    beside = {path.resolve(): log for log in logs for path in machine_file.files_beside(log)}
+    return tuple(log for log in logs if not beside or beside.get(log.resolve(), log) == log)
 
 
 def named_logs(table: Table, base: Path, scored: Sequence[Path], machine_file: MachineFile) -> dict[Path, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.errors import ConfigurationError
+from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.findings.channels import AbsentFile, SaturatedValues
 from cdtool.findings.clocks import FileAligned, TriggersDiffer, TriggersDrift
 from cdtool.formats.mcap.write import Stream, write_mcap
@@ -183,6 +185,22 @@ def test_a_damaged_file_leaves_the_log_without_a_cell(tmp_path, content):
     recording = read(tmp_path, TRIGGER)
     assert "force" not in recording and "speed" in recording
     assert len(facts(recording, AbsentFile)) == 1
+
+
+def test_the_log_itself_is_not_its_load_cell(tmp_path):
+    write_log(tmp_path)
+    recording = read(tmp_path, "time_offset = 0.0", cell=CELL.replace("cell_{stem}.csv", "{name}"))
+    assert "it is the log itself" in facts(recording, AbsentFile)[0].reason
+
+
+def test_the_onset_may_be_earlier_by_what_is_not_known_of_the_clocks(tmp_path):
+    time = np.arange(0.0, 4.0, 1e-3)
+    force = Series(time, np.where((time > 1.0) & (time < 1.2), 100.0, 0.0), "N")
+    known = Recording("r", "r", ("axis",), {"force": force})
+    (exact,), (wide,) = (
+        find_contacts(item, OnsetRule(above=20.0)) for item in (known, replace(known, truth_clock=0.01))
+    )
+    assert wide.uncertainty == pytest.approx(exact.uncertainty + 0.01) and wide.start == exact.start
 
 
 def test_a_log_without_the_trigger_has_no_cell(tmp_path):

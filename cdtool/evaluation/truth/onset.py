@@ -7,6 +7,8 @@ the rule in every report: in soft impacts the cell responds to the contact tens 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cdtool.errors import RecordingError
@@ -51,9 +53,12 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
     """
     if "force" in recording:
         force = recording["force"] if recording["force"].joint_count == 1 else force_magnitude(recording["force"], rule)
-        if isinstance(force, ForceMagnitude):
-            return magnitude_contacts(force, rule, steps)
-        return load_cell_contacts(force, rule, steps)
+        found = (
+            magnitude_contacts(force, rule, steps)
+            if isinstance(force, ForceMagnitude)
+            else load_cell_contacts(force, rule, steps)
+        )
+        return [_widened(contact, recording.truth_clock) for contact in found] if recording.truth_clock else found
     if "label" in recording:
         return _from_label(recording)
     if "event" in recording:
@@ -64,22 +69,37 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
     )
 
 
+def _widened(contact: Contact, clock: float) -> Contact:
+    """Return a contact whose onset may be earlier by how far the load cell's clock may be off [s]."""
+    return contact if contact.in_progress else replace(contact, uncertainty=contact.uncertainty + clock)
+
+
 def _from_label(recording: Recording) -> list[Contact]:
     series = recording["label"]
     present = np.isfinite(series.values[:, 0])  # a missing sample does not end a contact
-    time, touched = series.time[present], (series.values[present, 0] > 0.5).astype(int)
-    edges = np.diff(np.concatenate(([0], touched, [0])))
+    time, values = series.time[present], series.values[present, 0]
+    # The number of its kind, from 1; 0 where there is no contact. A change of kind is another contact.
+    kinds = np.zeros(len(time), dtype=int)
+    if recording.label_kinds:
+        for number, (code, _) in enumerate(recording.label_kinds, 1):
+            kinds[values == code] = number
+    else:
+        kinds[values > 0.5] = 1
+    firsts = np.flatnonzero(np.diff(kinds, prepend=0))
+    ends = np.append(firsts[1:], len(time))[: len(firsts)]
     period = series.period if len(series) > 1 else 0.0
     return [
         Contact(
-            start=float(time[a]),
-            end=float(time[b - 1]),
-            uncertainty=0.5 * period if a else 0.0,
+            start=float(time[first]),
+            end=float(time[end - 1]),
+            uncertainty=0.5 * period if first else 0.0,
             found_by="label",
+            kind=recording.label_kinds[kinds[first] - 1][1] if recording.label_kinds else "",
             resolution=period,
-            in_progress=bool(a == 0),
+            in_progress=bool(first == 0),
         )
-        for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+        for first, end in zip(firsts, ends, strict=True)
+        if kinds[first]
     ]
 
 

@@ -167,7 +167,7 @@ def read_benchmark_file(
             root.table("limits"),
             [*_names(machine_file, names), *((name, name) for name in also_known)],
             tuple(impacts),
-            [kind_group(group, kind) for group in impacts for kind in (*labels.kinds, "")] if labels else (),
+            [kind_group(group, kind) for group in impacts for kind in _kinds(machine_file, labels)],
         ),
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
         window=window,
@@ -179,6 +179,12 @@ def read_benchmark_file(
     refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
     return benchmark
+
+
+def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:
+    """Return the kinds of contacts that a limit may name; empty if none has a kind."""
+    kinds = dict.fromkeys((*machine_file.label_kinds, *(labels.kinds if labels else ())))
+    return (*kinds, "") if kinds else ()
 
 
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:

@@ -49,14 +49,11 @@ def contact_rows(
     curves: Mapping[int, ForceTimeCurve],
     synchronisation: float,
 ) -> list[ContactResult]:
-    """Return a row for each contact and detector; `synchronisation` [s]: largest offset of the load cell's clock.
-
-    To this is added how far the clock of a load cell in a file of its own may be off.
-    """
+    """Return a row for each contact and detector; `synchronisation` [s]: largest offset of the load cell's clock."""
     numbers = {contact: number for number, contact in enumerate(contacts, 1)}
     rows = []
     for detection, matching in zip(judged.detections, judged.matchings, strict=True):
-        own = detection.statistic.period + synchronisation + recording.truth_clock
+        own = detection.statistic.period + synchronisation
         for found in matching.matches:
             number = numbers[found.contact]
             resolution = own + _resolution_of_onset(recording, found.contact)
@@ -65,9 +62,12 @@ def contact_rows(
 
 
 def _resolution_of_onset(recording: Recording, contact: Contact) -> float:
-    """Return the resolution of the onset [s]; from a label file, at best that of the file and of the cell."""
+    """Return the resolution of the onset [s]; from a label file, at best that of the file and of the cell.
+
+    Of a load cell in a file of its own, with how far its clock may be off.
+    """
     if np.isfinite(contact.resolution):
-        return contact.resolution
+        return contact.resolution + (recording.truth_clock if contact.found_by == "load cell" else 0.0)
     cell = recording["force"].period if "force" in recording else 0.0
     return (cell if np.isfinite(cell) else 0.0) + contact.uncertainty
 

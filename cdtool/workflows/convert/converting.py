@@ -222,11 +222,14 @@ def _converted_machine(
     if urdf and machine_file.path.parent.resolve() != target.parent.resolve():
         place = os.path.relpath(machine_file.path.parent / urdf, target.parent)
         kept = _URDF.sub(lambda match: f"{match[1]}{_text(Path(place).as_posix())}", kept)
-    corner = (machine_file.topics if machine_file.topics.sources else machine_file.columns).speed_low_pass
-    return f"{kept.rstrip()}\n\n{_channels(log, groups, names, corner)}"
+    mapped = machine_file.topics if machine_file.topics.sources else machine_file.columns
+    kinds = next((item.kinds for item in mapped.sources if item.channel == "label"), ())
+    return f"{kept.rstrip()}\n\n{_channels(log, groups, names, mapped.speed_low_pass, kinds)}"
 
 
-def _channels(log: Path, groups: Sequence[Group], names: WrittenNames, corner: float) -> str:
+def _channels(
+    log: Path, groups: Sequence[Group], names: WrittenNames, corner: float, kinds: Sequence[tuple[float, str]]
+) -> str:
     topics = log.suffix.lower() == ".mcap"
     lines = [f"# The channels of {log.name} as cdtool convert wrote them: SI units, as logged."]
     lines += ["[channels.mcap]"] if topics else ["[channels]", 'time = { column = "time", unit = "s" }']
@@ -241,7 +244,9 @@ def _channels(log: Path, groups: Sequence[Group], names: WrittenNames, corner: f
             else:
                 where = f"columns = [{', '.join(map(_text, places))}]"
             unit = "" if column.name in UNITLESS else f", unit = {_text(column.unit or '1')}"
-            lines.append(f"{column.name} = {{ {where}{unit} }}")
+            of_label = ", ".join(f'"{value:.17g}" = {_text(kind)}' for value, kind in kinds)
+            also = f", kinds = {{ {of_label} }}" if of_label and column.name == "label" else ""
+            lines.append(f"{column.name} = {{ {where}{unit}{also} }}")
     return "\n".join(lines) + "\n"
 
 
