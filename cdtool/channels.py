@@ -20,6 +20,7 @@ _CLOCKS = ("log", "publish", "header")
 AXES = ("x", "y", "z")
 # What stands for the log in the name of a file beside it.
 _PLACEHOLDERS = ("{stem}", "{name}", "{folder}")
+_PLACEHOLDER = re.compile(r"\{[^{}]*\}")
 
 AcceptedUnits = Callable[[str], tuple[str, ...]]
 
@@ -57,12 +58,9 @@ class OwnFile:
 
     def path_for(self, log: Path) -> Path:
         """Return the file that belongs to a log."""
-        whole = log.resolve()
-        parts = {"{stem}": whole.stem if whole.suffix else whole.name, "{name}": whole.name}
-        name = self.pattern
-        for placeholder, text in (parts | {"{folder}": whole.parent.name}).items():
-            name = name.replace(placeholder, text)
-        return log.parent / name
+        own = log if log.name else log.resolve()  # "." has no name; a link has its own
+        texts = {"{stem}": own.stem, "{name}": own.name, "{folder}": own.absolute().parent.name}
+        return own.parent / _PLACEHOLDER.sub(lambda match: texts[match[0]], self.pattern)
 
 
 @dataclass(frozen=True)
@@ -306,7 +304,7 @@ def _kinds(table: Table) -> tuple[tuple[float, str], ...]:
 def _own_file(table: Table, topics: bool) -> OwnFile:
     """Return the file of a load cell beside the log; raises ConfigurationError if its clock is not aligned."""
     pattern = table.text("file")
-    placeholders = re.findall(r"\{[^{}]*\}", pattern)
+    placeholders = _PLACEHOLDER.findall(pattern)
     if not pattern or not placeholders:
         raise table.fault("file", f"is '{pattern}'", "name the log in it, e.g. cell_{stem}.csv")
     for name in placeholders:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.results import LimitResult
-from cdtool.evaluation.summary import COUNTED_ALWAYS, FIGURES, Summary
+from cdtool.evaluation.summary import COUNTED_ALWAYS, FIGURES, Summary, kind_group
 from cdtool.tables import Table
 
 ALL = "*"
@@ -100,6 +100,9 @@ def check_limits(
         named = [
             item for item in summaries if rule.detector in (ALL, item.detector) and rule.group in (ALL, item.group)
         ] or [item for item in kinds if rule.detector in (ALL, item.detector) and rule.group == item.group]
+        if not named and (unscored := _unscored_kind(rule, summaries)):
+            found += unscored
+            continue
         meant = [item for item in named if item.contacts or item.in_progress or rule.figure in COUNTED_ALWAYS]
         # A group of which no log could be scored has no figure either, but it should have had one.
         meant = meant or [item for item in named if not item.operations]
@@ -110,6 +113,22 @@ def check_limits(
             )
         found += [_check(rule, item, worst.get((item.detector, item.group))) for item in meant]
     return tuple(found)
+
+
+def _unscored_kind(rule: LimitRule, summaries: Sequence[Summary]) -> list[LimitResult]:
+    """Return the outcomes of a limit on a kind of which no contact could be scored; empty for any other limit."""
+    detectors = {
+        item.detector: None
+        for item in summaries
+        if rule.detector in (ALL, item.detector) and rule.group.startswith(kind_group(item.group, " ")[:-1])
+    }
+    least = rule.least if math.isfinite(rule.least) else None
+    largest = rule.largest if math.isfinite(rule.largest) else None
+    reason = "no contact of this kind was scored"
+    return [
+        LimitResult(rule.key, name, rule.group, rule.figure, None, least, largest, "not_assessable", reason)
+        for name in detectors
+    ]
 
 
 def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:

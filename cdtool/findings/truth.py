@@ -130,4 +130,5 @@ class KindsExcluded(Fact):
     def sentence(self) -> str:
         """Return how many, and what follows."""
         kinds = ", ".join(self.kinds)
-        return f"{counted(self.count, 'label')} of kind {kinds} are not contacts: an alarm there is a false alarm"
+        verb = "is not a contact" if self.count == 1 else "are not contacts"
+        return f"{counted(self.count, 'label')} of kind {kinds} {verb}: an alarm there is a false alarm"

@@ -130,7 +130,7 @@ def test_labels_in_ms_have_kinds_in_every_output_and_some_are_no_contacts(plain,
     done = cdtool("benchmark", file, *(part for name in names for part in ("-o", tmp_path / name)))
     assert done.status == 1
     assert "stiff/trunk.max_ms" in done.out and "stiff/head" in done.out
-    assert "1 label of kind intended" in " ".join(done.err.split())
+    assert "1 label of kind intended is not a contact" in " ".join(done.err.split())
     for name in names[1:4]:
         assert "stiff/head" in (tmp_path / name).read_text(encoding="utf-8")
     assert [row.kind for row in read_results(tmp_path / "new.json").contacts] == ["head", "trunk"]

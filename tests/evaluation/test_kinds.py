@@ -100,6 +100,16 @@ def test_a_limit_on_a_kind_is_read_back_from_results_json(tmp_path):
     assert read_results(tmp_path / "r.json") == done
 
 
+def test_a_limit_on_a_kind_without_a_scored_contact_does_not_pass(tmp_path):
+    known = (*KINDS, "stiff/head")
+    done = evaluate(THREE, limits('"*.stiff/head.missed" = { max = 0 }\n', known)).results
+    assert [(item.detector, item.outcome) for item in done.limits] == [
+        (name, "not_assessable") for name in ("momentum", "pure_torque")
+    ]
+    (tmp_path / "r.json").write_text(to_json(done), encoding="utf-8")
+    assert read_results(tmp_path / "r.json") == done
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

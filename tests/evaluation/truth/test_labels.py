@@ -113,6 +113,7 @@ def test_dates_without_a_zone_are_utc_and_that_is_stated(tmp_path):
         ("start_s,end_s\na,1,2", {"zone": "+02:00"}, "the labels are no dates"),
         ("start_row,end_row\na,1.5,2", {}, "start_row is '1.5'"),
         ("start_row,end_row\na,-1,2", {}, "start_row is '-1'"),
+        ("start_row,end_row\na,1234567890123456,", {}, "start_row is '1234567890123456'"),
         ("start_row,end_row\na,1,2", {"clock": "source"}, "the labels count rows"),
         ("start_ms,end_s\na,1,2", {}, "line 1: unknown column 'end_s'"),
         ("start_ms,end_ms\na,1e999999999,2", {}, "start_ms is '1e999999999'"),
