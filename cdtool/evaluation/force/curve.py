@@ -16,10 +16,12 @@ from cdtool.evaluation.truth.force_vector import ForceMagnitude
 from cdtool.evaluation.truth.missing_samples import PERIODS, CellClock, cell_samples, longest_step
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
-from cdtool.recording import BoolArray, Contact, FloatArray, Recording
+from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
+# An axis takes part in a contact from this share of the magnitude's peak on.
+_TAKES_PART = 0.3
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
 # recording's top speed the axis is at rest.
 _BEFORE = 0.1
@@ -176,7 +178,7 @@ def force_time_curve(
     pressing = (time <= contact.end) | (contact.end <= contact.start)
     largest = int(np.argmax(np.where(pressing, np.abs(over), -1.0)))
     force = over if over[largest] >= 0.0 else -over
-    clipped = _clipped(force)
+    clipped = _clipped(force) | _clipped_axis(recording["force"], first, last)
     if mass_before_cell > 0.0:
         force = force + mass_before_cell * _acceleration_with_contact(recording, contact.start, time)
     known = np.isfinite(force)
@@ -250,6 +252,24 @@ def _clipped(force: FloatArray) -> BoolArray:
     if lengths[highest].max() < _STUCK * usual:
         return np.zeros(len(force), dtype=bool)
     return np.repeat(highest, lengths)
+
+
+def _clipped_axis(series: Series, first: int, last: int) -> BoolArray | bool:
+    """Return the samples from `first` to `last` at which an axis of a magnitude is at its stop.
+
+    Only of an axis that takes part in the contact: one at rest may repeat its reading.
+    """
+    if not isinstance(series, ForceMagnitude):
+        return False
+    present = np.isfinite(series.values[:, 0])
+    axes, readings = series.axes[present][first:last], series.readings[present][first:last]
+    peak = float(np.max(series.values[present][first:last]))
+    clipped = np.zeros(len(axes), dtype=bool)
+    for over, reading in zip(axes.T, readings.T, strict=True):
+        largest = float(over[np.argmax(np.abs(over))])
+        if abs(largest) >= _TAKES_PART * peak:
+            clipped |= _clipped(np.copysign(1.0, largest) * reading)
+    return clipped
 
 
 def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatArray) -> FloatArray:

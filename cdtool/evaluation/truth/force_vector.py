@@ -33,16 +33,21 @@ _FEWEST = 3
 class ForceMagnitude(Series):
     """The magnitude (n, 1) [N] of a force vector without its rest level.
 
-    `axes` (n, K) [N] are what the axes read over their rest levels `rest` (n, K) [N]; `noise` [N] is the standard
-    deviation of the noisiest axis, `step` [N] the coarsest step in which one reads. A contact was in progress when the
-    record began until `pressed_until` [s]; -inf without one.
+    `readings` (n, K) [N] are those of the axes, and `axes` (n, K) [N] the same over their rest levels; `noise` [N] is the
+    standard deviation of the noisiest axis, `step` [N] the coarsest step in which one reads. A contact was in progress
+    when the record began until `pressed_until` [s]; -inf without one.
     """
 
     axes: FloatArray
-    rest: FloatArray
+    readings: FloatArray
     noise: float
     step: float
     pressed_until: float
+
+    @property
+    def rest(self) -> FloatArray:
+        """Return the rest level of each axis (n, K) [N]."""
+        return self.readings - self.axes
 
     def between(self, start: float, end: float) -> Series:
         """Return the samples with start <= time <= end [s], as an ordinary channel."""
@@ -103,15 +108,14 @@ def force_magnitude(vector: Series, rule: OnsetRule) -> ForceMagnitude:
     time, axes = vector.time[present], np.ascontiguousarray(vector.values[present].T)
     if len(time) < _FEWEST:
         nothing = np.full(vector.values.shape, np.nan)
-        return ForceMagnitude(vector.time, nothing[:, 0], vector.unit, nothing, nothing, 0.0, 0.0, -math.inf)
+        return ForceMagnitude(vector.time, nothing[:, 0], vector.unit, nothing, vector.values, 0.0, 0.0, -math.inf)
     steps = [reading_step(axis) for axis in axes]
     rests, pressed_until = _rest_levels(time, axes, rule)
     noise = max(max(rest.noise, ROUNDING * step) for rest, step in zip(rests, steps, strict=True))
-    over, level = np.full(vector.values.shape, np.nan), np.full(vector.values.shape, np.nan)
-    level[present] = np.column_stack([rest.levels for rest in rests])
-    over[present] = axes.T - level[present]
+    over = np.full(vector.values.shape, np.nan)
+    over[present] = axes.T - np.column_stack([rest.levels for rest in rests])
     size = np.sqrt(np.sum(over**2, axis=1))
-    return ForceMagnitude(vector.time, size, vector.unit, over, level, noise, max(steps), pressed_until)
+    return ForceMagnitude(vector.time, size, vector.unit, over, vector.values, noise, max(steps), pressed_until)
 
 
 def magnitude_contacts(force: ForceMagnitude, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:

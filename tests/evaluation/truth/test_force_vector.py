@@ -147,6 +147,19 @@ def test_the_force_over_time_of_a_labelled_contact_counts_from_zero():
     assert curve.peak == pytest.approx(100.0, abs=2.0)
 
 
+def test_an_axis_at_its_stop_is_seen_although_the_magnitude_changes():
+    time = clock()
+    force = np.outer(pulse(time, 3.0, peak=300.0), [0.6, 0.5, -0.6245]) + noise(time, 0.3)
+    stopped = force.copy()
+    stopped[:, 2] = np.maximum(stopped[:, 2], -150.0)
+    curves = []
+    for vector in (force, stopped):
+        reduced = with_scalar_force(recording(time, REST + vector), GATE)
+        curves.append(force_time_curve(reduced, find_contacts(reduced, GATE)[0]))
+    assert [curve.saturated for curve in curves] == [False, True]
+    assert curves[1].time[curves[1].clipped].min() == pytest.approx(0.09, abs=0.03)
+
+
 def test_the_rest_level_of_every_axis_is_reported():
     time = clock()
     reduced = with_scalar_force(recording(time, REST + np.outer(pulse(time, 3.0), OBLIQUE)), GATE)
