@@ -33,7 +33,7 @@ _FEWEST = 3
 class ForceMagnitude(Series):
     """The magnitude (n, 1) [N] of a force vector without its rest level.
 
-    `readings` (n, K) [N] are those of the axes, and `axes` (n, K) [N] the same over their rest levels; `noise` [N] is the
+    `readings` (n, K) [N] are those of the axes, and `axes` (n, K) [N] them over their rest levels; `noise` [N] is the
     standard deviation of the noisiest axis, `step` [N] the coarsest step in which one reads. A contact was in progress
     when the record began until `pressed_until` [s]; -inf without one.
     """
