@@ -305,8 +305,8 @@ def _own_file(table: Table, topics: bool) -> OwnFile:
     """Return the file of a load cell beside the log; raises ConfigurationError if its clock is not aligned."""
     pattern = table.text("file")
     placeholders = _PLACEHOLDER.findall(pattern)
-    if not pattern or not placeholders:
-        raise table.fault("file", f"is '{pattern}'", "name the log in it, e.g. cell_{stem}.csv")
+    if not placeholders or "\0" in pattern:
+        raise table.fault("file", f"is {value_in_words(pattern)}", "name the log in it, e.g. cell_{stem}.csv")
     for name in placeholders:
         if name not in _PLACEHOLDERS:
             raise table.fault("file", f"has {name}", f"use {', '.join(_PLACEHOLDERS)}")

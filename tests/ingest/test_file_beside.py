@@ -249,6 +249,7 @@ def test_the_name_of_the_file_follows_from_the_log(tmp_path, pattern, place):
         (CELL, 'trigger = { log = "sync" }', "trigger.file: is missing"),
         (CELL.replace("{stem}", "03"), TRIGGER, "name the log in it"),
         (CELL.replace("{stem}", "{stam}"), TRIGGER, r"has \{stam\}"),
+        (CELL.replace("cell_", "\\u0000"), TRIGGER, "name the log in it"),
         (CELL.replace(', time = { column = "time", unit = "ms" }', ""), TRIGGER, "force.time: is missing"),
         (CELL.replace("force", "x"), 'topic = "/cell", time_offset = 0', "unknown key"),
     ],

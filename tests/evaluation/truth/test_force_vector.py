@@ -76,6 +76,16 @@ def test_each_axis_may_drift_by_itself(rule):
     assert found[0].peak_force == pytest.approx(100.0, abs=1.5)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_mounting_of_the_sensor_does_not_matter(seed):
+    time = clock(length=5.0)
+    force = np.outer(pulse(time, 3.0), OBLIQUE) + noise(time, 0.3)
+    rotation = stats.ortho_group.rvs(3, random_state=seed)
+    (straight,), (turned,) = (find_contacts(recording(time, REST + axes), GATE) for axes in (force, force @ rotation))
+    assert turned.start == pytest.approx(straight.start, abs=1.01e-3)
+    assert turned.peak_force == pytest.approx(straight.peak_force, abs=0.3)
+
+
 @pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
 def test_a_long_push_on_one_axis_keeps_the_rest_levels_of_all(rule):
     time = clock()
