@@ -70,9 +70,9 @@ class ChannelSource:
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
     `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns).
 
-    A force may be a vector: `columns`, or `fields` of one topic, are then its axes. `direction` (axes,) is a unit
-    vector: the force is the component along it; without one it is the magnitude. It may be in a file of its own. Of a
-    label, `kinds` are the values that are contacts, each with its kind; without them, all above 0.5 are.
+    A force may be a vector: `columns`, or `fields`, each of one of the `topics`, are then its axes. `direction` (axes,)
+    is a unit vector: the force is the component along it; without one it is the magnitude. It may be in a file of its
+    own. Of a label, `kinds` are the values that are contacts, each with its kind; without them, all above 0.5 are.
     """
 
     channel: str
@@ -88,6 +88,7 @@ class ChannelSource:
     most: float = math.inf
     duty: Duty | None = None
     keys: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
     direction: tuple[float, ...] = ()
     own_file: OwnFile | None = None
@@ -96,8 +97,10 @@ class ChannelSource:
     @property
     def described(self) -> str:
         """Return its name in the machine file, for messages."""
+        if self.fields:
+            return ", ".join(self.axes)
         if self.topic:
-            return f"{self.topic} {', '.join(self.fields) or self.field}"
+            return f"{self.topic} {self.field}"
         return ", ".join(str(column) for column in self.columns)
 
     @property
@@ -105,7 +108,9 @@ class ChannelSource:
         """Return the names of the axes of a force vector in the machine file; empty for any other channel."""
         if self.channel != "force" or len(self.factor) == 1:
             return ()
-        return self.fields or tuple(str(column) for column in self.columns)
+        if self.fields:
+            return tuple(f"{topic} {field}" for topic, field in zip(self.topics, self.fields, strict=True))
+        return tuple(str(column) for column in self.columns)
 
     @property
     def reduction(self) -> str:
@@ -120,7 +125,8 @@ class ChannelSource:
     @property
     def by_axis(self) -> tuple[ChannelSource, ...]:
         """Return one source per axis of a vector of fields, so that a reader of topics finds each; otherwise itself."""
-        return tuple(replace(self, field=field, fields=()) for field in self.fields) or (self,)
+        pairs = zip(self.topics, self.fields, strict=True)
+        return tuple(replace(self, topic=topic, field=name, topics=(), fields=()) for topic, name in pairs) or (self,)
 
 
 @dataclass(frozen=True)
@@ -242,16 +248,16 @@ def _source(
     count = 1 if channel in (*GROUND_TRUTH, *TRIGGER) else len(joints)
     columns: tuple[str | int, ...] = ()
     topic = field = ""
-    fields: tuple[str, ...] = ()
+    axes: tuple[tuple[str, str], ...] = ()
     own_file = _own_file(table, topics) if channel == "force" and "file" in table else None
     topics = topics and own_file is None
-    if topics:
-        topic = table.text("topic")
-        if channel == "force" and "fields" in table:
-            fields = _field_axes(table)
-            count = len(fields)
-        else:
-            field = table.text("field")
+    if topics and channel == "force" and ("fields" in table or "topics" in table):
+        axes = _field_axes(table)
+        count = len(axes)
+        if count == 1:
+            ((topic, field),), axes = axes, ()
+    elif topics:
+        topic, field = table.text("topic"), table.text("field")
     else:
         columns = _columns(table, channel, count)
         count = len(columns)
@@ -272,7 +278,8 @@ def _source(
         least=least,
         most=most,
         duty=duty,
-        fields=fields,
+        topics=tuple(topic for topic, _ in axes),
+        fields=tuple(field for _, field in axes),
         direction=_direction(table, count) if channel == "force" and "direction" in table else (),
         own_file=own_file,
         kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
@@ -343,17 +350,24 @@ def _columns(table: Table, channel: str, count: int) -> tuple[str | int, ...]:
     return columns
 
 
-def _field_axes(table: Table) -> tuple[str, ...]:
-    if "field" in table:
-        raise table.fault("fields", "cannot be combined with 'field'", "remove one of the two")
-    fields = _distinct_axes(table, "fields", table.texts("fields"))
+def _field_axes(table: Table) -> tuple[tuple[str, str], ...]:
+    """Return topic and field of each axis of a force: several fields of a topic, or fields of several topics."""
+    for one, several in (("topic", "topics"), ("field", "fields")):
+        if one in table and several in table:
+            raise table.fault(several, f"cannot be combined with '{one}'", "remove one of the two")
+    topics = table.texts("topics") if "topics" in table else (table.text("topic"),)
+    fields = table.texts("fields") if "fields" in table else (table.text("field"),)
+    count = max(len(topics), len(fields))
+    if len(topics) not in (1, count) or len(fields) not in (1, count):
+        raise table.fault("topics", f"names {len(topics)} topics for {len(fields)} fields", "give one of each per axis")
+    topics, fields = (names * count if len(names) == 1 else names for names in (topics, fields))
     for name in fields:
         if "[:]" in name:
             raise table.fault("fields", f"names '{name}', a whole array", "name one element per axis, e.g. data[0]")
-    return fields
+    return _distinct_axes(table, "fields", tuple(zip(topics, fields, strict=True)))
 
 
-_Name = TypeVar("_Name", str, "str | int")
+_Name = TypeVar("_Name", "str | int", "tuple[str, str]")
 
 
 def _distinct_axes(table: Table, key: str, names: tuple[_Name, ...]) -> tuple[_Name, ...]:

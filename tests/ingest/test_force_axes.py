@@ -122,6 +122,17 @@ def write_log(folder: Path, axes: FloatArray, time: FloatArray) -> Path:
     return folder / "log.mcap"
 
 
+@pytest.mark.parametrize(
+    "force", ['topic = "/cell", fields = ["wrench.force.y"]', 'topics = ["/cell"], field = "wrench.force.y"']
+)
+def test_a_single_field_is_a_single_load_cell(tmp_path, force):
+    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}force = {{ {force} }}\n", encoding="utf-8")
+    axes = np.random.default_rng(0).normal(size=(200, 3))
+    log = write_log(tmp_path, axes, np.arange(200) * 5e-3)
+    recording = read_as_logged(log, read_machine_file(tmp_path / "machine.toml")).recording
+    assert recording["force"].values.tolist() == axes[:, 1:2].tolist()
+
+
 @pytest.mark.parametrize("also", ["", ', direction = "-z"'])
 def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, also):
     time = np.arange(200) * 5e-3
@@ -135,6 +146,41 @@ def test_the_fields_of_a_topic_are_the_axes_and_convert_keeps_them(tmp_path, als
         convert(log, tmp_path / name, machine=machine)
         again = read_machine_file(tmp_path / f"{name}.machine.toml")
         assert read_as_logged(tmp_path / name, again).recording["force"].values.tolist() == found.tolist()
+
+
+def test_each_axis_may_have_a_topic_and_a_clock_of_its_own(tmp_path):
+    time = np.arange(200) * 5e-3
+    speed = Stream("/joints", "sensor_msgs/msg/JointState", time, {"velocity": np.ones((200, 1))}, ("axis",))
+    late = time + 0.002
+    streams = [
+        Stream(f"/f{name}", "geometry_msgs/msg/WrenchStamped", clock, {"wrench.force.x": 100.0 * clock})
+        for name, clock in (("x", time), ("y", late))
+    ]
+    write_mcap(tmp_path / "log.mcap", [speed, *streams])
+    force = 'force = { topics = ["/fx", "/fy"], field = "wrench.force.x" }'
+    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}{force}\n", encoding="utf-8")
+    recording = read_as_logged(tmp_path / "log.mcap", read_machine_file(tmp_path / "machine.toml")).recording
+    series = recording["force"]
+    assert series.values[1:, 0] == pytest.approx(100.0 * series.time[1:])
+    assert series.values[1:, 1] == pytest.approx(100.0 * (series.time[1:] - 0.003))
+    (note,) = [item.fact for item in recording.findings if isinstance(item.fact, AxesHeld)]
+    assert note.age == pytest.approx(0.003, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("force", "said"),
+    [
+        ('topics = ["/a", "/b"], fields = ["x", "y", "z"]', "names 2 topics for 3 fields"),
+        ('topics = ["/a", "/b"], topic = "/a", field = "x"', "cannot be combined with 'topic'"),
+        ('topic = "/a", field = "x", fields = ["x", "y"]', "cannot be combined with 'field'"),
+        ('topics = ["/a", "/a"], field = "x"', "an axis twice"),
+        ('fields = ["x", "y"]', "force.topic: is missing"),
+    ],
+)
+def test_wrong_topics_of_a_vector_name_their_key(tmp_path, force, said):
+    (tmp_path / "machine.toml").write_text(f"{AXIS}{MCAP}force = {{ {force} }}\n", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=said):
+        read_machine_file(tmp_path / "machine.toml")
 
 
 def test_a_whole_array_is_no_axis(tmp_path):
