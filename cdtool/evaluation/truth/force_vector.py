@@ -153,7 +153,7 @@ def quiet_level(sigmas: float, axes: int) -> float:
     The survival functions of the chi and of the normal distribution are equal there (both sides of the latter).
 
     >>> [round(quiet_level(8.0, axes), 2) for axes in (1, 2, 3)]
-    [8.0, 8.29, 8.55]
+    [8.0, 8.28, 8.51]
     """
     target = _log_chi_survival(sigmas, 1)
     low, high = sigmas, sigmas + 4.0 * math.sqrt(axes)
