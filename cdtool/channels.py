@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, TypeVar
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
@@ -14,6 +16,11 @@ from cdtool.units import RAW_UNITS, unit
 from cdtool.value_words import value_in_words
 
 _CLOCKS = ("log", "publish", "header")
+# The axes of a force vector, in the order of its columns.
+AXES = ("x", "y", "z")
+# What stands for the log in the name of a file beside it.
+_PLACEHOLDERS = ("{stem}", "{name}", "{folder}")
+_PLACEHOLDER = re.compile(r"\{[^{}]*\}")
 
 AcceptedUnits = Callable[[str], tuple[str, ...]]
 
@@ -31,12 +38,41 @@ class Duty:
     torque_constant: float
 
 
+Alignment = Literal["offset", "epoch", "trigger"]
+
+
+@dataclass(frozen=True)
+class OwnFile:
+    """The file of a load cell that is not in the log, and how its clock is aligned with the log's.
+
+    `pattern` is relative to the log's folder, with {stem}, {name} and {folder} of the log. "offset": the times differ
+    by the channel's `time_offset`. "epoch": both count from 1970. "trigger": `log_trigger` and `file_trigger` are
+    columns, in the log or a topic and its field, that rise at the same time.
+    """
+
+    pattern: str
+    time: TimeSource
+    align: Alignment
+    log_trigger: str | int = ""
+    file_trigger: str | int = ""
+
+    def path_for(self, log: Path) -> Path:
+        """Return the file that belongs to a log."""
+        own = log if log.name else log.resolve()  # "." has no name; a link has its own
+        texts = {"{stem}": own.stem, "{name}": own.name, "{folder}": own.absolute().parent.name}
+        return own.parent / _PLACEHOLDER.sub(lambda match: texts[match[0]], self.pattern)
+
+
 @dataclass(frozen=True)
 class ChannelSource:
     """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
     `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns).
+
+    A force may be a vector: `columns`, or `fields`, each of one of the `topics`, are then its axes. `direction` (axes,)
+    is a unit vector: the force is the component along it; without one it is the magnitude. It may be in a file of its
+    own. Of a label, `kinds` are the values that are contacts, each with its kind; without them, all above 0.5 are.
     """
 
     channel: str
@@ -52,13 +88,45 @@ class ChannelSource:
     most: float = math.inf
     duty: Duty | None = None
     keys: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
+    direction: tuple[float, ...] = ()
+    own_file: OwnFile | None = None
+    kinds: tuple[tuple[float, str], ...] = ()
 
     @property
     def described(self) -> str:
         """Return its name in the machine file, for messages."""
+        if self.fields:
+            return ", ".join(self.axes)
         if self.topic:
             return f"{self.topic} {self.field}"
         return ", ".join(str(column) for column in self.columns)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Return the names of the axes of a force vector in the machine file; empty for any other channel."""
+        if self.channel != "force" or len(self.factor) == 1:
+            return ()
+        if self.fields:
+            return tuple(f"{topic} {field}" for topic, field in zip(self.topics, self.fields, strict=True))
+        return tuple(str(column) for column in self.columns)
+
+    @property
+    def reduction(self) -> str:
+        """Return how the axes of a force become one number, in words; empty for any other channel."""
+        if not self.axes:
+            return ""
+        names = ", ".join(self.axes)
+        if not self.direction:
+            return f"magnitude of {names}"
+        return f"component of {names} along ({', '.join(f'{part:g}' for part in self.direction)})"
+
+    @property
+    def by_axis(self) -> tuple[ChannelSource, ...]:
+        """Return one source per axis of a vector of fields, so that a reader of topics finds each; otherwise itself."""
+        pairs = zip(self.topics, self.fields, strict=True)
+        return tuple(replace(self, topic=topic, field=name, topics=(), fields=()) for topic, name in pairs) or (self,)
 
 
 @dataclass(frozen=True)
@@ -100,7 +168,8 @@ class TablePins:
 class ChannelMap:
     """All channels of a log; `topics` distinguishes the MCAP map from the map of columns, `pins` is for text tables.
 
-    `named`: the machine file names its joints. Otherwise a single joint has the machine's name.
+    `named`: the machine file names its joints. Otherwise a single joint has the machine's name. `beside` are the
+    channels in files of their own, which are not among the `sources`.
     """
 
     time: TimeSource
@@ -110,6 +179,7 @@ class ChannelMap:
     speed_low_pass: float = 50.0
     pins: TablePins = TablePins()
     named: bool = True
+    beside: tuple[ChannelSource, ...] = ()
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -136,7 +206,9 @@ def read_channel_map(table: Table, joints: tuple[str, ...], accepted: AcceptedUn
         except ConfigurationError as fault:
             fault.channel = name
             raise
-    return ChannelMap(time, tuple(sources), joints, topics, low_pass)
+    in_log = tuple(source for source in sources if source.own_file is None)
+    beside = tuple(source for source in sources if source.own_file is not None)
+    return ChannelMap(time, in_log, joints, topics, low_pass, beside=beside)
 
 
 def _time_source(table: Table, topics: bool) -> TimeSource:
@@ -147,7 +219,11 @@ def _time_source(table: Table, topics: bool) -> TimeSource:
         return TimeSource(clock=clock)  # type: ignore[arg-type]
     if not table.values or set(table.values) == {"mcap"}:
         return TimeSource()
-    part = table.table("time", required=True)
+    return _column_time(table.table("time", required=True))
+
+
+def _column_time(part: Table) -> TimeSource:
+    """Return the clock of a table: a column, a rate, or both."""
     if "rate_hz" in part:
         rate = part.number("rate_hz", above=0.0)
         counter = part.raw("column")
@@ -172,16 +248,19 @@ def _source(
     count = 1 if channel in (*GROUND_TRUTH, *TRIGGER) else len(joints)
     columns: tuple[str | int, ...] = ()
     topic = field = ""
-    if topics:
+    axes: tuple[tuple[str, str], ...] = ()
+    own_file = _own_file(table, topics) if channel == "force" and "file" in table else None
+    topics = topics and own_file is None
+    if topics and channel == "force" and ("fields" in table or "topics" in table):
+        axes = _field_axes(table)
+        count = len(axes)
+        if count == 1:
+            ((topic, field),), axes = axes, ()
+    elif topics:
         topic, field = table.text("topic"), table.text("field")
     else:
-        given = table.raw("columns")
-        if given is not None and "column" in table:
-            raise table.fault("columns", "cannot be combined with 'column'", "remove one of the two")
-        listed = given if isinstance(given, list) else [table.raw("column")]
-        columns = tuple(_column(table, item, "column" if given is None else "columns") for item in listed)
-        if len(columns) != count:
-            raise table.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
+        columns = _columns(table, channel, count)
+        count = len(columns)
     kind = table.choice("kind", ("measured", "duty"), "measured")
     duty = _duty(table, channel) if kind == "duty" else None
     stated, si, factor = _unit_factor(table, channel, accepted, count, topics, duty)
@@ -199,9 +278,122 @@ def _source(
         least=least,
         most=most,
         duty=duty,
+        topics=tuple(topic for topic, _ in axes),
+        fields=tuple(field for _, field in axes),
+        direction=_direction(table, count) if channel == "force" and "direction" in table else (),
+        own_file=own_file,
+        kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
     )
     table.finish()
     return source
+
+
+def _kinds(table: Table) -> tuple[tuple[float, str], ...]:
+    """Return the values of a label that are contacts, each with its kind: { 1 = "hard", 2 = "soft" }."""
+    part = table.table("kinds")
+    kinds = []
+    for value in part.values:
+        try:
+            code = float(value)
+        except ValueError:
+            code = math.nan
+        if not math.isfinite(code):
+            raise part.fault(value, "is not a number", 'give values of the column: kinds = { 1 = "hard", 2 = "soft" }')
+        kind = part.text(value).strip()
+        if not kind:
+            raise part.fault(value, "has no name", "name the kind; leave out values that are not contacts")
+        kinds.append((code, kind))
+    if not kinds or len({code for code, _ in kinds}) < len(kinds):
+        raise table.fault("kinds", "is empty, or has a value twice", 'give each value once: { 1 = "hard", 2 = "soft" }')
+    return tuple(kinds)
+
+
+def _own_file(table: Table, topics: bool) -> OwnFile:
+    """Return the file of a load cell beside the log; raises ConfigurationError if its clock is not aligned."""
+    pattern = table.text("file")
+    placeholders = _PLACEHOLDER.findall(pattern)
+    if not placeholders or "\0" in pattern:
+        raise table.fault("file", f"is {value_in_words(pattern)}", "name the log in it, e.g. cell_{stem}.csv")
+    for name in placeholders:
+        if name not in _PLACEHOLDERS:
+            raise table.fault("file", f"has {name}", f"use {', '.join(_PLACEHOLDERS)}")
+    given = [key for key in ("trigger", "clock") if key in table]
+    if len(given) == 2 or not (given or "time_offset" in table):
+        raise table.fault(
+            "file", "the clocks are not aligned", 'give time_offset, clock = "epoch" or trigger = { log = , file = }'
+        )
+    time = _column_time(table.table("time", required=True))
+    if "clock" in given:
+        table.choice("clock", ("epoch",))
+        return OwnFile(pattern, time, "epoch")
+    if not given:
+        return OwnFile(pattern, time, "offset")
+    part = table.table("trigger")
+    log, file = (_column(part, part.raw(key), key) for key in ("log", "file"))
+    if topics and (not isinstance(log, str) or " " not in log.strip()):
+        raise part.fault("log", f"is {value_in_words(log)}", 'give topic and field, e.g. "/sync data"')
+    part.finish()
+    return OwnFile(pattern, time, "trigger", log, file)
+
+
+def _columns(table: Table, channel: str, count: int) -> tuple[str | int, ...]:
+    """Return the columns of a channel: `count`, or for a force up to one per axis."""
+    given = table.raw("columns")
+    if given is not None and "column" in table:
+        raise table.fault("columns", "cannot be combined with 'column'", "remove one of the two")
+    listed = given if isinstance(given, list) else [table.raw("column")]
+    columns = tuple(_column(table, item, "column" if given is None else "columns") for item in listed)
+    if channel == "force" and given is not None:
+        return _distinct_axes(table, "columns", columns)
+    if len(columns) != count:
+        raise table.fault("columns", f"names {len(columns)} columns", f"give {count}: one per joint")
+    return columns
+
+
+def _field_axes(table: Table) -> tuple[tuple[str, str], ...]:
+    """Return topic and field of each axis of a force: several fields of a topic, or fields of several topics."""
+    for one, several in (("topic", "topics"), ("field", "fields")):
+        if one in table and several in table:
+            raise table.fault(several, f"cannot be combined with '{one}'", "remove one of the two")
+    topics = table.texts("topics") if "topics" in table else (table.text("topic"),)
+    fields = table.texts("fields") if "fields" in table else (table.text("field"),)
+    count = max(len(topics), len(fields))
+    if len(topics) not in (1, count) or len(fields) not in (1, count):
+        raise table.fault("topics", f"names {len(topics)} topics for {len(fields)} fields", "give one of each per axis")
+    topics, fields = (names * count if len(names) == 1 else names for names in (topics, fields))
+    for name in fields:
+        if "[:]" in name:
+            raise table.fault("fields", f"names '{name}', a whole array", "name one element per axis, e.g. data[0]")
+    return _distinct_axes(table, "fields", tuple(zip(topics, fields, strict=True)))
+
+
+_Name = TypeVar("_Name", "str | int", "tuple[str, str]")
+
+
+def _distinct_axes(table: Table, key: str, names: tuple[_Name, ...]) -> tuple[_Name, ...]:
+    if not 1 <= len(names) <= len(AXES):
+        raise table.fault(key, f"names {len(names)} axes", "give up to three: the axes of the force")
+    if len(set(names)) < len(names):
+        raise table.fault(key, "names an axis twice", "name each axis once")
+    return names
+
+
+def _direction(table: Table, count: int) -> tuple[float, ...]:
+    """Return the unit vector (axes,) of `direction`: the name of an axis, perhaps with a minus, or one number each."""
+    value = table.raw("direction")
+    known = [f"{sign}{axis}" for axis in AXES[:count] for sign in ("", "-")]
+    if count == 1:
+        raise table.fault("direction", "needs a force with several columns", "reverse one column with scale = -1")
+    if isinstance(value, str):
+        axis = table.choice("direction", known)
+        return tuple((-1.0 if axis[0] == "-" else 1.0) * (name == axis[-1]) for name in AXES[:count])
+    if not isinstance(value, list):
+        raise table.fault("direction", f"is {value_in_words(value)}", f"give {count} numbers, or one of {known}")
+    numbers = table.numbers("direction", count)
+    length = math.hypot(*numbers)
+    if length == 0.0 or not math.isfinite(length):
+        raise table.fault("direction", "has no length", "give a vector other than 0, e.g. [0, 0, -1]")
+    return tuple(number / length for number in numbers)
 
 
 def _unit_factor(

@@ -32,6 +32,24 @@ class MachineFile(StoresDerived):
     gains: Mapping[str, Mapping[str, Gain]]
     digest: str
 
+    @property
+    def force_reduction(self) -> str:
+        """Return how the axes of a force become one number, in words; empty if no force has several axes."""
+        maps = (self.columns, self.topics)
+        sources = [source for each in maps for source in (*each.sources, *each.beside)]
+        return " or ".join(dict.fromkeys(item.reduction for item in sources if item.reduction))
+
+    @property
+    def label_kinds(self) -> tuple[str, ...]:
+        """Return the kinds of contacts that a label channel distinguishes."""
+        sources = (*self.columns.sources, *self.topics.sources)
+        return tuple(dict.fromkeys(kind for item in sources for _, kind in item.kinds))
+
+    def files_beside(self, log: Path) -> tuple[Path, ...]:
+        """Return the files that belong to a log, whether they exist or not."""
+        sources = (*self.columns.beside, *self.topics.beside)
+        return tuple(dict.fromkeys(item.own_file.path_for(log) for item in sources if item.own_file))
+
     def detector(self, name: str) -> Any:
         """Return the detector of that (full or short) name with this file's gains."""
         registry = _registry("cdtool.detectors", "DETECTORS")

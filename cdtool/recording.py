@@ -25,6 +25,8 @@ TRIGGER = ("trigger",)
 # High or low, or one sample per event: without a unit.
 UNITLESS = ("label", "event", "trigger")
 CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
+# A load cell measures up to three axes, whatever the number of joints.
+_MOST_AXES = 3
 
 
 @dataclass(frozen=True)
@@ -85,11 +87,39 @@ class Series(StoresDerived):
 
 
 @dataclass(frozen=True)
+class TableRows:
+    """The rows of a table on its clock: `time` (n,) [s] of those that are kept; `kept` (m,), None if all are."""
+
+    time: FloatArray
+    kept: BoolArray | None = None
+
+    @property
+    def count(self) -> int:
+        """Return the number of rows."""
+        return len(self.time) if self.kept is None else len(self.kept)
+
+    def time_of(self, row: int) -> tuple[float, float]:
+        """Return the time of a row [s], twice; of one that was dropped, those of the next row and of the one before.
+
+        NaN for a row that does not exist, or after which none is kept.
+        """
+        if not 0 <= row < self.count:
+            return math.nan, math.nan
+        at = row if self.kept is None else int(np.count_nonzero(self.kept[:row]))
+        if at >= len(self.time):
+            return math.nan, math.nan
+        is_kept = self.kept is None or bool(self.kept[row]) or at == 0
+        return float(self.time[at]), float(self.time[at if is_kept else at - 1])
+
+
+@dataclass(frozen=True)
 class Recording(StoresDerived):
     """One log: its channels as Series, on the load side, each at its own rate.
 
     `origin` is added to every time to obtain the source's own clock [s] (0 unless that is an epoch). A missing channel
-    is missing, never zeros.
+    is missing, never zeros. `rows` are those of its table; None without a table with one clock. `beside`: the
+    name and the SHA-256 of each file beside the log with a channel; `truth_clock` [s]: how far its clock may be off.
+    `label_kinds` are the values of the label channel that are contacts, each with its kind; empty: all above 0.5 are.
     """
 
     name: str
@@ -99,13 +129,17 @@ class Recording(StoresDerived):
     origin: float = 0.0
     findings: tuple[Finding, ...] = ()
     digest: str = ""
+    rows: TableRows | None = None
+    beside: tuple[tuple[str, str], ...] = ()
+    truth_clock: float = 0.0
+    label_kinds: tuple[tuple[float, str], ...] = ()
 
     def __post_init__(self) -> None:
         for name, series in self.channels.items():
             if name not in CHANNELS:
                 raise RecordingError(f"{self.name}: unknown channel '{name}'", nearest(name, CHANNELS))
             expected = (1,) if name in (*GROUND_TRUTH, *TRIGGER) else (len(self.joints),)
-            if series.joint_count not in expected:
+            if series.joint_count not in expected and not (name == "force" and series.joint_count <= _MOST_AXES):
                 raise RecordingError(
                     f"{self.name}: channel '{name}' has {series.joint_count} columns for {len(self.joints)} joints",
                     "give one column per joint in [channels], in the order of machine.joints",

@@ -154,3 +154,35 @@ def test_gains_of_one_detector_under_both_its_names_are_refused(tmp_path):
 def test_a_unit_of_a_label_is_refused(tmp_path):
     with pytest.raises(ConfigurationError, match=r"channels\.label\.unit"):
         read(tmp_path, MACHINE + CHANNELS.replace("force =", 'label = { column = "hit", unit = "N" }\nforce ='))
+
+
+LABEL = '[channels]\ntime = { column = "t", unit = "s" }\nlabel = { column = "class", kinds = KINDS }\n'
+
+
+def test_the_values_of_a_label_have_kinds(tmp_path):
+    file = read(tmp_path, MACHINE + LABEL.replace("KINDS", '{ 1 = "hard", "2.5" = "soft", "-1" = "hard" }'))
+    assert file.columns.sources[0].kinds == ((1.0, "hard"), (2.5, "soft"), (-1.0, "hard"))
+    assert file.label_kinds == ("hard", "soft")
+
+
+@pytest.mark.parametrize(
+    ("kinds", "said"),
+    [
+        ("{}", "is empty"),
+        ("{ hard = 1 }", "kinds.hard: is not a number"),
+        ('{ nan = "hard" }', "kinds.nan: is not a number"),
+        ('{ 1 = "" }', "kinds.1: has no name"),
+        ("{ 1 = 2 }", "kinds.1: is 2"),
+        ('{ 1 = "hard", "1.0" = "soft" }', "a value twice"),
+        ('["hard"]', "kinds: is "),
+    ],
+)
+def test_wrong_kinds_of_a_label_name_their_key(tmp_path, kinds, said):
+    with pytest.raises(ConfigurationError, match=said):
+        read(tmp_path, MACHINE + LABEL.replace("KINDS", kinds))
+
+
+def test_only_a_label_has_kinds(tmp_path):
+    channels = LABEL.replace("label", "event").replace("KINDS", '{ 1 = "hard" }')
+    with pytest.raises(ConfigurationError, match=r"event\.kinds: unknown key"):
+        read(tmp_path, MACHINE + channels)

@@ -13,6 +13,7 @@ from cdtool.cli.options import (
     FromOption,
     HysteresisOption,
     JointsOption,
+    LabelsClockOption,
     LabelsOption,
     LatchOption,
     LimitOption,
@@ -68,6 +69,7 @@ class LogOptions:
     onset_sigmas: OnsetSigmasOption = None
     onset_separation: OnsetSeparationOption = None
     labels: LabelsOption = None
+    labels_clock: LabelsClockOption = None
     synchronisation: SynchronisationOption = None
     window: WindowOption = None
     mass_before_cell: MassBeforeCellOption = None
@@ -121,10 +123,12 @@ class LogOptions:
         from cdtool.evaluation.truth.onset import OnsetRule
         from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
+        if self.labels_clock and not self.labels:
+            raise UsageError("--labels-clock is only for a label file", "give --labels FILE")
         onset = {name: getattr(self, f"onset_{name}") for name in ("above", "back_to", "hold", "sigmas", "separation")}
         rules = {name: getattr(self, name) for name in ("window", "synchronisation", "mass_before_cell")}
         return ScoringRules(
             onset=OnsetRule(**{name: value for name, value in onset.items() if value is not None}),
-            labels=read_labels(self.labels) if self.labels else None,
+            labels=read_labels(self.labels, clock=self.labels_clock or "recording") if self.labels else None,
             **{name: value for name, value in rules.items() if value is not None},
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -87,6 +87,12 @@ OnsetSeparationOption = Annotated[
 ]
 LabelsOption = Annotated[
     Path | None, typer.Option("--labels", help="Label file (CSV) with the contacts; replaces the load cell.")
+]
+LabelsClockOption = Annotated[
+    Literal["recording", "source"] | None,
+    typer.Option(
+        "--labels-clock", help="Clock of the labels' seconds: the recording's, as cdtool shows it, or the source's."
+    ),
 ]
 SynchronisationOption = Annotated[
     float | None, typer.Option("--synchronisation", help="Largest offset of the load cell's clock [s]. Default: 0.")

@@ -42,6 +42,8 @@ def show_table(evaluated: Evaluated) -> None:
     names = (*(headings[name] for name in shown), "n", "missed", "n.a.", "false\nalarms", "ops")
     columns += [(name, "right") for name in names]
     table(columns, [_row(item, shown) for item in evaluated.summaries])
+    if evaluated.kinds:
+        _show_kinds(evaluated.kinds)
     provenance = evaluated.results.provenance
     # Mean and spread are those of the detected contacts.
     *most, last = (name for name in shown if name in ("median", "range", "P95"))
@@ -65,6 +67,16 @@ def show_table(evaluated: Evaluated) -> None:
     show_truth(evaluated)
     _show_bounds(evaluated)
     _show_forces(evaluated.results)
+
+
+def _show_kinds(kinds: Sequence[Summary]) -> None:
+    """Print one row per detector and kind of contact; false alarms belong to no kind."""
+    from cdtool.report.few_contacts import latency_columns
+
+    shown = latency_columns(kinds)
+    columns = [("group/kind", "left"), ("detector", "left")]
+    columns += [(name, "right") for name in (*(_HEADINGS[name] for name in shown), "n", "missed", "n.a.")]
+    table(columns, [_row(item, shown)[:-2] for item in kinds])
 
 
 def show_conclusion(evaluated: Evaluated) -> None:

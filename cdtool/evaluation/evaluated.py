@@ -9,16 +9,17 @@ from cdtool.evaluation.comparison import Comparison, compare_detectors
 from cdtool.evaluation.conclusion import conclude
 from cdtool.evaluation.limits import LimitRule, check_limits
 from cdtool.evaluation.results import Results
-from cdtool.evaluation.summary import Summary, at_worst, summarise
+from cdtool.evaluation.summary import Summary, at_worst, summarise, summarise_kinds
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """What reports show: they compute nothing themselves."""
+    """What reports show: they compute nothing themselves. `kinds` are summaries of one kind of contacts each."""
 
     results: Results
     summaries: tuple[Summary, ...]
     comparisons: tuple[Comparison, ...]
+    kinds: tuple[Summary, ...] = ()
 
 
 def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
@@ -34,7 +35,7 @@ def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     Returns
     -------
     Evaluated
-        The results with limits and conclusion, the summaries and the comparisons of detectors.
+        The results with limits and conclusion, the summaries, also by kind, and the comparisons of detectors.
 
     Raises
     ------
@@ -45,10 +46,10 @@ def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     --------
     `cdtool.benchmark` and `cdtool.score` return evaluated results.
     """
-    summaries = tuple(summarise(results))
+    summaries, kinds = tuple(summarise(results)), tuple(summarise_kinds(results))
     if limits:
         lost = any(item.onset_holes or item.force_holes for item in summaries)
-        worst = summarise(at_worst(results)) if lost else ()
-        results = replace(results, limits=check_limits(limits, summaries, worst))
+        worst = [*summarise(at_worst(results)), *summarise_kinds(at_worst(results))] if lost else ()
+        results = replace(results, limits=check_limits(limits, summaries, worst, kinds))
     results = replace(results, conclusion=conclude(results, summaries))
-    return Evaluated(results, summaries, tuple(compare_detectors(results)))
+    return Evaluated(results, summaries, tuple(compare_detectors(results)), kinds)

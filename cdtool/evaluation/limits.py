@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.results import LimitResult
-from cdtool.evaluation.summary import COUNTED_ALWAYS, FIGURES, Summary
+from cdtool.evaluation.summary import COUNTED_ALWAYS, FIGURES, Summary, kind_group
 from cdtool.tables import Table
 
 ALL = "*"
@@ -30,7 +30,9 @@ class LimitRule:
     largest: float = math.inf
 
 
-def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequence[str]) -> tuple[LimitRule, ...]:
+def read_limits(
+    table: Table, detectors: Sequence[tuple[str, str]], groups: Sequence[str], kinds: Sequence[str] = ()
+) -> tuple[LimitRule, ...]:
     """Read the rules of [limits].
 
     Parameters
@@ -41,6 +43,8 @@ def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequ
         Full and short names of the detectors.
     groups : sequence of str
         Names of the groups.
+    kinds : sequence of str
+        Names of the kinds of contacts in the groups, as GROUP/KIND; `*` does not stand for them.
 
     Returns
     -------
@@ -64,19 +68,26 @@ def read_limits(table: Table, detectors: Sequence[tuple[str, str]], groups: Sequ
         detector, group, figure = _split(table, key)
         if detector not in full:
             raise table.fault(key, f"unknown detector '{detector}'", nearest(detector, full))
-        if group != ALL and group not in groups:
-            raise table.fault(key, f"unknown group '{group}'", nearest(group, [ALL, *groups]))
+        if group != ALL and group not in (*groups, *kinds):
+            raise table.fault(key, f"unknown group '{group}'", nearest(group, [ALL, *groups, *kinds]))
         if figure not in FIGURES:
             raise table.fault(key, f"unknown metric '{figure}'", nearest(figure, FIGURES))
+        if group in kinds and group not in groups and figure in COUNTED_ALWAYS:
+            raise table.fault(key, f"{figure} of one kind of contacts", "set this limit for the whole group")
         least, largest = _bounds(table, key)
         rules.append(LimitRule(key, full[detector], group, figure, least, largest))
     return tuple(rules)
 
 
 def check_limits(
-    rules: Sequence[LimitRule], summaries: Sequence[Summary], at_worst: Sequence[Summary] = ()
+    rules: Sequence[LimitRule],
+    summaries: Sequence[Summary],
+    at_worst: Sequence[Summary] = (),
+    kinds: Sequence[Summary] = (),
 ) -> tuple[LimitResult, ...]:
     """Check every rule against the metrics that it names; raises ConfigurationError if they do not exist.
+
+    A rule is about `kinds`, summaries of one kind of contacts, only if it names one.
 
     `at_worst` are the same summaries with the worst values that missing load-cell samples allow: a limit that is
     met only without them is not assessable.
@@ -88,7 +99,10 @@ def check_limits(
     for rule in rules:
         named = [
             item for item in summaries if rule.detector in (ALL, item.detector) and rule.group in (ALL, item.group)
-        ]
+        ] or [item for item in kinds if rule.detector in (ALL, item.detector) and rule.group == item.group]
+        if not named and (unscored := _unscored_kind(rule, summaries)):
+            found += unscored
+            continue
         meant = [item for item in named if item.contacts or item.in_progress or rule.figure in COUNTED_ALWAYS]
         # A group of which no log could be scored has no figure either, but it should have had one.
         meant = meant or [item for item in named if not item.operations]
@@ -99,6 +113,22 @@ def check_limits(
             )
         found += [_check(rule, item, worst.get((item.detector, item.group))) for item in meant]
     return tuple(found)
+
+
+def _unscored_kind(rule: LimitRule, summaries: Sequence[Summary]) -> list[LimitResult]:
+    """Return the outcomes of a limit on a kind of which no contact could be scored; empty for any other limit."""
+    detectors = {
+        item.detector: None
+        for item in summaries
+        if rule.detector in (ALL, item.detector) and rule.group.startswith(kind_group(item.group, " ")[:-1])
+    }
+    least = rule.least if math.isfinite(rule.least) else None
+    largest = rule.largest if math.isfinite(rule.largest) else None
+    reason = "no contact of this kind was scored"
+    return [
+        LimitResult(rule.key, name, rule.group, rule.figure, None, least, largest, "not_assessable", reason)
+        for name in detectors
+    ]
 
 
 def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:

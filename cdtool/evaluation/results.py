@@ -43,6 +43,7 @@ def onset_words(provenance: Mapping[str, Any]) -> str:
     'load cell above 20 N for 3 ms; label file labels.csv'
     """
     rule, labels = provenance.get("onset") or "rule not stated", provenance.get("label_file")
+    rule = f"{rule}; force: {provenance['force']}" if provenance.get("force") else rule
     return f"{rule}; label file {PureWindowsPath(str(labels)).name}" if labels else str(rule)
 
 
@@ -221,7 +222,7 @@ class LimitResult:
 
     limit: str = meant("key in [limits]")
     detector: str = meant("full name of the detector")
-    group: str = meant("the benchmark's group")
+    group: str = meant("the benchmark's group; of one kind of contacts GROUP/KIND")
     figure: str = meant("name of the figure")
     value: float | None = meant("the figure; null where it is not known or not finite")
     least: float | None = meant("smallest value allowed")

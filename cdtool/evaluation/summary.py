@@ -177,6 +177,62 @@ def summarise(results: Results) -> list[Summary]:
     ]
 
 
+def kind_group(group: str, kind: str) -> str:
+    """Return the name under which statistics of one kind of contacts are shown and limited.
+
+    Parameters
+    ----------
+    group, kind : str
+        The benchmark's group, and what the label file calls the contacts; empty for those without a kind.
+
+    Returns
+    -------
+    str
+        The name.
+
+    Examples
+    --------
+    >>> kind_group("stiff", "head"), kind_group("stiff", "")
+    ('stiff/head', 'stiff/(no kind)')
+    """
+    return f"{group}/{kind or '(no kind)'}"
+
+
+def summarise_kinds(results: Results) -> list[Summary]:
+    """Return one Summary for each detector, group and kind of contact, under the name of `kind_group`.
+
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+
+    Returns
+    -------
+    list of Summary
+        Empty if no contact has a kind. Groups without kinds are left out. False alarms belong to no kind: a summary has
+        neither them nor operations.
+
+    Examples
+    --------
+    `evaluate` adds them to the results.
+    """
+    kinds: dict[str, dict[str, None]] = {}
+    for item in results.contacts:
+        kinds.setdefault(item.group, {})[item.kind or ""] = None
+    clusters = campaigns(results)
+    made = []
+    for group in results.groups:
+        known = kinds.get(group, {})
+        for kind in known if any(known) else ():
+            of_kind = [item for item in results.contacts if item.group == group and (item.kind or "") == kind]
+            numbers = {(item.recording, item.contact) for item in of_kind}
+            forces = [item for item in results.forces if (item.recording, item.contact) in numbers]
+            for detector in results.detectors:
+                contacts = [item for item in of_kind if item.detector == detector]
+                made.append(_summary(detector, kind_group(group, kind), contacts, 0, None, clusters, forces))
+    return made
+
+
 def later_ms(item: ContactResult) -> float:
     """Return how much longer the latency of a contact may be, because load-cell samples are missing where it began.
 

@@ -19,7 +19,7 @@ def _of_joint(joint: str) -> str:
 class AbsentTruth(Fact):
     """A column or topic of ground truth that is mapped and not in the log; `similar` is the nearest name in it."""
 
-    what: Literal["column", "topic"]
+    what: Literal["column", "topic", "file"]
     name: str
     similar: str = ""
 
@@ -212,3 +212,31 @@ class LinkAccelerations(TemplateFact):
     """Specific forces on the links became their angular accelerations."""
 
     words = "specific forces [m/s2] became link accelerations [rad/s2], gravity taken off"
+
+
+@frozen
+class AxesHeld(Fact):
+    """The axes of a force have clocks of their own: held on that of the `slowest`, up to `age` [s] old."""
+
+    slowest: str
+    age: float
+
+    def sentence(self) -> str:
+        """Return the clock and the age."""
+        return (
+            f"its axes have clocks of their own: each is held on the clock of {self.slowest}, "
+            f"up to {1e3 * self.age:.3g} ms old"
+        )
+
+
+@frozen
+class AbsentFile(AbsentTruth):
+    """The file of a load cell beside the log is missing (`reason` is empty) or cannot be used."""
+
+    reason: str = ""
+
+    def sentence(self) -> str:
+        """Return the file that was looked for, or why it cannot be used."""
+        if self.reason:
+            return f"its file '{self.name}' cannot be used: {self.reason}"
+        return f"has no file for this log: '{self.name}' does not exist"

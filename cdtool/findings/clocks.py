@@ -486,3 +486,48 @@ class ClocksApart(TemplateFact):
         "begins {distance:.6g} s after {before} ends: their clocks have no time in common; choose another clock in "
         "the machine file, or a time_offset"
     )
+
+
+@frozen
+class FileAligned(Fact):
+    """The clock of a channel's own file is shifted [s] to that of the log, known `within` [s]; `cut`: left out."""
+
+    file_name: str
+    shift: float
+    how: Literal["offset", "epoch", "trigger"]
+    within: float
+    cut: int
+
+    def sentence(self) -> str:
+        """Return the shift, where it is from, and how far it is known."""
+        by = {
+            "offset": "as time_offset states",
+            "epoch": "both count from 1970",
+            "trigger": f"by the trigger in both, known to {1e3 * self.within:.3g} ms",
+        }[self.how]
+        cut = f"; {counted(self.cut, 'sample')} outside the log left out" if self.cut else ""
+        return f"from {self.file_name}, its times shifted by {self.shift:.6g} s ({by}){cut}"
+
+
+@frozen
+class TriggersDiffer(TemplateFact):
+    """The trigger rises `in_log` times in the log and `in_file` times in the file of the load cell."""
+
+    in_log: int
+    in_file: int
+
+    words = "its trigger rises {in_file} times in its own file, {in_log} times in the log: aligned by the first of each"
+
+
+@frozen
+class TriggersDrift(TemplateFact):
+    """The distances of the triggers differ by `spread` [ms] over `span` [s]: a drift of `ppm`."""
+
+    spread: float
+    span: float
+    ppm: float
+
+    words = (
+        "its clock runs apart from the log's: the triggers' distances differ by {spread:.3g} ms over {span:.3g} s "
+        "({ppm:.3g} ppm); aligned in the middle"
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.frozen import frozen
-from cdtool.plain_text import digits
+from cdtool.plain_text import counted, digits
 
 
 def _rounded(value: float, significant: int) -> str:
@@ -93,3 +93,42 @@ class InProgress(TemplateFact):
     end: float
 
     words = "a contact is in progress when it begins, until {end:.3f} s: its onset is not recorded"
+
+
+@frozen
+class ForceMagnitudeUsed(Fact):
+    """A force vector is reduced to its magnitude; `rest` [N] is the level of each axis when the log begins."""
+
+    rest: tuple[float, ...]
+
+    def sentence(self) -> str:
+        """Return the rest level of each axis."""
+        levels = ", ".join(_rounded(level, 3) for level in self.rest)
+        return (
+            f"magnitude of {len(self.rest)} axes, the rest level of each removed (at first {levels} N): "
+            "it cannot tell pushing from pulling; direction in [channels] selects a component"
+        )
+
+
+@frozen
+class LabelsWithoutZone(TemplateFact):
+    """The dates of a label file have no zone."""
+
+    words = (
+        "the dates have no zone: read as UTC, like dates without a zone in a log. If the logs state a zone, set "
+        "labels_zone, e.g. '+02:00'"
+    )
+
+
+@frozen
+class KindsExcluded(Fact):
+    """Labels that are no contacts, because of their `kinds`."""
+
+    count: int
+    kinds: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """Return how many, and what follows."""
+        kinds = ", ".join(self.kinds)
+        verb = "is not a contact" if self.count == 1 else "are not contacts"
+        return f"{counted(self.count, 'label')} of kind {kinds} {verb}: an alarm there is a false alarm"

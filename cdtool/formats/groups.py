@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from cdtool.channels import AXES
 from cdtool.columns import Column
 from cdtool.errors import UsageError
 from cdtool.recording import FloatArray
@@ -41,13 +42,17 @@ class Group:
         """Return whether the times need a column of their own."""
         return self.timed and not self.is_table
 
+    def _parts(self, column: Column) -> tuple[str, ...]:
+        """Return the names of a column's values: its joints, or the axes of a force."""
+        return AXES[: column.values.shape[1]] if column.name == "force" else self.joints
+
     @property
     def flat(self) -> list[list[Column]]:
-        """Return each column as columns of (n,) values: `torque shoulder`, `torque elbow`."""
+        """Return each column as columns of (n,) values: `torque shoulder`, `force x`."""
         return [
             [column]
             if column.values.ndim == 1
-            else [Column(f"{column.name} {joint}", np.empty(0), None, column.unit) for joint in self.joints]
+            else [Column(f"{column.name} {part}", np.empty(0), None, column.unit) for part in self._parts(column)]
             for column in self.columns
         ]
 

@@ -28,7 +28,7 @@ from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.plausible import IMPOSSIBLE
-from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series
+from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 # A file of at most this many bytes is read at once for its digest.
@@ -77,6 +77,8 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine) -
             ),
         ),
         digest=file_digest(source.path),
+        rows=work.rows,
+        label_kinds=next((item.kinds for item in channels.sources if item.channel == "label"), ()),
     )
 
 
@@ -114,6 +116,13 @@ class _Assembly:
             self.table = self._table_clock()
             self.findings += unit_findings(source, channels)
 
+    @property
+    def rows(self) -> TableRows | None:
+        """Return the rows of the table on its clock; None for channels with clocks of their own."""
+        if self.table is None or self.clock is None:
+            return None
+        return TableRows(self.clock.time, None if self.table.keep.all() else self.table.keep)
+
     def drop_columns(self, item: ChannelSource, later: Sequence[ChannelSource]) -> None:
         """Remove the columns of a channel that no later channel needs."""
         needed = {key for other in later for key in other.keys}
@@ -139,9 +148,9 @@ class _Assembly:
         scaled, masked = convert_to_si(item, self._select(item, values, clean.keep))
         self.findings += masked_findings(masked, item, self.channels.joints)
         self.findings += [replace(finding, channel=item.channel) for finding in gaps]
-        series = clock.with_values(scaled, item.unit)
         absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
         self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
+        series = clock.with_values(component_along(item.direction, scaled) if item.direction else scaled, item.unit)
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
 
     def _topic_clock(self, stamps: FloatArray, item: ChannelSource) -> _TopicClock:
@@ -221,20 +230,34 @@ def check_width(path: Path, item: ChannelSource, width: int) -> None:
     if width != len(item.factor):
         raise RecordingError(
             f"{path}: channel '{item.channel}' ({item.described}) has {width} values "
-            f"per sample for {len(item.factor)} joints",
-            "name one element per joint, in the order of machine.joints",
+            f"per sample for {len(item.factor)} {'axes' if item.axes else 'joints'}",
+            "name one element per axis" if item.axes else "name one element per joint, in the order of machine.joints",
             channel=item.channel,
         )
 
 
 def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) -> list[Finding]:
-    """Return the findings on masked values by joint; `masked` (3, J) are the counts of convert_to_si."""
+    """Return the findings on masked values by joint, or by axis of a force; `masked` (3, J): as of convert_to_si."""
+    if item.axes:
+        return [
+            Finding(kind(count, ""), f"{item.channel} {item.axes[j]}", severity)
+            for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
+            for j, count in enumerate(counts)
+            if count
+        ]
     return [
         Finding(kind(count, joint_name(joints, j, len(counts))), item.channel, severity)
         for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
         for j, count in enumerate(counts)
         if count
     ]
+
+
+def component_along(direction: Sequence[float], values: FloatArray) -> FloatArray:
+    """Return the component (n, 1) of vectors (n, axes) along a unit vector; NaN where an axis that it needs is NaN."""
+    used = np.flatnonzero(direction)
+    along: FloatArray = values[:, used] @ np.array(direction)[used]
+    return along[:, np.newaxis]
 
 
 def joint_name(joints: Sequence[str], joint: int, count: int) -> str:

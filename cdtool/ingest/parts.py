@@ -177,7 +177,8 @@ def join_recordings(parts: Sequence[Recording], name: str) -> Recording:
     findings += tuple(part_gap_findings(spans))
     source = ", ".join(part.source for part in parts)
     digest = join_digests([part.digest for part in parts])
-    return Recording(name, source, first.joints, joined, first.origin, findings, digest)
+    kinds = next((part.label_kinds for part in parts if part.label_kinds), ())
+    return Recording(name, source, first.joints, joined, first.origin, findings, digest, label_kinds=kinds)
 
 
 def with_file_name(path: Path, findings: Sequence[Finding]) -> Iterator[Finding]:

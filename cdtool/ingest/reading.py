@@ -21,6 +21,8 @@ from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source, in_words
 from cdtool.ingest.channel_assembly import assemble_recording
+from cdtool.ingest.file_beside import add_files_beside
+from cdtool.ingest.force_axes import fields_by_axis, join_axes, join_fields
 from cdtool.ingest.header_units import unit_findings
 from cdtool.ingest.parts import (
     Span,
@@ -34,7 +36,7 @@ from cdtool.ingest.parts import (
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import Recording
+from cdtool.recording import Recording, Series
 
 # Opens a file of a format, for some or all of its columns.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
@@ -165,6 +167,27 @@ def read_as_logged(
 
     `unread` is the severity of a part that cannot be read: with "error" it raises, with "loss" it is a finding.
     """
+    logged = _read_log_itself(path, machine_file, unread)
+    if not (machine_file.columns.beside or machine_file.topics.beside):
+        return logged
+    by_topics = has_topics(choose_format(log_parts(path)[0]))
+    channels = machine_file.topics if by_topics else machine_file.columns
+
+    def read_trigger(name: str | int) -> Series:
+        source = ChannelSource("trigger", columns=(name,))
+        if by_topics:
+            topic, _, field = str(name).rpartition(" ")
+            source = ChannelSource("trigger", topic=topic, field=field)
+        only = replace(channels, sources=(source,), beside=())
+        return _read_log_itself(path, replace(machine_file, columns=only, topics=only), unread).recording["trigger"]
+
+    recording = logged.recording
+    recording = add_files_beside(recording, path, channels, machine_file.machine, _resolved_source, read_trigger)
+    return replace(logged, recording=recording)
+
+
+def _read_log_itself(path: Path, machine_file: MachineFile, unread: Literal["error", "loss"]) -> LoggedRecording:
+    """Return one log without the channels in files beside it."""
     if not path.is_dir():
         return read_parts([path], machine_file, path.stem)
     if unread == "loss":
@@ -235,10 +258,17 @@ def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, Channe
 
     A mapped load cell or label that is not in the file is left out of the map, with a note.
     """
+    return _resolved_source(path, _map_for(choose_format(path), machine_file, path))
+
+
+def _resolved_source(path: Path, channels: ChannelMap) -> tuple[Source, ChannelMap]:
+    """Return the columns of one file that a map names, and the map for them; raises RecordingError."""
     file_format = choose_format(path)
-    channels = _map_for(file_format, machine_file, path)
-    source, resolved = resolve_columns(file_format.columns(path, channels), channels)
-    return with_own_clocks(source, resolved)
+    if has_topics(file_format) and not channels.topics:
+        raise RecordingError(f"{path}: contains topics, but columns are mapped", "give a file of columns")
+    asked = fields_by_axis(channels)
+    source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+    return with_own_clocks(*join_fields(source, resolved, channels))
 
 
 def has_topics(file_format: Format) -> bool:
@@ -341,17 +371,22 @@ def with_own_clocks(source: Source, channels: ChannelMap) -> tuple[Source, Chann
             f"{source.path}: its own clock is in s, but [channels] time states another unit",
             'time = { column = "time", unit = "s" }',
         )
-    joined = {item.channel: _joined(source, item) for item in channels.sources}
+    joined, notes = dict[str, Column](), list[Finding]()
+    for item in channels.sources:
+        joined[item.channel], of_axes = _joined(source, item)
+        notes += of_axes
     sources = tuple(replace(item, columns=(item.channel,), keys=(item.channel,)) for item in channels.sources)
     names = tuple(joined)
     # The units are compared here, as joined columns have no unit.
-    findings = (*source.findings, *unit_findings(source, channels))
+    findings = (*source.findings, *unit_findings(source, channels), *notes)
     source = replace(source, columns=joined, names=names, findings=findings)
     return source, replace(channels, sources=sources, topics=True)
 
 
-def _joined(source: Source, item: ChannelSource) -> Column:
+def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]:
     parts = [source.columns[key] for key in item.keys]
+    if item.axes and all(part.time is not None for part in parts):
+        return join_axes(source.path, item, parts)
     time = parts[0].time
     for part in parts:
         if part.time is None or time is None:
@@ -366,4 +401,4 @@ def _joined(source: Source, item: ChannelSource) -> Column:
                 "all joints of a channel must have the same clock",
                 channel=item.channel,
             )
-    return Column(item.channel, np.column_stack([part.values for part in parts]), time)
+    return Column(item.channel, np.column_stack([part.values for part in parts]), time), []

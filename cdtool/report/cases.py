@@ -15,7 +15,8 @@ from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed,
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
 from cdtool.evaluation.results import DAMAGED, ContactResult, LimitResult, RecordingFinding
-from cdtool.evaluation.summary import later_ms
+from cdtool.evaluation.summary import Summary, later_ms
+from cdtool.plain_text import counted
 from cdtool.report.number_text import number, spoken
 from cdtool.report.tables.results import required, value_of
 
@@ -39,7 +40,7 @@ class Suite:
 
 
 def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
-    """Yield limits, force profiles, what was left out or is damaged, then the recordings of each detector and group."""
+    """Yield limits, force profiles, what was left out or damaged, recordings by detector and group, and kinds."""
     results = evaluated.results
     if results.limits:
         yield Suite("limits", tuple(_limit(item) for item in results.limits))
@@ -56,6 +57,8 @@ def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
     for pair, items in groupby(outcomes, key=lambda item: (item.detector, item.group)):
         cases = (_recording(item, pair in silent, pair in forbidden) for item in items)
         yield Suite(".".join(pair), tuple(cases))
+    if evaluated.kinds:
+        yield Suite("kinds", tuple(_kind(item) for item in evaluated.kinds))
     if not outcomes:
         yield Suite("benchmark", (Case("scored", "error", "nothing was scored"),))
 
@@ -98,8 +101,17 @@ def _recording(item: RecordingOutcome, silent: bool, forbidden: bool) -> Case:
     return Case(item.recording, lines=tuple(lines) or ("no contact and no alarm",))
 
 
+def _kind(item: Summary) -> Case:
+    """Return the figures of one kind of contact; limits on it are cases of their own."""
+    words = f"{item.detected} of {counted(item.contacts, 'contact')} detected, {item.missed} missed"
+    words += f", {item.not_assessable} not assessable" if item.not_assessable else ""
+    latency = f"; median latency {number(item.median_ms)} ms" if item.assessable else ""
+    return Case(f"{item.detector}.{item.group}", lines=(words + latency,))
+
+
 def _contact(item: ContactResult) -> str:
-    words = f"contact {item.contact} at {item.onset_s:.3f} s: {spoken(item.outcome)}"
+    kind = f" ({item.kind})" if item.kind else ""
+    words = f"contact {item.contact}{kind} at {item.onset_s:.3f} s: {spoken(item.outcome)}"
     if item.latency_ms is not None:
         words += f" after {number(item.latency_ms)} ms"
         words += " (before the onset, within its uncertainty)" if item.clipped else ""

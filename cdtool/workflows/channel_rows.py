@@ -53,13 +53,14 @@ class ChannelRows:
 def channel_rows(log: Path, machine_file: MachineFile) -> ChannelRows | ChannelPieces:
     """Return the channels of a log or of its folder of parts: in pieces if the format supports it, else in memory.
 
-    Two cases are also read into memory: a coarse clock, which is fitted as one straight line, and the torque of a duty
-    cycle, which needs the speed. Raises RecordingError or ConfigurationError.
+    Four cases are also read into memory: a coarse clock, which is fitted as one straight line, the torque of a duty
+    cycle, which needs the speed, a force of several fields, and one in a file beside the log. Raises RecordingError or
+    ConfigurationError.
     """
     folder = LogFolder.of(log) if log.is_dir() else None
     files = (log,) if folder is None else folder.filled
     mapped = machine_file.topics.sources
-    plain = bool(mapped) and not any(item.duty for item in mapped)
+    plain = bool(mapped) and not (machine_file.topics.beside or any(item.duty or item.fields for item in mapped))
     logs = _mapped_logs(files, machine_file.topics) if plain else {}
     if logs:
         pieces = ChannelPieces(logs, machine_file, folder)

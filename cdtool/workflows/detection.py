@@ -150,10 +150,10 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
     if raised_by != stored_one and signature is not None:
         described += ", with an activation different from the file's"
-    whole = read_named(Path(log), machine_file, ranges=ranges)
+    rules = options.rules or ScoringRules()
+    whole = read_named(Path(log), machine_file, ranges=ranges, onset=rules.onset)
     recording = options.section.of(whole)
     parts = operations_of(recording, options.operations)
-    rules = options.rules or ScoringRules()
     hold = max(HOLD, rules.window)
     detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
     contacts = any_contacts(whole, rules)
@@ -171,7 +171,7 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
         rules.window,
         matched.contacts,
         matched.not_scored,
-        (*matched.findings, *notes),
+        (*matched.findings, *rules.findings, *notes),
         normals,
         rules.onset.described,
     )
@@ -203,7 +203,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         benchmark.window(log),
         tuple(rows for _, rows in judged),
         matched.not_scored,
-        (*matched.findings, *benchmark.notes),
+        (*matched.findings, *benchmark.setup.rules_of("").findings, *benchmark.notes),
         benchmark.normals,
         benchmark.setup.onset.described,
     )

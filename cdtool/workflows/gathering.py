@@ -73,6 +73,7 @@ class Gathering:
         self.outcomes: list[LogOutcome] = []
         self.skipped: list[Skipped] = []
         self.findings = [RecordingFinding.of(str(setup.path), Finding(Remark(words))) for words in setup.migrated]
+        self.findings += setup.rules_of("").findings
         # By detector: the unit of the value compared with the limits, which may differ from that of the signal.
         self.units: dict[str, str] = {}
         self._exposure: dict[tuple[str, str], Exposure] = {}
@@ -150,9 +151,15 @@ class Gathering:
         if self._choice.left_out:
             left_out = Finding(PlotsLeftOut(self._choice.left_out))
             self.findings.append(RecordingFinding.of(str(self.setup.path), left_out))
+        beside = {
+            f"{item.recording.recording}, {name}": digest
+            for item in self.outcomes
+            if item.recording
+            for name, digest in item.beside
+        }
         profiles = {name: group.force for name, group in self.setup.impacts.items()}
         return Results(
-            provenance=provenance,
+            provenance={**provenance, "load_cell_sha256": beside} if beside else provenance,
             detectors=self.names,
             groups=self.setup.groups,
             recordings=tuple(item.recording for item in self.outcomes if item.recording),

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.channels import AXES
 from cdtool.clock.stamps import COARSE_SHARE, missing_findings
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
+from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.findings import Fact, Finding, worst_first
 from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
 from cdtool.findings.truth import InProgress
@@ -145,6 +147,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
         for j in range(series.joint_count)
     ]
     rules = ScoringRules()
+    recording = with_scalar_force(recording, rules.onset)
     contacts = any_contacts(recording, rules)
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
@@ -154,7 +157,8 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
 
 def _label(name: str, recording: Recording, joint: int) -> str:
     many = recording[name].joint_count > 1
-    return f"{name} [{recording.joints[joint]}]" if many else name
+    columns = AXES if name == "force" else recording.joints
+    return f"{name} [{columns[joint]}]" if many else name
 
 
 def _channel(name: str, series: Series, joint: int) -> ChannelInfo:

@@ -6,26 +6,36 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cdtool.errors import ConfigurationError, UsageError
-from cdtool.evaluation.truth.labels import Labels, read_labels
+from cdtool.evaluation.truth.labels import CLOCKS, Labels, read_labels
 from cdtool.evaluation.truth.named_rows import by_recording
 from cdtool.log_section import MARK_HINT, LogSection, Mark
+from cdtool.machine_file import MachineFile
 from cdtool.tables import Table
 from cdtool.value_words import value_in_words
 from cdtool.workflows.runs import find_logs, shown_path
 
 
-def logs_of(table: Table, base: Path) -> tuple[Path, ...]:
-    """Return the files that `logs` names below `base`; raises ConfigurationError for no match and for unknown keys."""
-    logs = tuple(find_logs(table.texts("logs"), base, table.key("logs")))
+def logs_of(table: Table, base: Path, machine_file: MachineFile) -> tuple[Path, ...]:
+    """Return the files that `logs` names below `base`; raises ConfigurationError for no match and for unknown keys.
+
+    A file that belongs to another one of them, as that of its load cell, is not a log.
+    """
+    logs = find_logs(table.texts("logs"), base, table.key("logs"))
     table.finish()
-    return logs
+    return _without_files_beside(logs, machine_file)
 
 
-def sectioned_logs(table: Table, base: Path) -> dict[Path, LogSection]:
+def _without_files_beside(logs: Sequence[Path], machine_file: MachineFile) -> tuple[Path, ...]:
+    beside = {path.resolve(): log for log in logs for path in machine_file.files_beside(log)}
+    return tuple(log for log in logs if not beside or beside.get(log.resolve(), log) == log)
+
+
+def sectioned_logs(table: Table, base: Path, machine_file: MachineFile) -> dict[Path, LogSection]:
     """Return the files that `logs` names below `base`, with the part of each that is used.
 
     `from` and `to` of the table are for all of them; an entry `{ path = "...", from = "...", to = "..." }` has its own.
-    Raises ConfigurationError for no match, for unknown keys, and for a log with two different parts.
+    A file that belongs to another one of them, as that of its load cell, is not a log. Raises ConfigurationError for no
+    match, for unknown keys, and for a log with two different parts.
     """
     common = _section(table)
     entries = table.raw("logs")
@@ -41,7 +51,8 @@ def sectioned_logs(table: Table, base: Path) -> dict[Path, LogSection]:
             if found.setdefault(path, section) != section:
                 raise table.fault("logs", f"names {path} with two different parts", "name each log once")
     table.finish()
-    return found
+    logs = _without_files_beside(list(found), machine_file)
+    return {path: found[path] for path in logs}
 
 
 def _section(table: Table) -> LogSection:
@@ -63,7 +74,7 @@ def _mark(table: Table, name: str) -> Mark | None:
         raise table.fault(name, fault.message, fault.hint) from fault
 
 
-def named_logs(table: Table, base: Path, scored: Sequence[Path]) -> dict[Path, str]:
+def named_logs(table: Table, base: Path, scored: Sequence[Path], machine_file: MachineFile) -> dict[Path, str]:
     """Return the campaign or test point of each of the `scored` logs, independent of how its path is written.
 
     Raises ConfigurationError for a log that is not scored, or that belongs to two of them.
@@ -73,7 +84,7 @@ def named_logs(table: Table, base: Path, scored: Sequence[Path]) -> dict[Path, s
     for name in table.values:
         if not name.strip():
             raise table.fault(name, "has no name", "give it a name")
-        for log in logs_of(table.table(name), base):
+        for log in logs_of(table.table(name), base, machine_file):
             path = known.get(log.resolve())
             if path is None:
                 raise table.fault(name, f"names {log}, which is not in a group of [impacts]", "name only scored logs")
@@ -88,10 +99,15 @@ def labels_of(onset: Table, base: Path, scored: Sequence[Path]) -> Labels | None
 
     Raises ConfigurationError for a row that matches no log, or for a file name that matches several.
     """
+    settings = {"clock": onset.choice("labels_clock", CLOCKS, "recording"), "zone": onset.text("labels_zone", "")}
+    not_contacts = onset.texts("not_contacts", ())
     if "labels" not in onset:
+        for key in ("labels_clock", "labels_zone", "not_contacts"):
+            if key in onset:
+                raise onset.fault(key, "is only for a label file", "name one: labels")
         return None
     path = base / onset.text("labels")
-    labels = read_labels(path)
+    labels = read_labels(path, not_contacts=not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
     recordings = [shown_path(log, base) for log in scored]
     for name, recording in by_recording(path, labels.contacts, set(recordings)).items():
         if recording is None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
 from cdtool.findings.channels import AbsentTruth
@@ -60,7 +61,8 @@ def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: Plausib
     Returns
     -------
     Recording
-        Every mapped channel on the load side in SI units, at its own times; a missing sample is NaN.
+        Every mapped channel on the load side in SI units, at its own times; a missing sample is NaN. A force with
+        several columns has one column per axis.
 
     Raises
     ------
@@ -84,17 +86,29 @@ def load_operations(
     how: str,
     base: Path | None = None,
     ranges: PlausibleRanges | None = None,
+    onset: OnsetRule | None = None,
 ) -> tuple[Recording, list[Operation]]:
-    """Return one log's recording, named by its path below `base`, and its operations; CdtoolError names the file."""
-    recording = read_named(path, machine_file, base, ranges)
+    """Return one log's recording, named by its path below `base`, and its operations; CdtoolError names the file.
+
+    A force with several axes is a magnitude, their rest levels removed by the `onset` rule.
+    """
+    recording = read_named(path, machine_file, base, ranges, onset)
     return recording, operations_of(recording, how)
 
 
 def read_named(
-    path: Path, machine_file: MachineFile, base: Path | None = None, ranges: PlausibleRanges | None = None
+    path: Path,
+    machine_file: MachineFile,
+    base: Path | None = None,
+    ranges: PlausibleRanges | None = None,
+    onset: OnsetRule | None = None,
 ) -> Recording:
-    """Return one log's recording, named by its path below `base`; CdtoolError names the file."""
-    return replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
+    """Return one log's recording, named by its path below `base`; CdtoolError names the file.
+
+    A force with several axes is a magnitude, their rest levels removed by the `onset` rule.
+    """
+    recording = replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
+    return with_scalar_force(recording, onset or OnsetRule())
 
 
 @dataclass(frozen=True)
@@ -164,7 +178,7 @@ def load_runs(
             if isinstance(item, CdtoolError):
                 raise item
             recording = item.on_load_side(machine_file.machine, known, to_learn=True)
-            recording = replace(recording, name=shown_path(path, base))
+            recording = with_scalar_force(replace(recording, name=shown_path(path, base)), rule)
             contacts: Sequence[Contact] | None = None
             if reading.part:
                 recording, contacts = reading.part(path, recording)

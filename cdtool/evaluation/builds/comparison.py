@@ -38,7 +38,9 @@ from cdtool.plain_text import counted, shorten
 _RULES = {
     "onset": "[onset]",
     "separation_s": "[onset] separation_s",
+    "force": "machine file's [channels] force",
     "label_file": "[onset] labels",
+    "not_contacts": "[onset] not_contacts",
     "synchronisation_s": "[onset] synchronisation_s",
     "window_s": "window_s",
     "operations": "operations",

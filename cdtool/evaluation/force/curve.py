@@ -12,13 +12,16 @@ from functools import cached_property
 import numpy as np
 
 from cdtool.errors import RecordingError, UsageError
+from cdtool.evaluation.truth.force_vector import ForceMagnitude
 from cdtool.evaluation.truth.missing_samples import PERIODS, CellClock, cell_samples, longest_step
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
-from cdtool.recording import BoolArray, Contact, FloatArray, Recording
+from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
+# An axis takes part in a contact from this share of the magnitude's peak on.
+_TAKES_PART = 0.3
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
 # recording's top speed the axis is at rest.
 _BEFORE = 0.1
@@ -170,12 +173,12 @@ def force_time_curve(
             f"{recording.name}: no load-cell sample after the onset at {contact.start:.3f} s",
             "check the force limits of contacts on the load cell",
         )
-    rest = contact.rest if np.isfinite(contact.rest) else rest_before(whole, samples.force, contact.start)
+    rest = contact.rest if np.isfinite(contact.rest) else _rest(recording, contact)
     time, over = whole[first:last], samples.force[first:last] - rest
     pressing = (time <= contact.end) | (contact.end <= contact.start)
     largest = int(np.argmax(np.where(pressing, np.abs(over), -1.0)))
     force = over if over[largest] >= 0.0 else -over
-    clipped = _clipped(force)
+    clipped = _clipped(force) | _clipped_axis(recording["force"], first, last)
     if mass_before_cell > 0.0:
         force = force + mass_before_cell * _acceleration_with_contact(recording, contact.start, time)
     known = np.isfinite(force)
@@ -192,6 +195,14 @@ def force_time_curve(
         hole=contact.hole,
         uncertainty=contact.uncertainty if contact.hole else 0.0,
     )
+
+
+def _rest(recording: Recording, contact: Contact) -> float:
+    """Return the reading at rest before a contact that the load cell did not show; 0 of a magnitude."""
+    if isinstance(recording["force"], ForceMagnitude):
+        return 0.0
+    samples = cell_samples(recording["force"])
+    return rest_before(samples.time, samples.force, contact.start)
 
 
 def force_at(curve: ForceTimeCurve, time: float) -> float:
@@ -241,6 +252,24 @@ def _clipped(force: FloatArray) -> BoolArray:
     if lengths[highest].max() < _STUCK * usual:
         return np.zeros(len(force), dtype=bool)
     return np.repeat(highest, lengths)
+
+
+def _clipped_axis(series: Series, first: int, last: int) -> BoolArray | bool:
+    """Return the samples from `first` to `last` at which an axis of a magnitude is at its stop.
+
+    Only of an axis that takes part in the contact: one at rest may repeat its reading.
+    """
+    if not isinstance(series, ForceMagnitude):
+        return False
+    present = np.isfinite(series.values[:, 0])
+    axes, readings = series.axes[present][first:last], series.readings[present][first:last]
+    peak = float(np.max(series.values[present][first:last]))
+    clipped = np.zeros(len(axes), dtype=bool)
+    for over, reading in zip(axes.T, readings.T, strict=True):
+        largest = float(over[np.argmax(np.abs(over))])
+        if abs(largest) >= _TAKES_PART * peak:
+            clipped |= _clipped(np.copysign(1.0, largest) * reading)
+    return clipped
 
 
 def _acceleration_with_contact(recording: Recording, onset: float, clock: FloatArray) -> FloatArray:

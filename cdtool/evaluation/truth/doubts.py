@@ -7,10 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdtool.evaluation.statistics.correlation import correlation
+from cdtool.evaluation.truth.force_vector import rest_of_axes
 from cdtool.evaluation.truth.missing_samples import cell_samples, longest_step
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.findings import Finding
-from cdtool.findings.truth import FollowsTorque, ForceBeginsLate, ForceLeft, NotTared, RestLevelShifted
+from cdtool.findings.truth import (
+    FollowsTorque,
+    ForceBeginsLate,
+    ForceLeft,
+    ForceMagnitudeUsed,
+    NotTared,
+    RestLevelShifted,
+)
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 # Above this magnitude of the correlation the force follows the torque.
@@ -58,6 +66,8 @@ def truth_findings(recording: Recording, contacts: Sequence[Contact], rule: Onse
     found += [item for item in [_not_tared(contacts, rule)] if item]
     found += [item for item in [_not_back(recording["force"], contacts, rule)] if item]
     found += [item for item in [_begins_late(recording, contacts, rule)] if item]
+    if levels := rest_of_axes(recording["force"]):
+        found.append(Finding(ForceMagnitudeUsed(tuple(levels)), "force", "note"))
     joint, r = follows_torque(recording, contacts)
     if abs(r) > _FOLLOWS:
         found.append(Finding(FollowsTorque(joint if len(recording.joints) > 1 else "", r), "force"))

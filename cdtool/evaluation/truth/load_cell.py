@@ -20,17 +20,17 @@ from cdtool.evaluation.truth.rest_level_kernels import INTERVAL, IntArray
 from cdtool.recording import Contact, FloatArray, Series
 
 # Standard deviation of the error of rounding to steps of 1: uniform between -1/2 and 1/2.
-_ROUNDING = 12.0**-0.5
+ROUNDING = 12.0**-0.5
 # Readings closer than this share of the largest one differ by what arithmetic rounds, not by a step of the cell.
 _SAME = 1e-6
 # A step above this [N] must be proved by so many readings, none off its grid by more than this share of a step. Eight
 # deviations of its rounding are 46 N: a coarser load cell is no truth for contacts that limits of 65 N and more allow.
 _COARSEST, _GRID, _OFF_GRID = 20.0, 4, 0.01
 # The rest level is estimated again from the samples up to this long before the onset [s].
-_BEFORE_ONSET = 0.05
+BEFORE_ONSET = 0.05
 # A burst of noise: within this time [s] before and after, the force crosses both levels so often, goes to the other
 # side by this share, and holds on one side in no more than this share of its excursions.
-_BURST, _CROSSINGS, _AS_FAR, _HELD = 0.03, 4, 0.4, 0.5
+BURST, _CROSSINGS, _AS_FAR, _HELD = 0.03, 4, 0.4, 0.5
 # What was felt at the start was a contact if it was at least this share of the largest force until its release.
 _SHARE_OF_PEAK = 0.1
 # Released is what settles at this share of the first level, or less.
@@ -67,7 +67,7 @@ def load_cell_contacts(series: Series, rule: OnsetRule, steps: float = 0.0) -> l
     samples = cell_samples(series)
     if len(samples.time) < 3:
         return []
-    return _Search(samples, rule, steps, float(series.time[0])).contacts()
+    return ContactSearch(samples, rule, steps, float(series.time[0])).contacts()
 
 
 def _joined(contact: Contact, rebound: Contact) -> Contact:
@@ -85,14 +85,19 @@ class _Rise:
     rest: RestLine
 
 
-class _Search:
-    """One load cell's readings (n,) and what has been found in them so far."""
+class ContactSearch:
+    """One load cell's readings (n,) and what has been found in them so far.
 
-    def __init__(self, samples: CellSamples, rule: OnsetRule, steps: float, since: float) -> None:
+    `rest` is their rest level, by default a running one.
+    """
+
+    def __init__(
+        self, samples: CellSamples, rule: OnsetRule, steps: float, since: float, rest: RunningRest | None = None
+    ) -> None:
         self.time, self.force, self.clock = samples.time, samples.force, samples.clock
         self.rule, self.since = rule, since
         self.period = samples.clock.period
-        self.rest = RunningRest(samples.time, samples.force)
+        self.rest = RunningRest(samples.time, samples.force) if rest is None else rest
         # Levels that are given by hand do not depend on the noise.
         by_noise = (self.noise, steps * self.step) if rule.above is None else (0.0, 0.0)
         self.above, self.back_to = rule.levels(*by_noise)
@@ -105,7 +110,7 @@ class _Search:
     @cached_property
     def noise(self) -> float:
         """Return the standard deviation of a reading at rest [N]."""
-        return max(self.rest.noise, _ROUNDING * self.step)
+        return max(self.rest.noise, ROUNDING * self.step)
 
     def contacts(self) -> list[Contact]:
         """Every contact; one that is in progress at the start comes first."""
@@ -125,7 +130,7 @@ class _Search:
                     found[-1] = _joined(found[-1], contact)
                 else:
                     found.append(contact)
-                self.rest.exclude(contact.start - _BEFORE_ONSET, contact.end + INTERVAL)
+                self.rest.exclude(contact.start - BEFORE_ONSET, contact.end + INTERVAL)
                 begin = last + 1
         return found
 
@@ -161,8 +166,8 @@ class _Search:
 
     def _end_of_burst(self, begin: int, first: int, over: FloatArray) -> int | None:
         """Return the sample after a burst of noise around `first`, which goes to both sides; None without a burst."""
-        since = max(begin, int(np.searchsorted(self.time, self.time[first] - _BURST)))
-        until = int(np.searchsorted(self.time, self.time[first] + _BURST, side="right"))
+        since = max(begin, int(np.searchsorted(self.time, self.time[first] - BURST)))
+        until = int(np.searchsorted(self.time, self.time[first] + BURST, side="right"))
         part = over[since - begin : until - begin]
         large = np.flatnonzero(np.abs(part) > self.above)
         sides = np.sort([float(np.max(part)), -float(np.min(part))])
@@ -180,7 +185,7 @@ class _Search:
         line = self.rest.line(float(self.time[high]))
         onset = self._followed_back(begin, high, sign, line)
         for _ in range(3):
-            line = self.rest.line(float(self.time[onset]), _BEFORE_ONSET)
+            line = self.rest.line(float(self.time[onset]), BEFORE_ONSET)
             before, onset = onset, self._followed_back(begin, high, sign, line)
             if onset == before:
                 break

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cdtool.errors import RecordingError
 from cdtool.recording import FloatArray, Series
 
 CLOSE_ENOUGH = 5e-3
@@ -94,6 +95,11 @@ def cell_samples(force: Series) -> CellSamples:
     CellSamples
         The samples with their clock.
 
+    Raises
+    ------
+    RecordingError
+        The force is a vector: `with_scalar_force` reduces it.
+
     Examples
     --------
     >>> samples = cell_samples(Series(np.arange(4) * 1e-3, np.array([0.0, np.nan, 2.0, 3.0]), "N"))
@@ -104,6 +110,8 @@ def cell_samples(force: Series) -> CellSamples:
 
 
 def _existing(force: Series) -> CellSamples:
+    if force.joint_count > 1:
+        raise RecordingError(f"the force has {force.joint_count} axes", "reduce it to one, with with_scalar_force")
     reading = np.ascontiguousarray(force.values[:, 0])
     present = np.isfinite(reading)
     if present.all():

@@ -1,15 +1,18 @@
 """Ground truth: the contacts of a recording, by the load cell, by labels or by events.
 
 Conventions: a contact begins where the force, followed back from the first sample of a stay above the upper level, left
-the lower level over the cell's rest level. State the rule in every report: in soft impacts the cell responds to the
-contact tens of milliseconds after touch.
+the lower level over the cell's rest level; of a force with several axes, its magnitude over their rest levels. State
+the rule in every report: in soft impacts the cell responds to the contact tens of milliseconds after touch.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cdtool.errors import RecordingError
+from cdtool.evaluation.truth.force_vector import ForceMagnitude, force_magnitude, magnitude_contacts
 from cdtool.evaluation.truth.load_cell import load_cell_contacts
 from cdtool.evaluation.truth.onset_rule import OnsetRule as OnsetRule
 from cdtool.recording import Contact, Recording
@@ -49,7 +52,13 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
     (1, 1.0, 100.0)
     """
     if "force" in recording:
-        return load_cell_contacts(recording["force"], rule, steps)
+        force = recording["force"] if recording["force"].joint_count == 1 else force_magnitude(recording["force"], rule)
+        found = (
+            magnitude_contacts(force, rule, steps)
+            if isinstance(force, ForceMagnitude)
+            else load_cell_contacts(force, rule, steps)
+        )
+        return [_widened(contact, recording.truth_clock) for contact in found] if recording.truth_clock else found
     if "label" in recording:
         return _from_label(recording)
     if "event" in recording:
@@ -60,22 +69,37 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
     )
 
 
+def _widened(contact: Contact, clock: float) -> Contact:
+    """Return a contact whose onset may be earlier by how far the load cell's clock may be off [s]."""
+    return contact if contact.in_progress else replace(contact, uncertainty=contact.uncertainty + clock)
+
+
 def _from_label(recording: Recording) -> list[Contact]:
     series = recording["label"]
     present = np.isfinite(series.values[:, 0])  # a missing sample does not end a contact
-    time, touched = series.time[present], (series.values[present, 0] > 0.5).astype(int)
-    edges = np.diff(np.concatenate(([0], touched, [0])))
+    time, values = series.time[present], series.values[present, 0]
+    # The number of its kind, from 1; 0 where there is no contact. A change of kind is another contact.
+    kinds = np.zeros(len(time), dtype=int)
+    if recording.label_kinds:
+        for number, (code, _) in enumerate(recording.label_kinds, 1):
+            kinds[values == code] = number
+    else:
+        kinds[values > 0.5] = 1
+    firsts = np.flatnonzero(np.diff(kinds, prepend=0))
+    ends = np.append(firsts[1:], len(time))[: len(firsts)]
     period = series.period if len(series) > 1 else 0.0
     return [
         Contact(
-            start=float(time[a]),
-            end=float(time[b - 1]),
-            uncertainty=0.5 * period if a else 0.0,
+            start=float(time[first]),
+            end=float(time[end - 1]),
+            uncertainty=0.5 * period if first else 0.0,
             found_by="label",
+            kind=recording.label_kinds[kinds[first] - 1][1] if recording.label_kinds else "",
             resolution=period,
-            in_progress=bool(a == 0),
+            in_progress=bool(first == 0),
         )
-        for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+        for first, end in zip(firsts, ends, strict=True)
+        if kinds[first]
     ]
 
 

@@ -41,6 +41,8 @@ def to_markdown(report: Report, most: int = 60_000) -> str:
     for group, table in model.groups:
         own = [_image(image) for image in report.images if image.group == group]
         results.append(_section(table, tail="\n\n".join(own)))
+    if "kinds" in model.tables:
+        results.append(_section(model.tables["kinds"]))
     if model.notes["differences"]:
         lead = escape(model.notes["differences"], None)
         differences = model.tables.get("differences")

@@ -26,8 +26,10 @@ _NAMES = {
     "hysteresis": "hysteresis, share of the safety factor",
     "latch": "alarms latch",
     "onset": "onset of a contact",
+    "force": "force from several axes",
     "separation_s": "separation of contacts [s]",
     "label_file": "label file",
+    "not_contacts": "kinds of labels that are not contacts",
     "synchronisation_s": "synchronisation of the load cell [s]",
     "mass_before_cell_kg": "mass before the load cell [kg]",
     "benchmark_sha256": "SHA-256 of the benchmark file",
@@ -40,7 +42,10 @@ _NAMES = {
     "sections": "parts of logs scored",
 }
 # Entries that have tables of their own, are part of another, or are the same in every report.
-_OTHER_TABLES = ("tool", "gains", "signature_sha256", "learned_sha256", "units", "short_names", "force_profiles")
+_OTHER_TABLES = (
+    *("tool", "gains", "signature_sha256", "learned_sha256", "load_cell_sha256", "units", "short_names"),
+    "force_profiles",
+)
 
 
 def provenance_tables(results: Results) -> list[Table]:
@@ -52,11 +57,13 @@ def provenance_tables(results: Results) -> list[Table]:
         if key not in _OTHER_TABLES and value not in (None, "", {}, [])
     ]
     learned = [(name_cell(name), Cell(str(digest))) for name, digest in part_of(provenance, "learned_sha256").items()]
+    cells = [(name_cell(name), Cell(str(digest))) for name, digest in part_of(provenance, "load_cell_sha256").items()]
     tables = (
         _table("provenance", "Provenance", ("entry", "value"), entries),
         _table("gains", "Detectors", ("detector", "unit", "gains", "SHA-256 of its threshold"), _gains(results)),
         _table("profiles", "Force profiles", ("group", "profile", "limits", "source", "note"), _profiles(provenance)),
         _table("learned", "Recordings learned from", ("recording", "SHA-256"), learned),
+        _table("load_cells", "Load cells in files of their own", ("recording and file", "SHA-256"), cells),
     )
     return [table for table in tables if table.rows]
 

@@ -95,6 +95,33 @@ def results_table(results: Results, items: Sequence[Summary], group: str | None 
     ]
     if group is None:
         fields.append((Column("group", choice=True), lambda item: name_cell(item.group)))
+    fields += _of_contacts(items)
+    fields += [
+        (Column("false alarms", numeric=True), _false_alarms),
+        (Column("false alarms per operation", numeric=True), _per_operation),
+        (Column("per hour", numeric=True, below=True), _per_hour),
+    ]
+    fields += _of_force(items)
+    title = "Latency, misses and false alarms by detector and group"
+    if group is not None:
+        title = shown(group) + ("" if any(item.contacts for item in items) else ": no contacts, only false alarms")
+    return tabulate("results", title, fields, items, "contacts")
+
+
+def kinds_table(results: Results, items: Sequence[Summary]) -> Table:
+    """Return the latencies of each kind of contact, a row per summary; without rows if no contact has a kind."""
+    fields: list[tuple[Column, Callable[[Summary], Cell]]] = [
+        (Column("detector"), lambda item: detector_cell(results, item.detector)),
+        (Column("group/kind", choice=True), lambda item: name_cell(item.group)),
+        *_of_contacts(items),
+        *_of_force(items),
+    ]
+    return tabulate("kinds", "Latency and misses by kind of contact", fields, items, "contacts")
+
+
+def _of_contacts(items: Sequence[Summary]) -> list[tuple[Column, Callable[[Summary], Cell]]]:
+    """Return the columns of latencies and outcomes; empty without a contact."""
+    fields: list[tuple[Column, Callable[[Summary], Cell]]] = []
     if any(item.contacts for item in items):
         fields += [
             *((Column(f"{name} [ms]", numeric=True), partial(_latency, name)) for name in latency_columns(items)),
@@ -102,21 +129,19 @@ def results_table(results: Results, items: Sequence[Summary], group: str | None 
             (Column("missed", numeric=True), _missed),
             (Column("not assessable", numeric=True), _not_assessable),
         ]
-    fields += [
-        (Column("false alarms", numeric=True), _false_alarms),
-        (Column("false alarms per operation", numeric=True), _per_operation),
-        (Column("per hour", numeric=True, below=True), _per_hour),
-    ]
+    return fields
+
+
+def _of_force(items: Sequence[Summary]) -> list[tuple[Column, Callable[[Summary], Cell]]]:
+    """Return the columns of the force that a row fills."""
+    fields: list[tuple[Column, Callable[[Summary], Cell]]] = []
     if any(not math.isnan(item.force_at_alarm) for item in items):
         fields.append((Column("force at alarm [N]", numeric=True), _force_at_alarm))
     if any(not math.isnan(item.peak_force) for item in items):
         fields.append((Column("peak force [N]", numeric=True), lambda item: number_cell(item.peak_force)))
     if any(not math.isnan(item.force_failed) for item in items):
         fields.append((Column("force limit exceeded", numeric=True), _force_failed))
-    title = "Latency, misses and false alarms by detector and group"
-    if group is not None:
-        title = shown(group) + ("" if any(item.contacts for item in items) else ": no contacts, only false alarms")
-    return tabulate("results", title, fields, items, "contacts")
+    return fields
 
 
 def comparisons_table(evaluated: Evaluated) -> Table:

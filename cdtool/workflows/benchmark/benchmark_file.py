@@ -16,6 +16,7 @@ from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
+from cdtool.evaluation.summary import kind_group
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
 from cdtool.log_section import LogSection
@@ -92,13 +93,16 @@ class BenchmarkFile:
     @property
     def scoring(self) -> dict[str, Any]:
         """Return the settings that determine the results, for provenance; only results with equal settings compare."""
+        reduction = self.machine_file.force_reduction
         return {
             "onset": self.onset.described,
+            **({"force": reduction} if reduction else {}),
             "separation_s": self.onset.separation,
             "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
             "operations": self.operations,
             "watched_joints": ", ".join(self.watched) or None,
             "label_file": self.labels.source if self.labels else None,
+            **({"not_contacts": list(self.labels.not_contacts)} if self.labels and self.labels.not_contacts else {}),
             "synchronisation_s": self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
@@ -142,9 +146,10 @@ class BenchmarkFile:
     @property
     def inputs(self) -> tuple[Path, ...]:
         """Return every file that is read for the benchmark; none of them may be overwritten."""
-        logs = (path for group in self.impacts.values() for path in group.logs)
+        logs = (*self.learn, *(path for group in self.impacts.values() for path in group.logs))
         labels = (Path(self.labels.source),) if self.labels else ()
-        return (self.path, self.machine_file.path, *self.learn, *logs, *labels)
+        beside = (path for log in logs for path in self.machine_file.files_beside(log))
+        return (self.path, self.machine_file.path, *logs, *labels, *beside)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -177,13 +182,14 @@ def read_benchmark_file(
     needs_runs = learning and not is_per_run(rule)
     learn_table = root.table("learn", required=needs_runs)
     guard = _guard(learn_table)
-    learn = sectioned_logs(learn_table, base) if needs_runs or "learn" in root else {}
+    learn = sectioned_logs(learn_table, base, machine_file) if needs_runs or "learn" in root else {}
     force = root.table("force")
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
-    impacts, sections = _groups(root, base, window, force)
+    impacts, sections = _groups(root, base, window, force, machine_file)
     onset = root.table("onset")
     migrated = migrated_onset(onset)
+    labels = labels_of(onset, base, [*_scored(impacts, HOLDOUT), *(learn if guard is not None else ())])
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
@@ -195,16 +201,19 @@ def read_benchmark_file(
         signature=signature,
         rule=rule,
         activation=_read_activation(root.table("activation")),
-        labels=labels_of(onset, base, [*_scored(impacts, HOLDOUT), *(learn if guard is not None else ())]),
+        labels=labels,
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=read_onset(onset),
         mass_before_cell=mass_before_cell,
         learn=tuple(learn),
         impacts=impacts,
-        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
-        points=named_logs(root.table("points"), base, _scored(impacts)),
+        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT), machine_file),
+        points=named_logs(root.table("points"), base, _scored(impacts), machine_file),
         limits=read_limits(
-            root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
+            root.table("limits"),
+            [*_names(machine_file, names), *((name, name) for name in also_known)],
+            tuple(impacts),
+            [kind_group(group, kind) for group in impacts for kind in _kinds(machine_file, labels)],
         ),
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
         window=window,
@@ -219,6 +228,12 @@ def read_benchmark_file(
     refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
     return benchmark
+
+
+def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:
+    """Return the kinds of contacts that a limit may name; empty if none has a kind."""
+    kinds = dict.fromkeys((*machine_file.label_kinds, *(labels.kinds if labels else ())))
+    return (*kinds, "") if kinds else ()
 
 
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
@@ -261,7 +276,7 @@ def _guard(learn: Table) -> float | None:
 
 
 def _groups(
-    root: Table, base: Path, window: float, force: Table
+    root: Table, base: Path, window: float, force: Table, machine_file: MachineFile
 ) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
     """Return the groups of impacts, then the hold-out, and the sections of their logs."""
     tables = root.table("impacts")
@@ -283,11 +298,11 @@ def _groups(
         if profile and "force_profile" not in table:
             limits = profiles[profile]
         own = table.number("window_s", window, above=0.0)
-        logs = sectioned_logs(table, base)
+        logs = sectioned_logs(table, base, machine_file)
         sections |= logs
         groups[name] = ImpactGroup(tuple(logs), own, limits)
     if HOLDOUT in root:
-        logs = sectioned_logs(root.table(HOLDOUT), base)
+        logs = sectioned_logs(root.table(HOLDOUT), base, machine_file)
         sections |= logs
         groups[HOLDOUT] = ImpactGroup(tuple(logs), window)
     if "limits" in force and not any(group.force for group in groups.values()):

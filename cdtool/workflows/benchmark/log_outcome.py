@@ -62,7 +62,7 @@ class LogOutcome:
     """The results of one log, small enough to be kept for all logs and to be sent from one process to another.
 
     `unchecked`: names of logs assumed to be free of impacts, with the ground truth that is missing from them.
-    `reading` and `detecting` [s]: the time that they took.
+    `beside`: name and SHA-256 of each file beside the log with a channel. `reading`, `detecting` [s]: time taken.
     """
 
     recording: RecordingResult | None
@@ -76,6 +76,7 @@ class LogOutcome:
     operations: tuple[OperationOutcome, ...]
     reading: float
     detecting: float
+    beside: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,7 @@ def outcome_of(scored: Scored, setup: BenchmarkFile, normals: NormalMotions, wan
         operations=tuple(_operation(judged, setup, normals, wanted) for judged in scored.judged),
         reading=scored.reading,
         detecting=scored.detecting,
+        beside=scored.log.beside if scored.log else (),
     )
 
 

@@ -126,12 +126,16 @@ def score_log(
     rules = setup.rules_of(group)
     begin = perf_counter()
     try:
-        whole = read_named(path, setup.machine_file, setup.path.parent, ranges)
+        whole = read_named(path, setup.machine_file, setup.path.parent, ranges, rules.onset)
         section = setup.sections.get(path, _WHOLE)
         recording = section.of(whole)
         operations = operations_of(recording, setup.operations)
         contacts: Sequence[Contact] = ()
-        if group != HOLDOUT:
+        unwanted: Sequence[Contact] = ()
+        if group == HOLDOUT:
+            unwanted = unwanted_contacts(whole, rules)
+            unwanted = section.contacts_of(whole, unwanted) if section else unwanted
+        else:
             contacts = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
         if section and contacts:
             contacts = section.contacts_of(whole, contacts)
@@ -145,8 +149,6 @@ def score_log(
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
     scored.findings += lost(recording)
     if group == HOLDOUT:
-        unwanted = unwanted_contacts(whole, rules)
-        unwanted = section.contacts_of(whole, unwanted) if section else unwanted
         operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]

@@ -62,9 +62,12 @@ def contact_rows(
 
 
 def _resolution_of_onset(recording: Recording, contact: Contact) -> float:
-    """Return the resolution of the onset [s]; from a label file, at best that of the file and of the cell."""
+    """Return the resolution of the onset [s]; from a label file, at best that of the file and of the cell.
+
+    Of a load cell in a file of its own, with how far its clock may be off.
+    """
     if np.isfinite(contact.resolution):
-        return contact.resolution
+        return contact.resolution + (recording.truth_clock if contact.found_by == "load cell" else 0.0)
     cell = recording["force"].period if "force" in recording else 0.0
     return (cell if np.isfinite(cell) else 0.0) + contact.uncertainty
 

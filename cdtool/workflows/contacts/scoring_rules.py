@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from cdtool.errors import UsageError
+from cdtool.evaluation.results import RecordingFinding
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset import OnsetRule
 
@@ -29,3 +30,9 @@ class ScoringRules:
         for name, unit in (("synchronisation", "s"), ("mass_before_cell", "kg")):
             if not getattr(self, name) >= 0.0:
                 raise UsageError(f"{name} is {getattr(self, name):g} {unit}", f"give 0 {unit} or more")
+
+    @property
+    def findings(self) -> tuple[RecordingFinding, ...]:
+        """Return what is to be reported about the label file."""
+        labels = self.labels
+        return tuple(RecordingFinding.of(labels.source, item) for item in labels.findings) if labels else ()

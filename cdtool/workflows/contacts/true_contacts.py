@@ -19,18 +19,20 @@ _TAIL = 0.1
 
 
 def unwanted_contacts(recording: Recording, rules: ScoringRules) -> tuple[Contact, ...]:
-    """Return the contacts of a hold-out log, which should have none; a label file with the log takes precedence."""
+    """Return the contacts of a hold-out log, which should have none; a label file with the log takes precedence.
+
+    Raises RecordingError if a label is outside the log.
+    """
     labels = rules.labels
-    name = labels.name_of(recording.name) if labels else None
-    return tuple(labels.contacts[name]) if labels and name is not None else contacts_shown(recording, rules.onset)
+    if labels and labels.name_of(recording.name) is not None:
+        return tuple(labels.contacts_in(recording))
+    return contacts_shown(recording, rules.onset)
 
 
 def any_contacts(recording: Recording, rules: ScoringRules) -> list[Contact]:
     """Return the contacts of a log by a label file that names it or by its channels; empty without ground truth."""
-    name = rules.labels.name_of(recording.name) if rules.labels else None
-    if rules.labels and name is not None:
-        rules.labels.check(recording.name, recording.start, recording.end)
-        return list(rules.labels.contacts[name])
+    if rules.labels and rules.labels.name_of(recording.name) is not None:
+        return rules.labels.contacts_in(recording)
     try:
         return find_contacts(recording, rules.onset)
     except RecordingError:
@@ -45,13 +47,13 @@ def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list
     labels = rules.labels
     name = labels.name_of(recording.name) if labels else None
     if labels and name is not None:
-        labels.check(recording.name, recording.start, recording.end)
-        if not labels.contacts[name]:
+        found = labels.contacts_in(recording)
+        if not found:
             raise RecordingError(
-                f"{path}: no contact found ({labels.lines[name][0]} does not list one)",
+                f"{path}: no contact found ({labels.why_none(name)})",
                 "add start_s and end_s there, or move the log to [holdout]",
             )
-        return list(labels.contacts[name])
+        return found
     for item in absent_truth(recording):
         if not any(channel in recording for channel in GROUND_TRUTH):
             raise RecordingError(f"{path}: no ground truth: {item}", "an impact log requires it, or a label file")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdtool.bounded_loading import ContentError, parse_toml, read_text
+from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError, UsageError, nearest
 from cdtool.files import replaced
 from cdtool.findings import Finding
@@ -121,8 +122,11 @@ def convert(
     pieces = _pieces(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
-    _check_free([*names, *companions], parts, force)
+    beside = [path for path in machine_file.files_beside(log) if path.is_file()] if machine_file else []
+    _check_free([*names, *companions], [*parts, *beside], force)
     provenance = _provenance(log, parts, rows, machine_file, section)
+    if beside:
+        provenance |= {"load_cell": "; ".join(f"{path.name} {file_digest(path)}" for path in beside)}
     row_progress = _RowProgress(log, sum(group.rows for group in rows.groups), progress)
     with replaced(*names, *companions) as temporary:  # all or none
         for i, (path, part) in enumerate(pieces):
@@ -176,7 +180,7 @@ def _check_apart(target: Path, log: Path, parts: Sequence[Path]) -> None:
 def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> None:
     for path in paths:
         if path.exists() and any(path.samefile(part) for part in parts):
-            raise UsageError(f"{path}: is the log itself", "choose another name")
+            raise UsageError(f"{path}: is the log itself, or its load cell", "choose another name")
         if path.exists() and not force:
             raise UsageError(f"{path}: already exists", "choose another name, or overwrite it with --force")
 
@@ -191,7 +195,7 @@ def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[
 
 def _provenance(
     log: Path, parts: Sequence[Path], rows: Rows, machine_file: MachineFile | None, section: LogSection
-) -> Mapping[str, str]:
+) -> dict[str, str]:
     """Return the provenance; for a log in parts with each part's name and SHA-256, `sha256` being that of these."""
     if log.is_dir():
         parts = LogFolder.of(log).files  # in order of time
@@ -227,11 +231,14 @@ def _converted_machine(
     if urdf and machine_file.path.parent.resolve() != target.parent.resolve():
         place = os.path.relpath(machine_file.path.parent / urdf, target.parent)
         kept = _URDF.sub(lambda match: f"{match[1]}{_text(Path(place).as_posix())}", kept)
-    corner = (machine_file.topics if machine_file.topics.sources else machine_file.columns).speed_low_pass
-    return f"{kept.rstrip()}\n\n{_channels(log, groups, names, corner)}"
+    mapped = machine_file.topics if machine_file.topics.sources else machine_file.columns
+    kinds = next((item.kinds for item in mapped.sources if item.channel == "label"), ())
+    return f"{kept.rstrip()}\n\n{_channels(log, groups, names, mapped.speed_low_pass, kinds)}"
 
 
-def _channels(log: Path, groups: Sequence[Group], names: WrittenNames, corner: float) -> str:
+def _channels(
+    log: Path, groups: Sequence[Group], names: WrittenNames, corner: float, kinds: Sequence[tuple[float, str]]
+) -> str:
     topics = log.suffix.lower() == ".mcap"
     lines = [f"# The channels of {log.name} as cdtool convert wrote them: SI units, as logged."]
     lines += ["[channels.mcap]"] if topics else ["[channels]", 'time = { column = "time", unit = "s" }']
@@ -240,14 +247,24 @@ def _channels(log: Path, groups: Sequence[Group], names: WrittenNames, corner: f
         for column, places in zip(group.columns, of_group, strict=True):
             if topics:
                 topic, _, field = places[0].partition(" ")
-                where = f"topic = {_text(topic)}, field = {_text(field)}"
+                where = f"topic = {_text(topic)}, {_field(field, column)}"
             elif len(places) == 1:
                 where = f"column = {_text(places[0])}"
             else:
                 where = f"columns = [{', '.join(map(_text, places))}]"
             unit = "" if column.name in UNITLESS else f", unit = {_text(column.unit or '1')}"
-            lines.append(f"{column.name} = {{ {where}{unit} }}")
+            of_label = ", ".join(f'"{value:.17g}" = {_text(kind)}' for value, kind in kinds)
+            also = f", kinds = {{ {of_label} }}" if of_label and column.name == "label" else ""
+            lines.append(f"{column.name} = {{ {where}{unit}{also} }}")
     return "\n".join(lines) + "\n"
+
+
+def _field(field: str, column: Column) -> str:
+    """Return the field of a channel in [channels.mcap]; the axes of a force are elements of an array."""
+    if column.name != "force" or column.values.ndim == 1:
+        return f"field = {_text(field)}"
+    elements = [_text(field.replace("[:]", f"[{axis}]")) for axis in range(column.values.shape[1])]
+    return f"fields = [{', '.join(elements)}]"
 
 
 def _without_channels(text: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -138,3 +140,24 @@ def test_a_missing_label_does_not_split_a_contact():
     label = ((TIME > 1.0) & (TIME <= 1.5)).astype(float)
     label[1200] = np.nan
     assert len(find_contacts(recording(label, "label"), GATE_RULE)) == 1
+
+
+def kinds_of(values: np.ndarray) -> list[tuple[str, float, bool]]:
+    kinds = ((1.0, "hard"), (2.5, "soft"))
+    found = find_contacts(replace(recording(values, "label"), label_kinds=kinds), GATE_RULE)
+    return [(item.kind, round(item.start, 3), item.in_progress) for item in found]
+
+
+def test_a_label_with_kinds_has_a_contact_for_each_stay_at_one_of_its_values():
+    values = np.select([(TIME > 1.0) & (TIME <= 1.2), (TIME > 1.2) & (TIME <= 1.4), TIME > 2.0], [1.0, 2.5, 3.0], 0.0)
+    assert kinds_of(values) == [("hard", 1.001, False), ("soft", 1.201, False)]
+
+
+def test_a_label_with_kinds_may_begin_and_end_in_a_contact_and_lose_samples():
+    values = np.where(TIME < 0.5, 2.5, np.where(TIME > 2.0, 1.0, 0.0))
+    values[(TIME > 0.2) & (TIME < 0.3)] = np.nan
+    assert kinds_of(values) == [("soft", 0.0, True), ("hard", 2.001, False)]
+
+
+def test_a_label_whose_values_are_all_no_contact_has_none():
+    assert kinds_of(np.full(len(TIME), 7.0)) == [] == kinds_of(np.full(len(TIME), np.nan))

@@ -284,3 +284,18 @@ def test_names_that_are_equal_for_a_container_are_made_unique(suffix, tmp_path):
     done = convert(tmp_path / "log.csv", tmp_path / f"out{suffix}")
     ends = {(column.values[0], column.values[-1]) for column in survey(Path(done.files[0])).columns.values()}
     assert {(0.0, 19.0), (0.0, -19.0)} <= ends
+
+
+def test_the_kinds_of_a_label_are_kept(tmp_path):
+    text = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\n[channels]\ntime = { column = "t", unit = "s" }\n'
+    text += (
+        'speed = { column = "v", unit = "m/s" }\nlabel = { column = "k", kinds = { 1 = "hard", "2.5" = "so\\"ft" } }\n'
+    )
+    (tmp_path / "machine.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "log.csv").write_text(
+        "t,v,k\n" + "".join(f"{i / 10},0.{i},{i % 3}\n" for i in range(9)), encoding="utf-8"
+    )
+    machine = read_machine_file(tmp_path / "machine.toml")
+    convert(tmp_path / "log.csv", tmp_path / "new.h5", machine=machine)
+    again = read_machine_file(tmp_path / "new.h5.machine.toml")
+    assert {item.channel: item.kinds for item in again.columns.sources}["label"] == ((1.0, "hard"), (2.5, 'so"ft'))
