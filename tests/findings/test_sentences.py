@@ -604,6 +604,48 @@ SENTENCES: list[tuple[Fact, str]] = [
         "momentum is not assessable: nothing can be learned from the other recordings: 9 impact-free runs of one class",
     ),
     (
+        channels.AxesHeld("fz", 0.0042),
+        "its axes have clocks of their own: each is held on the clock of fz, up to 4.2 ms old",
+    ),
+    (channels.AbsentFile("file", "cell_3.csv"), "has no file for this log: 'cell_3.csv' does not exist"),
+    (
+        channels.AbsentFile("file", "cell_3.csv", reason="no column 'fz'"),
+        "its file 'cell_3.csv' cannot be used: no column 'fz'",
+    ),
+    (
+        clocks.FileAligned("cell_3.csv", -1.25, "trigger", 0.001, 12),
+        "from cell_3.csv, its times shifted by -1.25 s (by the trigger in both, known to 1 ms); 12 samples outside the "
+        "log left out",
+    ),
+    (
+        clocks.FileAligned("cell_3.csv", 2.0, "offset", 0.0, 0),
+        "from cell_3.csv, its times shifted by 2 s (as time_offset states)",
+    ),
+    (
+        clocks.TriggersDiffer(2, 3),
+        "its trigger rises 3 times in its own file, 2 times in the log: aligned by the first of each",
+    ),
+    (
+        clocks.TriggersDrift(4.0, 60.0, 66.7),
+        "its clock runs apart from the log's: the triggers' distances differ by 4 ms over 60 s (66.7 ppm); aligned in "
+        "the middle",
+    ),
+    (
+        truth.ForceMagnitudeUsed((-1.5, 2.0, 0.25)),
+        "magnitude of 3 axes, the rest level of each removed (at first -1.5, 2, 0.25 N): it cannot tell pushing from "
+        "pulling; direction in [channels] selects a component",
+    ),
+    (
+        truth.LabelsWithoutZone(),
+        "the dates have no zone: read as UTC, like dates without a zone in a log. If the logs state a zone, set "
+        "labels_zone, e.g. '+02:00'",
+    ),
+    (truth.KindsExcluded(1, ("wave",)), "1 label of kind wave is not a contact: an alarm there is a false alarm"),
+    (
+        truth.KindsExcluded(3, ("wave", "push")),
+        "3 labels of kind wave, push are not contacts: an alarm there is a false alarm",
+    ),
+    (
         scoring.RecordingsWithoutRow("plc", 2, 9, True, "stiff/01.csv"),
         "plc: 2 of 9 recordings without a row: left out; first stiff/01.csv",
     ),
