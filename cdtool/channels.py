@@ -36,7 +36,8 @@ class ChannelSource:
     """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
-    `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns).
+    `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns). `words`: the
+    column may contain texts, which are read as categories.
     """
 
     channel: str
@@ -52,6 +53,7 @@ class ChannelSource:
     most: float = math.inf
     duty: Duty | None = None
     keys: tuple[str, ...] = ()
+    words: bool = False
 
     @property
     def described(self) -> str:
@@ -110,6 +112,11 @@ class ChannelMap:
     speed_low_pass: float = 50.0
     pins: TablePins = TablePins()
     named: bool = True
+
+    @property
+    def worded(self) -> frozenset[str]:
+        """Return the columns that may contain texts, by their names in the machine file."""
+        return frozenset(str(column) for source in self.sources if source.words for column in source.columns)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

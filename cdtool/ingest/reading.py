@@ -230,13 +230,18 @@ def log_parts(path: Path) -> list[Path]:
     return [path]
 
 
-def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, ChannelMap]:
+def mapped_source(
+    path: Path, machine_file: MachineFile, also: Callable[[bool], ChannelSource] | None = None
+) -> tuple[Source, ChannelMap]:
     """Return the columns of one file that the machine file maps, and the map for them; raises RecordingError.
 
-    A mapped load cell or label that is not in the file is left out of the map, with a note.
+    A mapped load cell or label that is not in the file is left out of the map, with a note. `also` returns a further
+    column, given whether the file contains topics; it becomes the last source of the map.
     """
     file_format = choose_format(path)
     channels = _map_for(file_format, machine_file, path)
+    if also is not None:
+        channels = replace(channels, sources=(*channels.sources, also(channels.topics)))
     source, resolved = resolve_columns(file_format.columns(path, channels), channels)
     return with_own_clocks(source, resolved)
 
@@ -366,4 +371,4 @@ def _joined(source: Source, item: ChannelSource) -> Column:
                 "all joints of a channel must have the same clock",
                 channel=item.channel,
             )
-    return Column(item.channel, np.column_stack([part.values for part in parts]), time)
+    return Column(item.channel, np.column_stack([part.values for part in parts]), time, words=parts[0].words)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,12 +10,16 @@ import numpy as np
 
 from cdtool.activation import Activation
 from cdtool.detection import Alarm
+from cdtool.detectors.base import Detector
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import Matching, belongs, windows
 from cdtool.evaluation.truth.missing_samples import longest_step
+from cdtool.ingest.run_reading import read_runs
+from cdtool.machine_file import MachineFile
 from cdtool.motion.applicable import HOLD
+from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
@@ -27,10 +31,11 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import absent_truth, check_joints, load_operations
+from cdtool.workflows.runs import absent_truth, check_joints, load_operations, reported, shown_path
 
 if TYPE_CHECKING:
     from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
+    from cdtool.workflows.benchmark.scoring import Scored
 
 
 @dataclass(frozen=True)
@@ -101,71 +106,197 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     >>> 0.0 < latency < 0.2                                             # s
     True
     """
-    if benchmark := options.prepared():
-        return _detect_prepared(Path(log), benchmark)
-    machine_file = options.machine_file()
-    signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
-    if (signature is None) == (not limit):
-        raise UsageError("give either a signature or a limit", "give --signature FILE or --limit VALUE")
-    thresholds: tuple[FittedThreshold, ...]
-    learned: set[str] = set()
-    ranges: PlausibleRanges | None = None
-    normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
-    if signature is not None:
-        from cdtool.signature_store import read_signature
-        from cdtool.workflows.signature.normal_runs import normals_of, notes_on
-
-        stored = read_signature(signature)
-        instance = machine_file.detector(detector or stored.detector)
-        stored.check(machine_file.machine, instance)
-        if joints:
-            raise UsageError("joints require a limit", "a signature monitors the joints that it was learned for")
-        thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
-        learned = {run.sha256 for run in stored.runs}
-        raised_by, described = stored.activation, stored.described
-        normals = normals_of(stored)
-        notes = notes_on(stored)
-    else:
-        if detector is None:
-            raise UsageError("a limit requires a detector", "give --detector NAME; see cdtool list detectors")
-        instance = machine_file.detector(detector)
-        check_joints(joints, machine_file.machine)
-        thresholds = (Limit.given(limit),)
-        raised_by = Activation()
-        described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
-    stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
-    if raised_by != stored_one and signature is not None:
-        described += ", with an activation different from the file's"
-    recording, parts = load_operations(Path(log), machine_file, options.operations, ranges=ranges)
-    rules = options.rules or ScoringRules()
-    hold = max(HOLD, rules.window)
-    detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
-    contacts = any_contacts(recording, rules)
-    detected = DetectedLog(recording, parts, options.operations, contacts, [[item] for item in detections])
-    matched = match_log(detected, "", rules, raised_by.wait)
-    return Detected(
-        recording,
-        detections,
-        tuple(contacts),
-        tuple(item.matchings[0] for item in matched.judged),
-        described,
-        raised_by,
-        recording.digest in learned,
-        rules.window,
-        matched.contacts,
-        matched.not_scored,
-        (*matched.findings, *notes),
-        normals,
-        rules.onset.described,
-    )
+    found = detect_log_runs(log, options).runs
+    if len(found) > 1:
+        ids = f"{found[0].recording.source} to {found[-1].recording.source}"
+        raise UsageError(f"{log}: has {len(found)} runs, {ids}", "name one, as LOG#ID, or call detect_runs")
+    return found[0]
 
 
 detect = by_keywords(DetectionOptions, detect_log)
 
 
-def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
+@dataclass(frozen=True)
+class DetectedRuns:
+    """The results for the runs of a log, in its order; `skipped` are runs left out, `findings` concern the log."""
+
+    runs: tuple[Detected, ...]
+    skipped: tuple[Skipped, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
+
+
+def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
+    """Run one detector over each run of a log; a log that is not cut into runs is one.
+
+    Parameters
+    ----------
+    log : str or Path
+        The log, or LOG#ID for some of its runs.
+    options : DetectionOptions
+        The machine, the detector and its threshold.
+
+    Returns
+    -------
+    DetectedRuns
+        The same as `detect` for each run, and what was left out.
+
+    Raises
+    ------
+    UsageError
+        No threshold is given, or two are.
+    SignatureError
+        The signature belongs to another machine or to other gains.
+    RecordingError
+        The log cannot be read, or has no channel that the detector needs.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> machine = "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect_runs("sample_logs/gate/stiff/03.csv", machine, detector="momentum", limit=[400.0])
+    >>> [run.detections[0].verdict.outcome for run in found.runs]
+    ['alarm']
+    """
+    path = Path(log)
+    if benchmark := options.prepared():
+        return _detect_prepared(path, benchmark)
+    cut = RunCut.of(options.operations)
+    run = _OneDetector.of(options)
+    if cut is None:
+        return DetectedRuns((run.detect(*load_operations(path, run.machine_file, run.operations, ranges=run.ranges)),))
+    logged = read_runs(path, run.machine_file, cut)
+    skipped, findings = reported(logged, path)
+    found: list[Detected] = []
+    for item in logged.runs:
+        name = shown_path(Path(item.recording.source))
+        try:
+            recording = replace(item.on_load_side(run.machine_file.machine, run.ranges), name=name)
+            found.append(run.detect(recording, operations_of(recording, run.operations)))
+        except RecordingError as fault:
+            skipped.append(Skipped(name, str(fault).removeprefix(f"{name}: ")))
+    if not found:
+        raise RecordingError(f"{path}: no run can be used, the first: {skipped[-1].reason}", "see cdtool info")
+    return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
+
+
+detect_runs = by_keywords(DetectionOptions, detect_log_runs)
+
+
+@dataclass(frozen=True)
+class _OneDetector:
+    """A detector with its thresholds and all settings: what `detect` needs for any recording."""
+
+    machine_file: MachineFile
+    detector: Detector
+    thresholds: tuple[FittedThreshold, ...]
+    described: str
+    activation: Activation
+    joints: tuple[str, ...]
+    operations: str
+    rules: ScoringRules
+    learned: frozenset[str]
+    ranges: PlausibleRanges | None
+    normals: NormalMotions
+    notes: tuple[RecordingFinding, ...]
+
+    @classmethod
+    def of(cls, options: DetectionOptions) -> _OneDetector:
+        """Return the detector and threshold of the options; raises what `detect` raises for wrong ones."""
+        machine_file = options.machine_file()
+        signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
+        if (signature is None) == (not limit):
+            raise UsageError("give either a signature or a limit", "give --signature FILE or --limit VALUE")
+        thresholds: tuple[FittedThreshold, ...]
+        learned: set[str] = set()
+        ranges: PlausibleRanges | None = None
+        normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
+        if signature is not None:
+            from cdtool.signature_store import read_signature
+            from cdtool.workflows.signature.normal_runs import normals_of, notes_on
+
+            stored = read_signature(signature)
+            instance = machine_file.detector(detector or stored.detector)
+            stored.check(machine_file.machine, instance)
+            if joints:
+                raise UsageError("joints require a limit", "a signature monitors the joints that it was learned for")
+            thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
+            learned = {run.sha256 for run in stored.runs}
+            raised_by, described = stored.activation, stored.described
+            normals = normals_of(stored)
+            notes = notes_on(stored)
+        else:
+            if detector is None:
+                raise UsageError("a limit requires a detector", "give --detector NAME; see cdtool list detectors")
+            instance = machine_file.detector(detector)
+            check_joints(joints, machine_file.machine)
+            thresholds = (Limit.given(limit),)
+            raised_by = Activation()
+            described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
+        stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
+        if raised_by != stored_one and signature is not None:
+            described += ", with an activation different from the file's"
+        return cls(
+            machine_file,
+            instance,
+            thresholds,
+            described,
+            raised_by,
+            tuple(joints),
+            options.operations,
+            options.rules or ScoringRules(),
+            frozenset(learned),
+            ranges,
+            normals,
+            tuple(notes),
+        )
+
+    def detect(self, recording: Recording, parts: list[Operation]) -> Detected:
+        """Return the result for a recording that is cut into `parts`; raises RecordingError."""
+        rules, machine = self.rules, self.machine_file.machine
+        hold = max(HOLD, rules.window)
+        detections = tuple(
+            detect_operations(parts, machine, self.detector, self.thresholds, self.activation, self.joints, hold)
+        )
+        contacts = any_contacts(recording, rules)
+        detected = DetectedLog(recording, parts, self.operations, contacts, [[item] for item in detections])
+        matched = match_log(detected, "", rules, self.activation.wait)
+        return Detected(
+            recording,
+            detections,
+            tuple(contacts),
+            tuple(item.matchings[0] for item in matched.judged),
+            self.described,
+            self.activation,
+            recording.digest in self.learned,
+            rules.window,
+            matched.contacts,
+            matched.not_scored,
+            (*matched.findings, *self.notes),
+            self.normals,
+            rules.onset.described,
+        )
+
+
+def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> DetectedRuns:
     """Return the detection as `cdtool benchmark` scores it; raises RecordingError if it leaves the log out."""
-    scored = benchmark.score(log)
+    every = benchmark.score(log)
+    skipped, findings, found = list[Skipped](), list[RecordingFinding](), list[Detected]()
+    if benchmark.setup.has_runs:
+        skipped, findings, every = every[0].skipped, every[0].findings, every[1:]
+    for scored in every:
+        detected = _detected(scored, log, benchmark)
+        if detected is None:
+            skipped += scored.skipped or [Skipped(str(log), "no operation is assessable")]
+        else:
+            found.append(detected)
+    if not found:
+        reason = skipped[0].reason if skipped else "no operation is assessable"
+        raise RecordingError(reason if str(log) in reason else f"{log}: {reason}")
+    return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
+
+
+def _detected(scored: Scored, log: Path, benchmark: PreparedBenchmark) -> Detected | None:
+    """Return the detection in a scored recording; None if it was left out."""
     matched = scored.matched
     judged = (
         [(item, rows) for item, rows in zip(matched.judged, matched.contacts, strict=True) if item.detections]
@@ -173,8 +304,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         else []
     )
     if scored.log is None or matched is None or not judged:
-        reason = scored.skipped[0].reason if scored.skipped else "no operation is assessable"
-        raise RecordingError(reason if str(log) in reason else f"{log}: {reason}")
+        return None
     return Detected(
         scored.log,
         tuple(item.detections[0] for item, _ in judged),

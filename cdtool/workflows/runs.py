@@ -13,9 +13,10 @@ from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
 from cdtool.findings.channels import AbsentTruth
 from cdtool.ingest.reading import read_as_logged, read_recording
+from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.operations import Operation, operations_of
+from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
@@ -33,12 +34,18 @@ class Runs:
     ranges: PlausibleRanges
 
 
-def find_logs(patterns: Iterable[str], base: Path, key: str) -> list[Path]:
-    """Return the files that the patterns name below `base`, each once, in order; ConfigurationError for no match."""
+def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = False) -> list[Path]:
+    """Return the logs that the patterns name below `base`, each once, in order; ConfigurationError for no match.
+
+    With `runs`, a pattern may name runs of a log, as cycles.csv#7 or cycles.csv#free*.
+    """
     found: dict[Path, None] = {}
     for pattern in patterns:
         path = base / pattern
         matches = [path] if path.is_file() else sorted(_glob(path))
+        if not matches and runs and "#" in pattern:
+            files, _, ids = pattern.partition("#")
+            matches = [Path(f"{file}#{ids}") for file in find_logs([files], base, key)]
         if not matches:
             raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", "check the path")
         found.update(dict.fromkeys(matches))
@@ -90,19 +97,34 @@ def load_operations(
     return recording, operations_of(recording, how)
 
 
+def runs_of(path: Path, machine_file: MachineFile, cut: RunCut | None) -> LogRuns:
+    """Return the runs of a log as logged; without a cut the whole log is one. Raises CdtoolError naming the file."""
+    if cut is not None:
+        return read_runs(path, machine_file, cut)
+    logged = read_as_logged(path, machine_file)
+    _with_channels(path, logged.recording)
+    return LogRuns((logged,))
+
+
+def reported(runs: LogRuns, path: Path, base: Path | None = None) -> tuple[list[Skipped], list[RecordingFinding]]:
+    """Return the runs of a log that were left out, and the losses and warnings about the log itself."""
+    name = shown_path(split_run(path)[0], base)
+    skipped = [Skipped(shown_path(run, base), reason) for run, reason in runs.left_out]
+    return skipped, [RecordingFinding.of(name, item) for item in runs.findings if item.severity != "note"]
+
+
 @dataclass(frozen=True)
 class _AsLogged:
-    """Reads a log through a machine file; one that cannot be read gives the error."""
+    """Reads the runs of a log through a machine file; one that cannot be read gives the error."""
 
     machine_file: MachineFile
+    cut: RunCut | None
 
-    def __call__(self, path: Path) -> LoggedRecording | CdtoolError:
+    def __call__(self, path: Path) -> LogRuns | CdtoolError:
         try:
-            logged = read_as_logged(path, self.machine_file)
-            _with_channels(path, logged.recording)
+            return runs_of(path, self.machine_file, self.cut)
         except CdtoolError as fault:
             return fault
-        return logged
 
 
 def _with_channels(path: Path, recording: Recording) -> Recording:
@@ -143,9 +165,23 @@ def load_runs(
     by_bytes: dict[str, str] = {}
     without: list[tuple[str, Finding]] = []
 
-    logged = list(in_order(_AsLogged(machine_file), paths, len(paths), jobs, reading.progress))
-    known = ranges or PlausibleRanges.learned([item.recording for item in logged if isinstance(item, LoggedRecording)])
-    for path, item in zip(paths, logged, strict=True):
+    cut = RunCut.of(reading.operations)
+    logs = list(in_order(_AsLogged(machine_file, cut), paths, len(paths), jobs, reading.progress))
+    known = ranges or PlausibleRanges.learned(
+        [item.recording for log in logs if isinstance(log, LogRuns) for item in log.runs]
+    )
+    logged: list[tuple[Path, LoggedRecording | CdtoolError]] = []
+    for path, log in zip(paths, logs, strict=True):
+        if isinstance(log, CdtoolError):
+            logged.append((path, log))
+        elif cut is None:
+            logged += [(path, item) for item in log.runs]
+        else:
+            logged += [(Path(item.recording.source), item) for item in log.runs]
+            of_log, about_log = reported(log, path, base)
+            skipped += of_log
+            findings += about_log
+    for path, item in logged:
         try:
             if isinstance(item, CdtoolError):
                 raise item

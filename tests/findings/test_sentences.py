@@ -23,6 +23,7 @@ from cdtool.findings import (
     messages,
     motion,
     parts,
+    runs,
     scoring,
     tables,
     truth,
@@ -570,6 +571,14 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         scoring.PeakUnseen(1, 0.03),
         ("load-cell samples are missing for 30 ms during contact 1: its peak may be larger than the one reported"),
+    ),
+    (
+        runs.SamplesOutsideRuns(3, 900, "run_id"),
+        "3 of 900 samples belong to no run, as 'run_id' has no value there: left out",
+    ),
+    (
+        runs.ReturningIds(("A/2",), "run_id"),
+        "1 run has an id in 'run_id' that an earlier run has, too: named A/2",
     ),
     (scoring.NoForce(1, "the acceleration is missing"), "contact 1: no force: the acceleration is missing"),
     (

@@ -30,9 +30,15 @@ class Labels:
     lines: Mapping[str, tuple[str, ...]]
 
     def name_of(self, recording: str) -> str | None:
-        """Return the name of a recording in the file: its path, or only the file's name; None if it is not there."""
-        short = PurePosixPath(recording).name
-        return recording if recording in self.contacts else short if short in self.contacts else None
+        """Return the name of a recording in the file: its path, or only the file's name; None if it is not there.
+
+        The name of a run may contain slashes after the file's name: `logs/cycles.csv#push/2`.
+        """
+        if recording in self.contacts:
+            return recording
+        file, mark, run = recording.partition("#")
+        names = (PurePosixPath(recording).name, f"{PurePosixPath(file).name}{mark}{run}")
+        return next((name for name in names if name in self.contacts), None)
 
     def check(self, recording: str, start: float, end: float) -> None:
         """Raise RecordingError, naming the row, if a contact begins outside a recording of `start` to `end` [s]."""

@@ -17,8 +17,9 @@ from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
+from cdtool.ingest.run_reading import split_run
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.operations import HOW_TO_CUT
+from cdtool.operations import RunCut
 from cdtool.plain_text import counted
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.base import Threshold
@@ -101,7 +102,14 @@ class BenchmarkFile:
         """Return every file that is read for the benchmark; none of them may be overwritten."""
         logs = (path for group in self.impacts.values() for path in group.logs)
         labels = (Path(self.labels.source),) if self.labels else ()
-        return (self.path, self.machine_file.path, *self.learn, *logs, *labels)
+        runs = self.has_runs
+        files = dict.fromkeys(split_run(log)[0] if runs else log for log in (*self.learn, *logs))
+        return (self.path, self.machine_file.path, *files, *labels)
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether each log is cut into runs."""
+        return RunCut.of(self.operations) is not None
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -131,11 +139,13 @@ def read_benchmark_file(
         raise root.fault("detectors", "contains a detector twice", "list each detector once")
     signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
-    learn = logs_of(root.table("learn", required=True), base) if learning or "learn" in root else ()
+    operations = _read_operations(root)
+    runs = RunCut.of(operations) is not None
+    learn = logs_of(root.table("learn", required=True), base, runs) if learning or "learn" in root else ()
     force = root.table("force")
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
-    impacts = _groups(root, base, window, force)
+    impacts = _groups(root, base, window, force, runs)
     onset = root.table("onset")
     migrated = migrated_onset(onset)
     benchmark = BenchmarkFile(
@@ -143,20 +153,20 @@ def read_benchmark_file(
         machine_file=machine_file,
         detectors=names,
         watched=_read_watched(root, machine_file.machine.joints),
-        operations=root.choice("operations", HOW_TO_CUT, "whole"),
+        operations=operations,
         threshold=threshold,
         budget=_read_budget(root),
         signature=signature,
         rule=rule,
         activation=_read_activation(root.table("activation")),
-        labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
+        labels=labels_of(onset, base, _scored(impacts, HOLDOUT), runs),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
         onset=read_onset(onset),
         mass_before_cell=mass_before_cell,
         learn=learn,
         impacts=impacts,
-        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT)),
-        points=named_logs(root.table("points"), base, _scored(impacts)),
+        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT), runs),
+        points=named_logs(root.table("points"), base, _scored(impacts), runs),
         limits=read_limits(
             root.table("limits"), [*_names(machine_file, names), *((name, name) for name in also_known)], tuple(impacts)
         ),
@@ -202,7 +212,7 @@ def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
     return replace(setup, detectors=tuple(detectors), limits=limits)
 
 
-def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, ImpactGroup]:
+def _groups(root: Table, base: Path, window: float, force: Table, runs: bool) -> dict[str, ImpactGroup]:
     """Return the groups of impacts, then the hold-out."""
     tables = root.table("impacts")
     if HOLDOUT in tables.values:
@@ -222,9 +232,9 @@ def _groups(root: Table, base: Path, window: float, force: Table) -> dict[str, I
         if profile and "force_profile" not in table:
             limits = profiles[profile]
         own = table.number("window_s", window, above=0.0)
-        groups[name] = ImpactGroup(logs_of(table, base), own, limits)
+        groups[name] = ImpactGroup(logs_of(table, base, runs), own, limits)
     if HOLDOUT in root:
-        groups[HOLDOUT] = ImpactGroup(logs_of(root.table(HOLDOUT), base), window)
+        groups[HOLDOUT] = ImpactGroup(logs_of(root.table(HOLDOUT), base, runs), window)
     if "limits" in force and not any(group.force for group in groups.values()):
         raise force.fault(
             "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"
@@ -283,6 +293,21 @@ def _refuse_overlap(benchmark: BenchmarkFile) -> None:
                 f"{benchmark.path}: {path} is scored {where}", "list a recording in one group only, under one path"
             )
         scored[true] = name
+
+
+def _read_operations(root: Table) -> str:
+    """Return how logs are cut: `operations` as a text, or `by` in the table [operations]."""
+    is_table = isinstance(root.raw("operations"), dict)
+    table = root.table("operations") if is_table else root
+    key = "by" if is_table else "operations"
+    text = table.text(key, None if is_table else "whole")
+    if is_table:
+        table.finish()
+    try:
+        RunCut.of(text)
+    except UsageError as fault:
+        raise table.fault(key, f"is '{text}'", fault.hint) from fault
+    return text
 
 
 def _read_budget(table: Table) -> Budget | None:

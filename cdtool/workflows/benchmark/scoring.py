@@ -22,8 +22,10 @@ from cdtool.evaluation.results import (
 from cdtool.evaluation.sweep import sweep_operation
 from cdtool.findings import Finding
 from cdtool.findings.scoring import ForceUnassessable
+from cdtool.ingest.run_reading import read_runs
+from cdtool.logged_recording import LoggedRecording
 from cdtool.motion.applicable import HOLD
-from cdtool.operations import Operation
+from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Contact, FloatArray, Recording
@@ -36,7 +38,7 @@ from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import DetectedLog, MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.runs import absent_truth, load_operations, lost, unread
+from cdtool.workflows.runs import absent_truth, load_operations, lost, reported, shown_path, unread
 
 
 @dataclass
@@ -119,11 +121,79 @@ def score_log(
     `factors`: the safety factors of the sweep by detector. `group` is empty for a log outside all groups. Values
     outside the plausible `ranges` are masked.
     """
+    return _score(setup, group, path, detect, factors, _WholeLog(setup, path, ranges))
+
+
+def score_runs(
+    setup: BenchmarkFile,
+    group: str,
+    path: Path,
+    detect: Detect,
+    factors: Mapping[str, FloatArray],
+    ranges: PlausibleRanges | None = None,
+) -> list[Scored]:
+    """Return the same for each run of a log, if the benchmark cuts logs into runs; the first entry is about the log."""
+    cut = RunCut.of(setup.operations)
+    if cut is None:
+        return [score_log(setup, group, path, detect, factors, ranges)]
+    about_log, begin = Scored(), perf_counter()
+    try:
+        runs = read_runs(path, setup.machine_file, cut)
+    except CdtoolError as fault:
+        about_log.skipped.append(unread(path, setup.path.parent, fault))
+        return [about_log]
+    finally:
+        about_log.reading = perf_counter() - begin
+    about_log.skipped, about_log.findings = reported(runs, path, setup.path.parent)
+    scored = [about_log]
+    for logged in runs.runs:
+        run = Path(logged.recording.source)
+        scored.append(_score(setup, group, path, detect, factors, _OneRun(setup, run, logged, ranges)))
+    return scored
+
+
+@dataclass(frozen=True)
+class _WholeLog:
+    """Reads a log that is one recording, and cuts it into operations."""
+
+    setup: BenchmarkFile
+    path: Path
+    ranges: PlausibleRanges | None
+
+    def __call__(self) -> tuple[Recording, list[Operation]]:
+        setup = self.setup
+        return load_operations(self.path, setup.machine_file, setup.operations, setup.path.parent, self.ranges)
+
+
+@dataclass(frozen=True)
+class _OneRun:
+    """Converts a run that has been read; `path` is LOG#ID."""
+
+    setup: BenchmarkFile
+    path: Path
+    logged: LoggedRecording
+    ranges: PlausibleRanges | None
+
+    def __call__(self) -> tuple[Recording, list[Operation]]:
+        recording = self.logged.on_load_side(self.setup.machine_file.machine, self.ranges)
+        recording = replace(recording, name=shown_path(self.path, self.setup.path.parent))
+        return recording, operations_of(recording, self.setup.operations)
+
+
+def _score(
+    setup: BenchmarkFile,
+    group: str,
+    log: Path,
+    detect: Detect,
+    factors: Mapping[str, FloatArray],
+    load: _WholeLog | _OneRun,
+) -> Scored:
+    """Return the rows of a log or of one of its runs; `log` is its path in the benchmark file."""
     scored = Scored()
-    rules = setup.rules_of(group)
+    rules, path = setup.rules_of(group), load.path
     begin = perf_counter()
     try:
-        recording, operations = load_operations(path, setup.machine_file, setup.operations, setup.path.parent, ranges)
+        recording, operations = load()
         if group:
             contacts = true_contacts(recording, rules, path) if group != HOLDOUT else []
         else:
@@ -143,7 +213,7 @@ def score_log(
         if not operations:
             scored.findings += log_warnings(recording, unwanted, setup.onset)
             return scored
-    scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
+    scored.recording = _recording_result(recording, group, log, len(operations), len(contacts), setup)
     found = detect(operations, scored)
     detected = DetectedLog(recording, operations, setup.operations, contacts, found)
     matched = match_log(detected, group, rules, setup.activation.wait)

@@ -51,7 +51,8 @@ class LearningOptions:
     joints : sequence of str, optional
         The joints to monitor; all by default.
     operations : str, optional
-        How the logs are cut into operations: whole, motion or trigger.
+        How the logs are cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
+        clock-reset.
     activation : ActivationSettings, optional
         Settings of the activation that replace the default: debounce [samples], rearm [s], hysteresis [share], latch.
     false_alarm_budget : str, optional
