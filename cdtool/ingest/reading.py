@@ -30,12 +30,15 @@ from cdtool.ingest.parts import (
     join_topics,
     loss_findings,
     missing_part_findings,
+    named_parts,
 )
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Recording
 
+# The parts of a log in a folder; the first kind that is there is read.
+_PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
 # Opens a file of a format, for some or all of its columns.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
 
@@ -221,7 +224,7 @@ class LogFolder:
 
 def log_parts(path: Path) -> list[Path]:
     """Return the files of a log: the file itself, or those in a folder written by rosbag2; raises RecordingError."""
-    for pattern in ("*.mcap", "*.db3") if path.is_dir() else ():
+    for pattern in _PARTS if path.is_dir() else ():
         if parts := sorted(part for part in path.glob(pattern) if not part.name.startswith(".")):
             return parts
     if path.is_dir() and (lost := missing_part_findings(path, [])):
@@ -300,6 +303,11 @@ def _is_damaged_text(path: Path, encoding: str) -> bool:
     except UnicodeError:
         return True
     return False
+
+
+def is_bag_folder(path: Path) -> bool:
+    """Return whether a folder was written by rosbag2: its metadata.yaml names its parts."""
+    return path.is_dir() and bool(named_parts(path))
 
 
 def _first_time(part: Path) -> float:

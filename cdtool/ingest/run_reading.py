@@ -110,7 +110,10 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
     if later and cut.by == "column":
         findings.append(Finding(ReturningIds(later, cut.column)))
     short = np.flatnonzero(lengths < FEWEST_SAMPLES)
-    if len(short) and not pattern:
+    if pattern:
+        fits = [_fits(name, pattern) for name in segments.names(short)]
+        short = short[np.array(fits, dtype=bool)]
+    if len(short):
         left_out.append((path, _too_short(segments, short, lengths)))
     return LogRuns(tuple(runs), tuple(findings), tuple(left_out))
 
@@ -136,7 +139,7 @@ def id_source(cut: RunCut, topics: bool) -> ChannelSource:
     topic, _, field_name = cut.column.partition(" ")
     if not field_name.strip():
         raise RecordingError(
-            f"operations '{cut.by}:{cut.column}': names no field of a topic", f"write {cut.by}:TOPIC FIELD"
+            f"operations '{cut.by}:{cut.column}': does not name a field of a topic", f"write {cut.by}:TOPIC FIELD"
         )
     return ChannelSource(_ID, topic=topic, field=field_name.strip(), words=True)
 

@@ -28,8 +28,8 @@ Rows = npt.NDArray[np.intp]
 class Segments:
     """The runs of a log in order: `start` (r,) and `stop` (r,) are the first row of each and the row after its last.
 
-    `ids` (r,) are values of a column, `words` the texts that some of them stand for; `number` (r,) counts the runs with
-    the same id from 0 on.
+    `ids` (r,) are values of a column, `words` the texts that some of them stand for; `number` (r,) counts the earlier
+    runs with the same id.
     """
 
     start: Rows

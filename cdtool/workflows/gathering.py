@@ -165,8 +165,13 @@ class Gathering:
             sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
             calibration=tuple(calibration),
             skipped=tuple(self.skipped),
-            findings=(*self.findings, *unchecked(self._unchecked)),
+            findings=self._findings(),
         )
+
+    def _findings(self) -> tuple[RecordingFinding, ...]:
+        """Return all findings; one about a file of which several groups have runs is the same in each of them."""
+        findings = (*self.findings, *unchecked(self._unchecked))
+        return tuple(dict.fromkeys(findings)) if self.setup.has_runs else findings
 
     @property
     def scored(self) -> frozenset[str]:

@@ -12,7 +12,7 @@ from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
 from cdtool.findings.channels import AbsentTruth
-from cdtool.ingest.reading import read_as_logged, read_recording
+from cdtool.ingest.reading import is_bag_folder, read_as_logged, read_recording
 from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
@@ -37,12 +37,14 @@ class Runs:
 def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = False) -> list[Path]:
     """Return the logs that the patterns name below `base`, each once, in order; ConfigurationError for no match.
 
+    A log is a file, or a folder that rosbag2 wrote.
+
     With `runs`, a pattern may name runs of a log, as cycles.csv#7 or cycles.csv#free*.
     """
     found: dict[Path, None] = {}
     for pattern in patterns:
         path = base / pattern
-        matches = [path] if path.is_file() else sorted(_glob(path))
+        matches = [path] if path.is_file() or is_bag_folder(path) else sorted(_glob(path))
         if not matches and runs and "#" in pattern:
             files, _, ids = pattern.partition("#")
             matches = [Path(f"{file}#{ids}") for file in find_logs([files], base, key)]
@@ -252,5 +254,6 @@ def _glob(path: Path) -> Iterator[Path]:
     return (
         match
         for match in root.glob(pattern)
-        if all(part in written_out for part in match.parts if part.startswith(".")) and match.is_file()
+        if all(part in written_out for part in match.parts if part.startswith("."))
+        and (match.is_file() or is_bag_folder(match))
     )

@@ -573,6 +573,15 @@ SENTENCES: list[tuple[Fact, str]] = [
         ("load-cell samples are missing for 30 ms during contact 1: its peak may be larger than the one reported"),
     ),
     (
+        containers.BagNotClosed("log.db3-wal"),
+        "the bag was not closed: read from a temporary copy, with its journal log.db3-wal",
+    ),
+    (containers.DamagedRows(1), "1 row is left out: no time, topic or payload that can be read"),
+    (
+        containers.StandardDefinitions(("std_msgs/msg/Float64",)),
+        "does not contain message definitions: read as the standard ones of std_msgs/msg/Float64",
+    ),
+    (
         runs.SamplesOutsideRuns(3, 900, "run_id"),
         "3 of 900 samples belong to no run, as 'run_id' has no value there: left out",
     ),

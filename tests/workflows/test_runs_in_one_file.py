@@ -1,4 +1,4 @@
-"""Every command treats the runs of one file as recordings of their own: the same figures as from separate files."""
+"""Every command treats the runs of one file as recordings of their own: the same results as from separate files."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def figures(results) -> list[dict]:
 
 
 @pytest.mark.parametrize("operations", ['operations = "column:run_id"', '[operations]\nby = "label:run_id"'])
-def test_a_benchmark_of_runs_has_the_figures_of_separate_files(folder, separate, operations):
+def test_a_benchmark_of_runs_has_the_results_of_separate_files(folder, separate, operations):
     if operations.startswith("["):  # a table in TOML ends the keys above it
         assert "by" in operations
     done = cdtool.benchmark(benchmark_file(folder, "cut", operations, "all.csv#{}"))
@@ -103,7 +103,7 @@ def test_a_benchmark_of_runs_has_the_figures_of_separate_files(folder, separate,
     assert {trace.recording for trace in done.traces} == {row.recording for row in done.results.recordings}
 
 
-def test_a_benchmark_by_the_clock_that_starts_again_has_the_same_figures(folder, separate):
+def test_a_benchmark_by_the_clock_that_starts_again_has_the_same_results(folder, separate):
     path = benchmark_file(folder, "reset", 'operations = "clock-reset"', "all.csv#{}")
     for number, key in enumerate(("holdout_*", "stiff_*", "soft_*"), 3):
         path.write_text(path.read_text().replace(f"#{key}", f"#{number}"))
