@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.ingest.run_segments import id_text, segments_by_id, segments_by_reset
@@ -59,6 +59,7 @@ def test_an_id_is_written_with_the_digits_that_it_needs_and_without_control_char
     assert id_text(value, {-1.0: "a\x1bb"}) == text
 
 
+@settings(max_examples=40)
 @given(
     st.lists(st.integers(8, 120), min_size=1, max_size=6),
     st.floats(-1e3, 1e3),
