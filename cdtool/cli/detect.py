@@ -55,7 +55,7 @@ def detect(
     estimate_force = _force_at(contact_at, machine_file.machine) if contact_at else None
     run = _Run(
         settings,
-        _plot_names(plot, logs, force=force),
+        _plot_names(plot, logs, runs=settings.has_runs, force=force),
         estimate_force,
         skipped=[*prepared.skipped] if prepared else [],
         findings=[*prepared.losses] if prepared else [],
@@ -155,10 +155,11 @@ def _force_at(contact_at: str, machine: Machine) -> Callable[[Detection], ForceS
     return partial(summarise_force, machine=machine, contact=ContactPoint.parse(contact_at))
 
 
-def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:
+def _plot_names(plot: Path | None, logs: list[Path], *, runs: bool, force: bool) -> dict[Path, Path]:
+    """Return the plot of each log; `runs`: a log may have several runs, whose plots are in a folder."""
     if plot is None:
         return {}
-    if len(logs) == 1 and not plot.is_dir():
+    if len(logs) == 1 and not plot.is_dir() and not (runs and not plot.suffix):
         return {logs[0]: figure_name(plot, force=force)}
     if plot.suffix:
         raise UsageError(f"--plot names one file for {len(logs)} logs", "give a folder")

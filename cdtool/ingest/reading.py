@@ -325,7 +325,10 @@ def _read_head(path: Path) -> bytes:
         if path.is_dir():
             raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
         if not path.exists():
-            raise RecordingError(f"{path}: no such file", "check the path")
+            whole, mark, _ = str(path).rpartition("#")
+            is_run = mark and Path(whole).exists()
+            hint = f"for a run of {whole}, state how it is cut, e.g. --operations column:NAME" if is_run else ""
+            raise RecordingError(f"{path}: no such file", hint or "check the path")
         if not path.is_file():
             raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")
         with path.open("rb") as file:

@@ -193,10 +193,14 @@ def load_runs(
         except CdtoolError as fault:
             skipped.append(unread(path, base, fault))
             continue
-        first = by_bytes.setdefault(recording.digest, recording.name) if recording.digest else recording.name
-        if first != recording.name:
-            skipped.append(Skipped(recording.name, f"has the same content as {first}: used once"))
+        first = by_bytes.get(recording.digest)
+        if first is not None:
+            again = first == recording.name  # a run that two patterns name
+            why = "given more than once, used once" if again else f"has the same content as {first}: used once"
+            skipped.append(Skipped(recording.name, why))
             continue
+        if recording.digest:
+            by_bytes[recording.digest] = recording.name
         contacts = contacts_shown(recording, rule)
         free, touched = without_contacts(parts, contacts)
         operations.extend(free)

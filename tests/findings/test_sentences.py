@@ -55,7 +55,7 @@ SENTENCES: list[tuple[Fact, str]] = [
         clocks.BackwardStamps(3, 20, (3, 4, 5), "line", clocks.ClockRestart()),
         (
             "3 time stamps run backward (line 3, 4, 5), dropped (15 % of the rows); the clock starts again "
-            "there, or has jumped ahead before: cut the log there, or correct its stamps"
+            "there, or has jumped ahead before: cut the log there (--operations clock-reset), or correct its stamps"
         ),
     ),
     (

@@ -298,6 +298,29 @@ def test_columns_with_clocks_of_their_own_are_cut_where_each_clock_starts_again(
     assert first == [(0.0, 0.0), (100.0, 400.0), (200.0, 800.0)]
 
 
+def test_an_id_with_a_clock_of_its_own_holds_until_the_next_one(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    (tmp_path / "machine.toml").write_text(
+        MACHINE.replace('"t", unit', '"time", unit')
+        .replace('torque = { column = "tau", unit = "N m" }\n', "")
+        .replace('"w"', '"drive/w"')
+        .replace('"cell"', '"cell/f"')
+    )
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, time, values in (
+            ("drive/w", np.arange(300) / 100.0, np.arange(300.0)),
+            ("cell/f", np.arange(100) / 33.0, np.arange(100.0)),
+            ("state/run", np.array([0.5, 1.0, 1.5, 2.0]), np.array([3.0, 3.0, 8.0, 8.0])),
+        ):
+            group = file.require_group(name.partition("/")[0])
+            group["time"], file[name] = time, values
+            group["time"].attrs["unit"] = "s"
+    found = read_runs(tmp_path / "log.h5", read_machine_file(tmp_path / "machine.toml"), RunCut("column", "state/run"))
+    spans = [(run.recording.name, run.recording["speed"].values[[0, -1], 0].tolist()) for run in found.runs]
+    assert spans == [("log#3", [50.0, 149.0]), ("log#8", [150.0, 299.0])]
+    assert [run.recording["force"].values[0, 0] for run in found.runs] == [17.0, 50.0]
+
+
 @pytest.mark.parametrize("text", ["column:", "label: ", "columns:x", "clockreset", "", "column"])
 def test_another_word_for_a_cut_is_refused(text):
     with pytest.raises(UsageError):

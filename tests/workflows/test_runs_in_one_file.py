@@ -125,6 +125,25 @@ def test_a_run_that_is_learned_from_cannot_be_scored(folder, together):
         cdtool.benchmark(path)
 
 
+def test_a_run_that_is_named_twice_is_learned_from_once(folder, together):
+    path = folder / "again.toml"
+    path.write_text(together.read_text().replace('"all.csv#free_*"', '"all.csv#free_*", "all.csv#*_04"'))
+    results = cdtool.benchmark(path).results
+    assert results.provenance["learned_runs"] == ["all.csv#free_03", "all.csv#free_04"]
+    assert [(item.recording, item.reason) for item in results.skipped] == [
+        ("all.csv#free_04", "given more than once, used once")
+    ]
+
+
+def test_a_run_without_its_cut_and_a_folder_for_plots_are_understood(folder, tmp_path):
+    log = f"{folder / 'all.csv'}#stiff_03"
+    options = ("-m", folder / "machine.toml", "-d", "gm", "--limit", "400")
+    refused = command("detect", log, *options)
+    assert refused.status == 2 and "state how it is cut, e.g. --operations column:NAME" in one_line(refused.err)
+    drawn = command("detect", log, *options, "--operations", "column:run_id", "--plot", tmp_path / "plots")
+    assert drawn.status == 0 and len(list((tmp_path / "plots").iterdir())) == 1
+
+
 def test_labels_name_runs_and_one_without_a_run_is_reported(folder, together):
     labels = folder / "labels.csv"
     onset = next(
