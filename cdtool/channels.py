@@ -114,9 +114,9 @@ class ChannelMap:
     named: bool = True
 
     @property
-    def worded(self) -> frozenset[str]:
-        """Return the columns that may contain texts, by their names in the machine file."""
-        return frozenset(str(column) for source in self.sources if source.words for column in source.columns)
+    def worded(self) -> frozenset[str | int]:
+        """Return the columns that may contain texts, by their names or numbers."""
+        return frozenset(column for source in self.sources if source.words for column in source.columns)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -183,7 +183,9 @@ class _Datasets:
     datasets `worded` may contain texts, which are read as `categories`.
     """
 
-    def __init__(self, path: Path, h5py: Any, file: Any, findings: list[Finding], worded: Collection[str] = ()) -> None:
+    def __init__(
+        self, path: Path, h5py: Any, file: Any, findings: list[Finding], worded: Collection[str | int] = ()
+    ) -> None:
         self.path, self.h5py, self.findings = path, h5py, findings
         self.categories: dict[str, Categories] = {}
         self._worded = worded

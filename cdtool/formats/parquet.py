@@ -71,7 +71,7 @@ class _ArrowTable:
     The columns `worded` may contain texts, which are read as categories.
     """
 
-    def __init__(self, path: Path, arrow: Any, findings: list[Finding], worded: Collection[str] = ()) -> None:
+    def __init__(self, path: Path, arrow: Any, findings: list[Finding], worded: Collection[str | int] = ()) -> None:
         self.path, self.arrow, self.findings = path, arrow, findings
         self.rows = 0
         with path.open("rb") as file:

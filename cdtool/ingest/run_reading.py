@@ -135,7 +135,8 @@ def _too_short(segments: Segments, short: Rows, lengths: Rows) -> str:
 def id_source(cut: RunCut, topics: bool) -> ChannelSource:
     """Return the source of the ids of a cut; raises RecordingError if topics have no such field or no such cut."""
     if not topics:
-        return ChannelSource(_ID, (cut.column,), words=True)
+        column = int(cut.column) if cut.column.isdecimal() else cut.column  # a number as in [channels]
+        return ChannelSource(_ID, (column,), words=True)
     topic, _, field_name = cut.column.partition(" ")
     if not field_name.strip():
         raise RecordingError(
@@ -148,7 +149,8 @@ def id_source(cut: RunCut, topics: bool) -> ChannelSource:
 class _CutLog:
     """The columns of a log, and where its runs are.
 
-    `rows` are those of each clock by run; a clock is known by its identity, that of a table by 0.
+    `rows` are those of each clock by run; a clock is known by its identity, that of a table by 0. `begins` (r,) is when
+    the runs begin [s], where ids have a clock of their own.
     """
 
     path: Path
@@ -159,6 +161,7 @@ class _CutLog:
     files: tuple[Path, ...]
     segments: Segments
     rows: Mapping[int, _RunRows] = field(default_factory=dict)
+    begins: FloatArray | None = None
 
     @classmethod
     def of(cls, path: Path, machine_file: MachineFile, cut: RunCut) -> _CutLog:
@@ -198,7 +201,7 @@ class _CutLog:
         begins = time[segments.start]
         ends = np.append(time, np.inf)[segments.stop]
         rows = {id(clock): _RunRows.between(clock, begins, ends) for clock in self._clocks()}
-        return replace(self, segments=segments, rows=rows)
+        return replace(self, segments=segments, rows=rows, begins=begins)
 
     def _by_reset(self) -> _CutLog:
         if any(item.topic for item in self.channels.sources):
@@ -260,7 +263,8 @@ class _CutLog:
             columns[key] = replace(column, values=rows.of(column.values, run), time=time)
         if first_row and 0 in self.rows:
             first_row += int(self.segments.start[run])
-        part = replace(source, path=path, columns=columns, first_row=first_row, findings=())
+        columns, origin = self._from_start(run, columns)
+        part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=())
         channels, absent = self._present(columns)
         mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
         part = replace(part, findings=tuple(absent))
@@ -269,6 +273,31 @@ class _CutLog:
         factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
         details = in_words(source.details, source.topics)
         return LoggedRecording(recording, factors, channels.speed_low_pass, source.format, details, source.dialect)
+
+    def _from_start(self, run: int, columns: dict[str, Column]) -> tuple[dict[str, Column], float]:
+        """Return the columns of a run with times from its own start if the log counts from its start; the new origin.
+
+        A message's time, and one that counts from an epoch, then is what it is in a file with this run alone.
+        """
+        time, origin = self.channels.time, self.source.origin
+        if not self.channels.topics:
+            if not origin or time.column is None:
+                return columns, origin
+            clock = columns[time.key]
+            first = float(next(iter(clock.values[np.isfinite(clock.values)]), 0.0))
+            columns = columns | {time.key: replace(clock, values=clock.values - first)}
+            return columns, origin + first * time.factor
+        if not origin and not any(item.topic for item in self.channels.sources):
+            return columns, origin
+        starts = [float(column.time[0]) for column in columns.values() if column.time is not None and len(column.time)]
+        first = float(self.begins[run]) if self.begins is not None else min(starts, default=0.0)
+        shifted: dict[int, FloatArray] = {}
+        for key, column in columns.items():
+            if column.time is not None:
+                if id(column.time) not in shifted:
+                    shifted[id(column.time)] = column.time - first
+                columns[key] = replace(column, time=shifted[id(column.time)])
+        return columns, origin + first
 
     def _present(self, columns: Mapping[str, Column]) -> tuple[ChannelMap, list[Finding]]:
         """Return the map without ground truth that has no sample in a run, each with a note."""
@@ -303,7 +332,7 @@ class _CutLog:
         return RecordingError(
             f"{self.path}: none of {counted(len(self.segments), 'run')} by {_described(self.cut)} has "
             f"{FEWEST_SAMPLES} samples: the longest has {longest}",
-            "name a column whose value stays the same during a run",
+            "see cdtool info" if self.cut.by == "clock-reset" else "name a column whose value stays the same in a run",
         )
 
 

@@ -185,6 +185,32 @@ def test_a_wrong_column_is_an_error_with_the_next_step(tmp_path, machine, cut, w
         read_runs(log, machine, cut)
 
 
+EPOCHS = [
+    ("%s", lambda time: f"{time:.3f}", 's"'),
+    ("ms", lambda time: f"{1000 * time:.0f}", 'ms"'),
+    ("dates", lambda time: str(np.datetime64(round(time * 1000), "ms")).replace("T", " "), 's"'),
+]
+
+
+@pytest.mark.parametrize(("name", "stamp", "unit"), EPOCHS, ids=[name for name, *_ in EPOCHS])
+@pytest.mark.parametrize("apart", [3600.0, -86400.0])
+def test_the_time_of_a_run_counts_from_its_own_start_if_the_clock_counts_from_an_epoch(
+    tmp_path, name, stamp, unit, apart
+):
+    (tmp_path / "machine.toml").write_text(MACHINE.replace('"t", unit = "s"', f'"t", unit = "{unit}'))
+    machine = read_machine_file(tmp_path / "machine.toml")
+    starts = [1_700_000_000.0 + apart * run for run in range(3)]
+    lines = [f"{stamp(begin + k / 100)},{k},1,0,{run}" for run, begin in enumerate(starts) for k in range(ROWS)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(["t,w,tau,cell,run_id", *lines, ""]))
+    cuts = [RunCut("column", "run_id"), RunCut("column", "4")]
+    for cut in [*cuts, RunCut("clock-reset")] if apart < 0.0 else cuts:
+        found = read_runs(log, machine, cut).runs
+        assert [run.recording.origin for run in found] == pytest.approx(starts, abs=1e-6)
+        for run in found:
+            np.testing.assert_allclose(run.recording["speed"].time, np.arange(ROWS) / 100, atol=1e-6)
+
+
 def test_a_rate_in_place_of_a_clock_cannot_start_again(tmp_path):
     path = tmp_path / "machine.toml"
     text = MACHINE.replace('{ column = "t", unit = "s" }', "{ rate_hz = 100 }")
@@ -224,7 +250,8 @@ def bag(path: Path, start: float = 0.0, ids: tuple[tuple[float, float], ...] = (
 def test_the_id_of_a_topic_holds_from_its_message_to_the_next_one(tmp_path, machine):
     found = read_runs(bag(tmp_path / "log.mcap"), machine, RunCut("column", "/run data"))
     spans = [(item.recording.name, item.recording["speed"].time[[0, -1]].round(6).tolist()) for item in found.runs]
-    assert spans == [("log#1", [0.2, 0.99]), ("log#2", [1.0, 1.99]), ("log#1/2", [2.0, 2.99])]
+    assert spans == [("log#1", [0.0, 0.79]), ("log#2", [0.0, 0.99]), ("log#1/2", [0.0, 0.99])]
+    assert [round(item.recording.origin, 6) for item in found.runs] == [0.2, 1.0, 2.0]
     assert [sorted(item.recording.channels) for item in found.runs] == [["force", "speed"], ["speed"], ["speed"]]
     assert "absent_truth" in [item.kind for item in found.runs[1].recording.findings]
     outside = [(item.channel, item.fact.count) for item in found.findings if item.kind == "samples_outside_runs"]
@@ -241,10 +268,10 @@ def test_a_run_may_continue_in_the_next_part_of_a_log(tmp_path, machine):
     found = read_runs(folder, read_machine_file(tmp_path / "machine.toml"), RunCut("column", "/run data"))
     spans = [(item.recording.name, item.recording["speed"].time[[0, -1]].round(6).tolist()) for item in found.runs]
     assert spans == [
-        ("bag#1", [0.2, 0.99]),
-        ("bag#2", [1.0, 1.99]),
-        ("bag#1/2", [2.0, 3.99]),
-        ("bag#5", [4.0, 5.99]),
+        ("bag#1", [0.0, 0.79]),
+        ("bag#2", [0.0, 0.99]),
+        ("bag#1/2", [0.0, 1.99]),
+        ("bag#5", [0.0, 1.99]),
     ]
 
 
