@@ -43,15 +43,25 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
     """
     found: dict[Path, None] = {}
     for pattern in patterns:
-        path = base / pattern
-        matches = [path] if path.is_file() or is_bag_folder(path) else sorted(_glob(path))
-        if not matches and runs and "#" in pattern:
-            files, _, ids = pattern.partition("#")
-            matches = [Path(f"{file}#{ids}") for file in find_logs([files], base, key)]
-        if not matches:
-            raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", "check the path")
-        found.update(dict.fromkeys(matches))
+        matches = _matches(base / pattern)
+        of_runs = [] if matches else _runs_matching(pattern, base)
+        if not matches and not (runs and of_runs):
+            hint = 'to name runs of a file, set operations = "column:NAME"' if of_runs else "check the path"
+            raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", hint)
+        found.update(dict.fromkeys(matches or of_runs))
     return list(found)
+
+
+def _matches(path: Path) -> list[Path]:
+    return [path] if path.is_file() or is_bag_folder(path) else sorted(_glob(path))
+
+
+def _runs_matching(pattern: str, base: Path) -> list[Path]:
+    """Return FILE#IDS for each file that the part before a # names; a file name may contain the mark, too."""
+    for place in (i for i, character in enumerate(pattern) if character == "#"):
+        if files := _matches(base / pattern[:place]):
+            return [Path(f"{file}{pattern[place:]}") for file in files]
+    return []
 
 
 def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: PlausibleRanges | None = None) -> Recording:

@@ -11,6 +11,7 @@ import pytest
 import cdtool
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.results_file import to_json
+from cdtool.workflows.runs import find_logs
 from tests.command import cdtool as command
 from tests.command import one_line
 
@@ -142,6 +143,21 @@ def test_a_run_without_its_cut_and_a_folder_for_plots_are_understood(folder, tmp
     assert refused.status == 2 and "state how it is cut, e.g. --operations column:NAME" in one_line(refused.err)
     drawn = command("detect", log, *options, "--operations", "column:run_id", "--plot", tmp_path / "plots")
     assert drawn.status == 0 and len(list((tmp_path / "plots").iterdir())) == 1
+
+
+def test_runs_are_named_only_where_logs_are_cut_and_the_file_may_contain_the_mark(folder, tmp_path):
+    path = benchmark_file(folder, "uncut", "", "all.csv#{}")
+    with pytest.raises(ConfigurationError, match=r"no file matches 'all\.csv#free_\*' .*set operations = "):
+        cdtool.benchmark(path)
+    (tmp_path / "a#1.csv").touch()
+    (tmp_path / "b.csv").touch()
+    assert find_logs(["a#1.csv#7*", "a#1.csv", "?.csv#x"], tmp_path, "logs", runs=True) == [
+        tmp_path / "a#1.csv#7*",
+        tmp_path / "a#1.csv",
+        tmp_path / "b.csv#x",
+    ]
+    with pytest.raises(ConfigurationError, match=r"no file matches 'c\.csv#7' .*check the path"):
+        find_logs(["c.csv#7"], tmp_path, "logs", runs=True)
 
 
 def test_labels_name_runs_and_one_without_a_run_is_reported(folder, together):
