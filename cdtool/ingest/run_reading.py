@@ -47,10 +47,25 @@ class LogRuns:
 
 
 def split_run(log: Path) -> tuple[Path, str]:
-    """Return the file of LOG#ID and the id, which may be a pattern with `*`; the id is empty for a whole log.
+    """Return the file of LOG#ID, and the id.
 
-    >>> split_run(Path("cycles.csv#7*"))
-    (PosixPath('cycles.csv'), '7*')
+    Parameters
+    ----------
+    log : Path
+        A log, or LOG#ID. A file whose name contains the mark is a log.
+
+    Returns
+    -------
+    file : Path
+        The log.
+    ids : str
+        The id of a run, or a pattern such as `free*`; empty for a whole log.
+
+    Examples
+    --------
+    >>> file, ids = split_run(Path("cycles.csv#7*"))
+    >>> file.name, ids
+    ('cycles.csv', '7*')
     """
     text = str(log)
     if log.exists() or _MARK not in text:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ _RESTART_ROWS = 3
 _RETURN = 0.5
 # Widths [bits] of counters that wrap instead of starting again.
 _COUNTER_BITS = (16, 32)
+_SLASHES = re.compile(r"[/\\]+")
 # Length of an id in names [characters].
 _LONGEST = 60
 
@@ -59,11 +61,13 @@ class Segments:
 def id_text(value: float, words: Mapping[float, str]) -> str:
     """Return an id as text: its words, or its number with as many digits as it needs.
 
-    >>> id_text(3.0, {}), id_text(0.1, {}), id_text(-1.0, {-1.0: "run_A"})
-    ('3', '0.1', 'run_A')
+    A name that contains the text is treated like a path, so that slashes are replaced.
+
+    >>> id_text(3.0, {}), id_text(0.1, {}), id_text(-1.0, {-1.0: "run_A"}), id_text(-1.0, {-1.0: "push/hard"})
+    ('3', '0.1', 'run_A', 'push_hard')
     """
     if value in words:
-        return shorten(plain(words[value]), _LONGEST)
+        return shorten(plain(_SLASHES.sub("_", words[value].strip())), _LONGEST)
     short = f"{value:.15g}"
     return short if float(short) == value else f"{value:.17g}"
 

@@ -47,9 +47,10 @@ def test_missing_ids_are_bridged_only_between_equal_ids():
     assert spans(segments_by_id(ids, {}, False)) == [(1, 2), (3, 4), (5, 6)]
 
 
-def test_a_text_that_looks_like_a_second_run_has_a_name_of_its_own():
-    words = {-1.0: "A", -2.0: "A/2"}
-    assert names(segments_by_id(np.array([-1.0, -2.0, -1.0, -2.0]), words, True)) == ["A", "A/2", "A/3", "A/2/2"]
+def test_texts_that_would_have_the_same_name_have_names_of_their_own():
+    words = {-1.0: "A", -2.0: "A/2", -3.0: " A_2", -4.0: "..\\A"}
+    assert names(segments_by_id(np.array([-2.0, -3.0, -4.0]), words, True)) == ["A_2", "A_2/2", ".._A"]
+    assert names(segments_by_id(np.array([-1.0, -2.0, -1.0, -2.0]), words, True)) == ["A", "A_2", "A/2", "A_2/2"]
 
 
 @pytest.mark.parametrize(
