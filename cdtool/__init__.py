@@ -10,7 +10,9 @@ Every command is available as a function:
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
+        cdtool.detect_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
     cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
+        cdtool.explain_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
     cdtool.benchmark("benchmark.toml")                                  -> Benchmark
     cdtool.score("triggers.csv", "benchmark.toml")                      -> Score
     cdtool.compare("old.json", "new.json")                              -> BuildComparison
@@ -33,8 +35,8 @@ if TYPE_CHECKING:
     from cdtool.workflows.benchmark.benchmark import benchmark
     from cdtool.workflows.comparing import compare
     from cdtool.workflows.convert.converting import convert
-    from cdtool.workflows.detection import detect
-    from cdtool.workflows.explaining import explain
+    from cdtool.workflows.detection import detect, detect_runs
+    from cdtool.workflows.explaining import explain, explain_runs
     from cdtool.workflows.information import info
     from cdtool.workflows.init.drafting import init
     from cdtool.workflows.planning import plan
@@ -53,7 +55,9 @@ _API = {
     "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
     "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
     "detect": "cdtool.workflows.detection:detect",
+    "detect_runs": "cdtool.workflows.detection:detect_runs",
     "explain": "cdtool.workflows.explaining:explain",
+    "explain_runs": "cdtool.workflows.explaining:explain_runs",
     "benchmark": "cdtool.workflows.benchmark.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
     "convert": "cdtool.workflows.convert.converting:convert",
@@ -74,7 +78,9 @@ __all__ = [
     "compare",
     "convert",
     "detect",
+    "detect_runs",
     "explain",
+    "explain_runs",
     "info",
     "init",
     "learn_signature",

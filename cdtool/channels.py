@@ -68,7 +68,8 @@ class ChannelSource:
     """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
-    `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns).
+    `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns). `words`: the
+    column may contain texts, which are read as categories.
 
     A force may be a vector: `columns`, or `fields`, each of one of the `topics`, are then its axes. `direction` (axes,)
     is a unit vector: the force is the component along it; without one it is the magnitude. It may be in a file of its
@@ -93,6 +94,7 @@ class ChannelSource:
     direction: tuple[float, ...] = ()
     own_file: OwnFile | None = None
     kinds: tuple[tuple[float, str], ...] = ()
+    words: bool = False
 
     @property
     def described(self) -> str:
@@ -180,6 +182,11 @@ class ChannelMap:
     pins: TablePins = TablePins()
     named: bool = True
     beside: tuple[ChannelSource, ...] = ()
+
+    @property
+    def worded(self) -> frozenset[str | int]:
+        """Return the columns that may contain texts, by their names or numbers."""
+        return frozenset(column for source in self.sources if source.words for column in source.columns)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

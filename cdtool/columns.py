@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.recording import FloatArray
+
+# Codes are integers from -2^52 down by less than 2^48: float64 represents integers down to -2^53 exactly.
+_FIRST_CODE, _CODE_BYTES = 2**52, 6
 
 
 def as_float64(values: npt.ArrayLike) -> FloatArray:
@@ -25,13 +29,39 @@ def as_float64(values: npt.ArrayLike) -> FloatArray:
 class Column:
     """One stream of numbers: `values` (n,) or (n, k) as in the file.
 
-    `time` (n,) [s] if the format has a time per message, else None (in a table the clock is a column).
+    `time` (n,) [s] if the format has a time per message, else None (in a table the clock is a column). `words` are the
+    texts of a column of categories by the numbers that stand for them (`Categories`).
     """
 
     name: str
     values: FloatArray
     time: FloatArray | None = None
     unit: str | None = None
+    words: Mapping[float, str] = field(default_factory=dict)
+
+
+class Categories:
+    """Numbers for the texts of a column.
+
+    The number of a text depends on nothing else, so that several threads may read a column. They are integers below
+    every number that a log contains, so that a column may have texts and numbers.
+    """
+
+    def __init__(self) -> None:
+        self._codes: dict[str, float] = {}
+
+    def code(self, text: str) -> float:
+        """Return the number of a text; the same text has the same number."""
+        code = self._codes.get(text)
+        if code is None:
+            digest = hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=_CODE_BYTES).digest()
+            code = self._codes[text] = -float(_FIRST_CODE + int.from_bytes(digest, "big"))
+        return code
+
+    @property
+    def words(self) -> dict[float, str]:
+        """Return the texts by their numbers."""
+        return {code: text for text, code in self._codes.items()}
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,8 @@
 """Divide a recording into operations (strokes), by motion or by a trigger, with class of direction and speed.
 
+A log that contains several runs is cut into recordings before, see `RunCut` and `ingest.run_reading`; each of them is
+one operation.
+
 An operation keeps the recording's time. This analysis uses the whole recording, for learning, scoring and naming. No
 verdict depends on it: a detector runs over the whole log, and for its thresholds the start of a stroke is determined
 from earlier samples only (`motion.strokes`).
@@ -10,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +25,8 @@ from cdtool.motion import MotionClass, leading_joint, motion_class
 from cdtool.recording import BoolArray, FloatArray, Recording
 
 HOW_TO_CUT = ("whole", "motion", "trigger")
+# The forms of a cut into runs, for messages.
+_RUN_CUTS = ("column:NAME", "clock-reset", "label:NAME")
 
 # A larger speed counts as this one, so that the quantile is finite.
 _LARGEST = float(np.finfo(np.float64).max)
@@ -57,14 +63,45 @@ class Operation:
         return self.recording.name
 
 
+@dataclass(frozen=True)
+class RunCut:
+    """How a log is cut into runs, each of which is a recording of its own with its own clock.
+
+    By a `column` of ids, by a column of labels (where the same label again is another run), or where the clock starts
+    again. In a log of messages, `column` is a topic and a field with a blank between them.
+    """
+
+    by: Literal["column", "label", "clock-reset"]
+    column: str = ""
+
+    @classmethod
+    def of(cls, operations: str) -> RunCut | None:
+        """Return the cut that `operations` states; None if it does not cut a log into runs.
+
+        Raises UsageError for an unknown word, or if the column's name is missing.
+
+        >>> RunCut.of("column:run_id"), RunCut.of("motion")
+        (RunCut(by='column', column='run_id'), None)
+        """
+        if operations in HOW_TO_CUT:
+            return None
+        if operations == "clock-reset":
+            return cls("clock-reset")
+        by, colon, column = operations.partition(":")
+        if by in ("column", "label") and colon:
+            if not column.strip():
+                raise UsageError(f"operations '{operations}' names no column", f"write {by}:NAME")
+            return cls("column" if by == "column" else "label", column.strip())
+        raise UsageError(f"unknown operations '{operations}'", nearest(operations, (*HOW_TO_CUT, *_RUN_CUTS)))
+
+
 def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
     """Return the operations of a recording: the whole recording, its motions, or its trigger's high phases.
 
-    Raises UsageError for an unknown method, RecordingError if a required channel is missing or no operation is found.
+    A recording that is a run is one operation. Raises UsageError for an unknown method, RecordingError if a required
+    channel is missing or no operation is found.
     """
-    if how not in HOW_TO_CUT:
-        raise UsageError(f"unknown operations '{how}'", nearest(how, HOW_TO_CUT))
-    if how == "whole":
+    if how == "whole" or RunCut.of(how) is not None:
         return [Operation(recording, motion_class(recording))]
     spans: Sequence[tuple[float, float]] = motion_spans(recording) if how == "motion" else _trigger_spans(recording)
     if not spans:

@@ -17,7 +17,7 @@ from cdtool.errors import OutputError, SignatureError, UsageError
 from cdtool.file_kinds import kind_of
 from cdtool.files import locked, write_text
 from cdtool.foreign_files import Kind
-from cdtool.operations import HOW_TO_CUT
+from cdtool.operations import HOW_TO_CUT, RunCut
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import FittedThreshold
@@ -148,12 +148,21 @@ def _from_json(values: Mapping[str, Any], source: str) -> SignatureFile:
         current=current,
         first=first,
         runs=tuple(LearnedRun(str(run["name"]), str(run["sha256"]), int(run["operation"])) for run in values["runs"]),
-        operations=known("operations", values["operations"], HOW_TO_CUT),
+        operations=_operations(values["operations"]),
         source=source,
         plausible=PlausibleRanges.from_dict(values["plausible"]) if values.get("plausible") else None,
         normal=None if normal is None else tuple(NormalMotion.from_dict(item) for item in normal),
         machine_parameters=_parameters(values["machine"].get("parameters")),
     )
+
+
+def _operations(value: object) -> str:
+    try:
+        if isinstance(value, str) and RunCut.of(value) is not None:
+            return value
+    except UsageError:
+        pass
+    return known("operations", value, HOW_TO_CUT)
 
 
 def _check_fitted(current: Sequence[FittedThreshold], first: Sequence[FittedThreshold], joints: Sequence[str]) -> None:

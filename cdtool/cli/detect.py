@@ -55,10 +55,11 @@ def detect(
     estimate_force = _force_at(contact_at, machine_file.machine) if contact_at else None
     run = _Run(
         settings,
-        _plot_names(plot, logs, force=force),
+        _plot_names(plot, logs, runs=settings.has_runs, force=force),
         estimate_force,
         skipped=[*prepared.skipped] if prepared else [],
         findings=[*prepared.losses] if prepared else [],
+        into_folder=plot is not None and (plot.is_dir() or not plot.suffix),
     )
     folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
     with folder, progress("detecting") as advance:
@@ -89,24 +90,43 @@ class _Run:
     estimate_force: Callable[[Detection], ForceSummary] | None
     skipped: list[Skipped]
     findings: list[RecordingFinding]
+    into_folder: bool = False
+    plotted: list[Path] = field(default_factory=list)
     done: list[tuple[Path, Detected]] = field(default_factory=list)
     forces: dict[str, ForceSummary] = field(default_factory=dict)
 
     def add(self, log: Path) -> None:
-        """Run detection on one log and draw its plot; raises CdtoolError."""
-        from cdtool.workflows.detection import detect_log
+        """Run detection on one log, or on each of its runs, and draw the plots; raises CdtoolError."""
+        from cdtool.workflows.detection import detect_log_runs
         from cdtool.workflows.runs import lost
 
-        found = detect_log(log, self.settings)
-        if self.estimate_force:
-            self.forces |= {item.operation: item for item in map(self.estimate_force, found.detections)}
-        self.done.append((log, found))
-        self.skipped += found.not_scored
-        self.findings += [*lost(found.recording), *found.findings]
-        if self.plot_names:
-            from cdtool.report.plots.detection_plot import plot_detected
+        detected = detect_log_runs(log, self.settings)
+        self.skipped += detected.skipped
+        self.findings += detected.findings
+        plots = self._plots(log, len(detected.runs))
+        is_cut = self.settings.has_runs
+        for number, found in enumerate(detected.runs):
+            if self.estimate_force:
+                self.forces |= {item.operation: item for item in map(self.estimate_force, found.detections)}
+            self.done.append((Path(found.recording.source) if is_cut else log, found))
+            self.skipped += found.not_scored
+            self.findings += [*lost(found.recording), *found.findings]
+            if plots:
+                from cdtool.report.plots.detection_plot import plot_detected
 
-            plot_detected(found, self.plot_names[log])
+                plot_detected(found, plots[number])
+                self.plotted.append(plots[number])
+
+    def _plots(self, log: Path, runs: int) -> list[Path]:
+        """Return the plot of each run of a log; raises UsageError if one file is named for several runs."""
+        if not self.plot_names:
+            return []
+        name = self.plot_names[log]
+        if runs == 1:
+            return [name]
+        if not self.into_folder:
+            raise UsageError(f"--plot names one file for {runs} runs", "give a folder, or name one run as LOG#ID")
+        return [name.with_name(f"{name.stem}_{number:03d}{name.suffix}") for number in range(1, runs + 1)]
 
     def show(self, *, as_json: bool) -> None:
         """Print the results and exit with their status."""
@@ -124,9 +144,8 @@ class _Run:
             print_json(as_rows(self.done, self.forces))
         else:
             show_detected([found for _, found in self.done], self.forces)
-            for log, _ in self.done:
-                if log in self.plot_names:
-                    typer.echo(f"plot written to {plain(self.plot_names[log])}")
+            for plot in self.plotted:
+                typer.echo(f"plot written to {plain(plot)}")
         leave(self.skipped, self.findings, print_not_assessable((str(log), found) for log, found in self.done))
 
 
@@ -136,10 +155,11 @@ def _force_at(contact_at: str, machine: Machine) -> Callable[[Detection], ForceS
     return partial(summarise_force, machine=machine, contact=ContactPoint.parse(contact_at))
 
 
-def _plot_names(plot: Path | None, logs: list[Path], *, force: bool) -> dict[Path, Path]:
+def _plot_names(plot: Path | None, logs: list[Path], *, runs: bool, force: bool) -> dict[Path, Path]:
+    """Return the plot of each log; `runs`: a log may have several runs, whose plots are in a folder."""
     if plot is None:
         return {}
-    if len(logs) == 1 and not plot.is_dir():
+    if len(logs) == 1 and not plot.is_dir() and not (runs and not plot.suffix):
         return {logs[0]: figure_name(plot, force=force)}
     if plot.suffix:
         raise UsageError(f"--plot names one file for {len(logs)} logs", "give a folder")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -44,34 +45,39 @@ def explain(
 
     Example: cdtool explain stiff/01.csv --machine machine.toml --signature gate.feekf.json --plot why.png
     """
-    from cdtool.workflows.explaining import explain_log
+    from cdtool.workflows.explaining import explain_log_runs
     from cdtool.workflows.runs import lost
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
     settings = options.settings()
-    explained = explain_log(log, settings)
+    explained = explain_log_runs(log, settings)
     prepared = settings.prepared()
-    found = explained.found
-    skipped = [*(prepared.skipped if prepared else ()), *found.not_scored]
-    findings = [*(prepared.losses if prepared else ()), *lost(found.recording), *found.findings]
+    runs = [(run.found.recording.source if settings.has_runs else str(log), run) for run in explained.runs]
+    skipped = [*(prepared.skipped if prepared else ()), *explained.skipped]
+    skipped += [item for run in explained.runs for item in run.found.not_scored]
+    findings = [*(prepared.losses if prepared else ()), *explained.findings]
+    for run in explained.runs:
+        findings += [*lost(run.found.recording), *run.found.findings]
     print_skipped(skipped, findings)
     if as_json:
-        print_json(_as_json_value(log, explained))
+        values = [_as_json_value(name, run) for name, run in runs]
+        print_json(values if settings.has_runs else values[0])
     else:
-        _show_explained(explained)
-    for path in _draw(explained, drawn, log.stem, force=force):
+        for _, run in runs:
+            _show_explained(run)
+    for path in _draw(explained.runs, drawn, log.stem, force=force):
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
-    leave(skipped, findings, print_not_assessable([(str(log), found)]))
+    leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))
 
 
-def _draw(explained: Explained, plot: Path | None, stem: str, *, force: bool) -> list[Path]:
+def _draw(runs: Sequence[Explained], plot: Path | None, stem: str, *, force: bool) -> list[Path]:
     """Draw the first event into a file, or each event into a folder; return the files written."""
     if plot is None:
         return []
     from cdtool.report.plots.margin_plot import plot_explanation
 
-    events = explained.events[: _SHOWN if plot.is_dir() else 1]
+    events = [event for run in runs for event in run.events][: _SHOWN if plot.is_dir() else 1]
     paths = [plot / f"{i:03d}_{stem}.png" if plot.is_dir() else plot for i in range(1, len(events) + 1)]
     paths = [figure_name(path, force=force) for path in paths]
     for (detection, item), path in zip(events, paths, strict=True):
@@ -127,14 +133,14 @@ def _show_event(item: Explanation) -> None:
     typer.echo()
 
 
-def _as_json_value(log: Path, explained: Explained) -> dict[str, Any]:
+def _as_json_value(log: str, explained: Explained) -> dict[str, Any]:
     """Return the same as JSON values."""
     from cdtool.cli.contact_rows import contact_as_json
     from cdtool.evaluation.explanation.explanation import AlarmExplanation
 
     items = [item for _, item in explained.events]
     return {
-        "log": str(log),
+        "log": log,
         "verdicts": [
             {"operation": item.operation.name, "verdict": item.verdict.outcome, "reason": item.verdict.reason or None}
             for item in explained.found.detections

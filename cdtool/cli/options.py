@@ -22,7 +22,8 @@ OperationsOption = Annotated[
     str,
     typer.Option(
         "--operations",
-        help="How to divide a log into operations: whole (one per file), motion, or trigger (a channel).",
+        help="How to divide a log into operations: whole (one per file), motion, or trigger (a channel). Into runs, as "
+        "recordings of their own: column:NAME (of ids), label:NAME, or clock-reset.",
         autocompletion=completions.operations,
     ),
 ]

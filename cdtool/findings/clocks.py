@@ -111,7 +111,10 @@ class ClockRestart:
 
     def __str__(self) -> str:
         if not self.wrapped_bits:
-            return "the clock starts again there, or has jumped ahead before: cut the log there, or correct its stamps"
+            return (
+                "the clock starts again there, or has jumped ahead before: cut the log there (--operations "
+                "clock-reset), or correct its stamps"
+            )
         return (
             f"the counter of {self.wrapped_bits} bits wraps there: log a wider one, "
             f"or add {2**self.wrapped_bits} to the stamps from each wrap on"

@@ -6,7 +6,7 @@ from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.frozen import frozen
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, first_of
 
 
 @frozen
@@ -127,6 +127,37 @@ class BagDamaged(TemplateFact):
     reason: str
 
     words = "the bag is damaged: {reason}"
+
+
+@frozen
+class BagNotClosed(TemplateFact):
+    """A database has a journal beside it: the bag was not closed, or is still being written."""
+
+    journal: str
+
+    words = "the bag was not closed: read from a temporary copy, with its journal {journal}"
+
+
+@frozen
+class DamagedRows(Fact):
+    """Rows of a bag that are no messages: without a time, a topic or a payload, or damaged as they were compressed."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return f"{counted(self.count, 'row', 'are')} left out: no time, topic or payload that can be read"
+
+
+@frozen
+class StandardDefinitions(Fact):
+    """A bag without definitions of its messages, of which these types are standard ones."""
+
+    types: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """Return the types."""
+        return f"does not contain message definitions: read as the standard ones of {first_of(self.types)}"
 
 
 @frozen

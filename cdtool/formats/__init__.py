@@ -31,6 +31,7 @@ FORMATS = Registry(
         "mdf": "cdtool.formats.mdf:Mdf",
         "tdms": "cdtool.formats.tdms:Tdms",
         "rosbag": "cdtool.formats.rosbag:Rosbag",
+        "rosbag2": "cdtool.formats.rosbag2:Rosbag2",
     },
     contract=("name", "suffixes", "sniff", "columns"),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
-from cdtool.columns import as_float64
+from cdtool.columns import Categories, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import ClocksWithoutUnit, UnusableClock
@@ -156,7 +156,7 @@ class Hdf5(PiecewiseFormat):
             raise RecordingError(f"{path}: is not an HDF5 file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "an HDF5 file"), h5py.File(path, "r") as file:
-            tree = _Datasets(path, h5py, file, findings)
+            tree = _Datasets(path, h5py, file, findings, wanted.worded if wanted is not None else ())
             names = tuple(tree.locations)
             keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
             if not keys:
@@ -170,7 +170,8 @@ class Hdf5(PiecewiseFormat):
             findings += [finding for key in keys for finding in rounding_finding(key, tree.rounded[key])]
             findings += tree.clocks_without_unit()
             origin += float(file.attrs.get("cdtool.origin_s", 0.0))
-        headers = {column.name: header_of(column) for column in columns}
+        words = {key: each.words for key, each in tree.categories.items()}
+        headers = {column.name: replace(header_of(column), words=words.get(column.name, {})) for column in columns}
         details = {"datasets": str(len(tree.datasets))}
         return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, names)
 
@@ -178,11 +179,16 @@ class Hdf5(PiecewiseFormat):
 class _Datasets:
     """The datasets of numbers of an open file.
 
-    `locations` maps a column to its dataset and, if the dataset is a matrix, to the index of the column in it.
+    `locations` maps a column to its dataset and, if the dataset is a matrix, to the index of the column in it. The
+    datasets `worded` may contain texts, which are read as `categories`.
     """
 
-    def __init__(self, path: Path, h5py: Any, file: Any, findings: list[Finding]) -> None:
+    def __init__(
+        self, path: Path, h5py: Any, file: Any, findings: list[Finding], worded: Collection[str | int] = ()
+    ) -> None:
         self.path, self.h5py, self.findings = path, h5py, findings
+        self.categories: dict[str, Categories] = {}
+        self._worded = worded
         self.datasets: dict[str, Any] = {}
         self.packings: dict[str, Packing] = {}
         self.locations: dict[str, tuple[str, int | None]] = {}
@@ -194,6 +200,10 @@ class _Datasets:
 
     def _visit(self, name: str, node: Any) -> None:
         if not isinstance(node, self.h5py.Dataset):
+            return
+        if name in self._worded and node.ndim == 1 and self.h5py.check_string_dtype(node.dtype) is not None:
+            self.datasets[name], self.packings[name], self.locations[name] = node, Packing(), (name, None)
+            self.categories[name] = Categories()
             return
         reason = _unusable(node)
         try:
@@ -223,6 +233,9 @@ class _Datasets:
         dataset, rows = self.datasets[name], self.rows(key)
 
         def values(start: int, end: int) -> FloatArray:
+            if key in self.categories:
+                texts = dataset.asstr(errors="replace")[start:end]
+                return np.array([self.categories[key].code(text) if text else np.nan for text in texts])
             numbers = self.packings[name].unpacked(_rows_of(dataset, index, start, end))
             self.rounded[key] += rounded_integers(numbers) if dataset.dtype.kind in "iu" else 0
             return numbers

@@ -11,12 +11,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap
-from cdtool.columns import Column, Piece
+from cdtool.columns import Categories, Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import StampsAsSeconds
 from cdtool.findings.containers import CutBehindRow
-from cdtool.formats.column_names import OWN_CLOCK, requested_keys, split_unit
+from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, split_unit
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.parquet_check import check_batches, check_pages
 from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
@@ -49,7 +49,7 @@ class Parquet(PiecewiseFormat):
             raise RecordingError(f"{path}: is not a Parquet or Feather file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "a Parquet or Feather file"):
-            table = _ArrowTable(path, arrow, findings)
+            table = _ArrowTable(path, arrow, findings, wanted.worded if wanted is not None else ())
             names = tuple(table.schema.names)
             keys = [key for key in requested_keys(path, wanted, names) if some is None or key in some]
             read = [key for key in keys if table.is_number(key)]
@@ -66,9 +66,12 @@ class Parquet(PiecewiseFormat):
 
 
 class _ArrowTable:
-    """Schema and rows of a file in either container; `rows` is their number after `pieces` has read them."""
+    """Schema and rows of a file in either container; `rows` is their number after `pieces` has read them.
 
-    def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
+    The columns `worded` may contain texts, which are read as categories.
+    """
+
+    def __init__(self, path: Path, arrow: Any, findings: list[Finding], worded: Collection[str | int] = ()) -> None:
         self.path, self.arrow, self.findings = path, arrow, findings
         self.rows = 0
         with path.open("rb") as file:
@@ -83,11 +86,18 @@ class _ArrowTable:
         self.own_clocks = metadata.get(OWN_CLOCKS) == b"1" and OWN_CLOCK in self.schema.names
         self.origin = float(metadata.get(b"cdtool.origin_s", b"0"))
         self._starts: dict[str, Any] = {}  # of columns of time stamps
+        asked = (key for name in worded if (key := column_key(name, self.schema.names)))
+        self._categories = {key: Categories() for key in asked if self._has_texts(key)}
+
+    def _has_texts(self, key: str) -> bool:
+        types, kind = self.arrow.types, self.schema.field(key).type
+        kind = kind.value_type if types.is_dictionary(kind) else kind
+        return bool(types.is_string(kind) or types.is_large_string(kind))
 
     def is_number(self, key: str) -> bool:
-        """Return whether a column has numbers, booleans or time stamps."""
+        """Return whether a column has numbers, booleans or time stamps, or is read as categories."""
         types, kind = self.arrow.types, self.schema.field(key).type
-        return bool(
+        return key in self._categories or bool(
             types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_timestamp(kind)
         )
 
@@ -95,7 +105,8 @@ class _ArrowTable:
         """Return the columns without their rows."""
         own = np.empty(0) if self.own_clocks else None
         values = [key for key in keys if not (self.own_clocks and key == OWN_CLOCK)]
-        return {key: Column(key, np.empty(0), own, self._unit(key)) for key in values}
+        words = {key: each.words for key, each in self._categories.items()}
+        return {key: Column(key, np.empty(0), own, self._unit(key), words.get(key, {})) for key in values}
 
     def pieces(self, keys: Sequence[str]) -> Iterator[Piece]:
         """Yield the rows of these columns, one group of rows at a time."""
@@ -120,10 +131,22 @@ class _ArrowTable:
     def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
         """Return the values, and which of them are absent (null)."""
         absent = np.asarray(column.is_null().to_numpy(zero_copy_only=False))
+        if key in self._categories:
+            return self._codes(self._categories[key], column, absent), absent
         if self.arrow.types.is_timestamp(column.type):
             return self._seconds(key, column.to_numpy(zero_copy_only=False).astype("datetime64[ns]"))
         values = column.cast(self.arrow.float64(), safe=False) if absent.any() else column
         return as_numbers(key, values.to_numpy(zero_copy_only=False), self.findings), absent
+
+    def _codes(self, categories: Categories, column: Any, absent: Any) -> FloatArray:
+        """Return the codes of a column of texts; NaN where a text is missing or empty."""
+        encoded = column if self.arrow.types.is_dictionary(column.type) else column.dictionary_encode()
+        texts = encoded.dictionary.to_pylist()
+        codes = np.array([categories.code(text) if text else np.nan for text in texts], dtype=np.float64)
+        values = np.full(len(column), np.nan)
+        if len(codes):
+            values[~absent] = codes[encoded.indices.to_numpy(zero_copy_only=False)[~absent].astype(np.intp)]
+        return values
 
     def _seconds(self, key: str, stamps: Any) -> tuple[FloatArray, Any]:
         """Return time stamps as seconds after the first one, which float64 can represent, and which are absent."""

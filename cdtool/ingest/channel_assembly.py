@@ -42,10 +42,11 @@ _MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
 )
 
 
-def assemble_recording(source: Source, channels: ChannelMap, machine: Machine) -> Recording:
+def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, digest: str = "") -> Recording:
     """Return the channels in SI as logged, not yet referred to the load side; the map's columns are resolved.
 
-    Each column is removed from the source after its last use, to limit the memory in use.
+    Each column is removed from the source after its last use, to limit the memory in use. `digest` is that of the
+    content if the source is not a whole file.
     """
     work = _Assembly(source, channels)
     series = {}
@@ -76,7 +77,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine) -
                 {name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}
             ),
         ),
-        digest=file_digest(source.path),
+        digest=digest or file_digest(source.path),
         rows=work.rows,
         label_kinds=next((item.kinds for item in channels.sources if item.channel == "label"), ()),
     )

@@ -36,7 +36,7 @@ def join_digests(digests: Sequence[str]) -> str:
 def missing_part_findings(folder: Path, parts: Sequence[Path]) -> list[Finding]:
     """Return findings on files that the folder's metadata.yaml names, but that are not among its `parts`."""
     read, findings = {part.name for part in parts}, []
-    for name in _named_parts(folder / _METADATA):
+    for name in named_parts(folder):
         plain = Path(name).stem if Path(name).suffix in _COMPRESSED else name
         if name in read or plain in read:
             continue
@@ -207,12 +207,13 @@ def join_topics(parts: Sequence[Source]) -> dict[str, TopicDetails]:
     return {name: TopicDetails.of_parts(topics) for name, topics in by_name.items()}
 
 
-def _named_parts(metadata: Path) -> list[str]:
-    """Return the file names listed in `relative_file_paths`; empty without a metadata.yaml.
+def named_parts(folder: Path) -> list[str]:
+    """Return the file names listed in `relative_file_paths` of a folder's metadata.yaml; empty without this file.
 
     It is read line by line, as rosbag2 writes simple lists of strings. The first versions of rosbag2 wrote the bag's
     folder before each name.
     """
+    metadata = folder / _METADATA
     try:
         content = read_bytes(metadata, RecordingError) if metadata.is_file() else b""
     except RecordingError:  # the list is only used for a check

@@ -32,12 +32,15 @@ from cdtool.ingest.parts import (
     join_topics,
     loss_findings,
     missing_part_findings,
+    named_parts,
 )
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Recording, Series
 
+# The parts of a log in a folder; the first kind that is there is read.
+_PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
 # Opens a file of a format, for some or all of its columns.
 ReadFile = Callable[[Format, Path, Collection[str] | None], Pieces]
 
@@ -244,7 +247,7 @@ class LogFolder:
 
 def log_parts(path: Path) -> list[Path]:
     """Return the files of a log: the file itself, or those in a folder written by rosbag2; raises RecordingError."""
-    for pattern in ("*.mcap", "*.db3") if path.is_dir() else ():
+    for pattern in _PARTS if path.is_dir() else ():
         if parts := sorted(part for part in path.glob(pattern) if not part.name.startswith(".")):
             return parts
     if path.is_dir() and (lost := missing_part_findings(path, [])):
@@ -253,19 +256,26 @@ def log_parts(path: Path) -> list[Path]:
     return [path]
 
 
-def mapped_source(path: Path, machine_file: MachineFile) -> tuple[Source, ChannelMap]:
+def mapped_source(
+    path: Path, machine_file: MachineFile, also: Callable[[bool], ChannelSource] | None = None
+) -> tuple[Source, ChannelMap]:
     """Return the columns of one file that the machine file maps, and the map for them; raises RecordingError.
 
-    A mapped load cell or label that is not in the file is left out of the map, with a note.
+    A mapped load cell or label that is not in the file is left out of the map, with a note. `also` returns a further
+    column, given whether the file contains topics; it becomes the last source of the map.
     """
-    return _resolved_source(path, _map_for(choose_format(path), machine_file, path))
+    return _resolved_source(path, _map_for(choose_format(path), machine_file, path), also)
 
 
-def _resolved_source(path: Path, channels: ChannelMap) -> tuple[Source, ChannelMap]:
-    """Return the columns of one file that a map names, and the map for them; raises RecordingError."""
+def _resolved_source(
+    path: Path, channels: ChannelMap, also: Callable[[bool], ChannelSource] | None = None
+) -> tuple[Source, ChannelMap]:
+    """Return the columns of one file that a map names, with that of `also`, and the map; raises RecordingError."""
     file_format = choose_format(path)
     if has_topics(file_format) and not channels.topics:
         raise RecordingError(f"{path}: contains topics, but columns are mapped", "give a file of columns")
+    if also is not None:
+        channels = replace(channels, sources=(*channels.sources, also(channels.topics)))
     asked = fields_by_axis(channels)
     source, resolved = resolve_columns(file_format.columns(path, asked), asked)
     return with_own_clocks(*join_fields(source, resolved, channels))
@@ -327,6 +337,11 @@ def _is_damaged_text(path: Path, encoding: str) -> bool:
     return False
 
 
+def is_bag_folder(path: Path) -> bool:
+    """Return whether a folder was written by rosbag2: its metadata.yaml names its parts."""
+    return path.is_dir() and bool(named_parts(path))
+
+
 def _first_time(part: Path) -> float:
     """Return the first time of a part [s]; infinite without a message, so that the part is last."""
     pieces = read_pieces(choose_format(part), part)
@@ -342,7 +357,10 @@ def _read_head(path: Path) -> bytes:
         if path.is_dir():
             raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
         if not path.exists():
-            raise RecordingError(f"{path}: no such file", "check the path")
+            whole, mark, _ = str(path).rpartition("#")
+            is_run = mark and Path(whole).exists()
+            hint = f"for a run of {whole}, state how it is cut, e.g. --operations column:NAME" if is_run else ""
+            raise RecordingError(f"{path}: no such file", hint or "check the path")
         if not path.is_file():
             raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")
         with path.open("rb") as file:
@@ -401,4 +419,4 @@ def _joined(source: Source, item: ChannelSource) -> tuple[Column, list[Finding]]
                 "all joints of a channel must have the same clock",
                 channel=item.channel,
             )
-    return Column(item.channel, np.column_stack([part.values for part in parts]), time), []
+    return Column(item.channel, np.column_stack([part.values for part in parts]), time, words=parts[0].words), []

@@ -10,13 +10,17 @@ import numpy as np
 
 from cdtool.activation import Activation
 from cdtool.detection import Alarm
+from cdtool.detectors.base import Detector
 from cdtool.errors import RecordingError, UsageError
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import Matching, belongs, windows
 from cdtool.evaluation.truth.missing_samples import longest_step
+from cdtool.ingest.run_reading import read_runs
+from cdtool.log_section import LogSection
+from cdtool.machine_file import MachineFile
 from cdtool.motion.applicable import HOLD
-from cdtool.operations import operations_of
+from cdtool.operations import RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
@@ -29,10 +33,11 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import absent_truth, check_joints, read_named
+from cdtool.workflows.runs import absent_truth, check_joints, named_on_load_side, read_named, reported, shown_path
 
 if TYPE_CHECKING:
     from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
+    from cdtool.workflows.benchmark.scoring import Scored
 
 
 @dataclass(frozen=True)
@@ -103,86 +108,213 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     >>> 0.0 < latency < 0.2                                             # s
     True
     """
-    if benchmark := options.prepared():
-        return _detect_prepared(Path(log), benchmark)
-    machine_file = options.machine_file()
-    signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
-    if [signature is not None, bool(limit), options.warm_up is not None].count(True) != 1:
-        raise UsageError(
-            "give a signature, a limit or a warm-up", "give one of --signature FILE, --limit VALUE, --warm-up SECONDS"
-        )
-    thresholds: tuple[FittedThreshold, ...]
-    learned: set[str] = set()
-    ranges: PlausibleRanges | None = None
-    normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
-    if signature is not None:
-        from cdtool.signature_store import read_signature
-        from cdtool.workflows.signature.normal_runs import normals_of, notes_on
-
-        stored = read_signature(signature)
-        instance = machine_file.detector(detector or stored.detector)
-        stored.check(machine_file.machine, instance)
-        if joints:
-            raise UsageError(
-                "joints require a limit or a warm-up", "a signature monitors the joints that it was learned for"
-            )
-        thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
-        learned = {run.sha256 for run in stored.runs}
-        raised_by, described = stored.activation, stored.described
-        normals = normals_of(stored)
-        notes = notes_on(stored)
-    else:
-        if detector is None:
-            what = "limit" if limit else "warm-up"
-            raise UsageError(f"a {what} requires a detector", "give --detector NAME; see cdtool list detectors")
-        instance = machine_file.detector(detector)
-        check_joints(joints, machine_file.machine)
-        raised_by = Activation()
-        if options.warm_up is None:
-            thresholds = (Limit.given(limit),)
-            described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
-        else:
-            sides = machine_file.machine.default_sides
-            baseline = Baseline(warm_up=options.warm_up, sides=sides).fit([])
-            thresholds, normals = (baseline,), NormalMotions(absent=Absence.PER_RUN)
-            first = f"the first {digits(baseline.warm_up)} s in motion"
-            described = f"baseline of {first}, safety factor {baseline.safety_factor:g}"
-    stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
-    if raised_by != stored_one and signature is not None:
-        described += ", with an activation different from the file's"
-    rules = options.rules or ScoringRules()
-    whole = read_named(Path(log), machine_file, ranges=ranges, onset=rules.onset)
-    recording = options.section.of(whole)
-    parts = operations_of(recording, options.operations)
-    hold = max(HOLD, rules.window)
-    detections = tuple(detect_operations(parts, machine_file.machine, instance, thresholds, raised_by, joints, hold))
-    contacts = any_contacts(whole, rules)
-    contacts = list(options.section.contacts_of(whole, contacts)) if options.section else contacts
-    detected = DetectedLog(recording, parts, options.operations, contacts, [[item] for item in detections])
-    matched = match_log(detected, "", rules, raised_by.wait)
-    return Detected(
-        recording,
-        detections,
-        tuple(contacts),
-        tuple(item.matchings[0] for item in matched.judged),
-        described,
-        raised_by,
-        recording.digest in learned,
-        rules.window,
-        matched.contacts,
-        matched.not_scored,
-        (*matched.findings, *rules.findings, *notes),
-        normals,
-        rules.onset.described,
-    )
+    found = detect_log_runs(log, options).runs
+    if len(found) > 1:
+        ids = f"{found[0].recording.source} to {found[-1].recording.source}"
+        raise UsageError(f"{log}: has {len(found)} runs, {ids}", "name one, as LOG#ID, or call detect_runs")
+    return found[0]
 
 
 detect = by_keywords(DetectionOptions, detect_log)
 
 
-def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
+@dataclass(frozen=True)
+class DetectedRuns:
+    """The results for the runs of a log, in its order; `skipped` are runs left out, `findings` concern the log."""
+
+    runs: tuple[Detected, ...]
+    skipped: tuple[Skipped, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
+
+
+def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
+    """Run one detector over each run of a log; a log that is not cut into runs is one.
+
+    Parameters
+    ----------
+    log : str or Path
+        The log, or LOG#ID for some of its runs.
+    options : DetectionOptions
+        The machine, the detector and its threshold.
+
+    Returns
+    -------
+    DetectedRuns
+        The same as `detect` for each run, and what was left out.
+
+    Raises
+    ------
+    UsageError
+        No threshold is given, or two are.
+    SignatureError
+        The signature belongs to another machine or to other gains.
+    RecordingError
+        The log cannot be read, or has no channel that the detector needs.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> machine = "sample_logs/gate/machine.toml"
+    >>> found = cdtool.detect_runs("sample_logs/gate/stiff/03.csv", machine, detector="momentum", limit=[400.0])
+    >>> [run.detections[0].verdict.outcome for run in found.runs]
+    ['alarm']
+    """
+    path = Path(log)
+    if benchmark := options.prepared():
+        return _detect_prepared(path, benchmark)
+    cut = RunCut.of(options.operations)
+    run = _OneDetector.of(options)
+    if cut is None:
+        whole = read_named(path, run.machine_file, ranges=run.ranges, onset=run.rules.onset)
+        return DetectedRuns((run.detect(whole),))
+    logged = read_runs(path, run.machine_file, cut)
+    skipped, findings = reported(logged, path)
+    found: list[Detected] = []
+    for item in logged.runs:
+        name = shown_path(Path(item.recording.source))
+        try:
+            whole = named_on_load_side(item, Path(name), run.machine_file, None, run.ranges, run.rules.onset)
+            found.append(run.detect(whole))
+        except RecordingError as fault:
+            skipped.append(Skipped(name, str(fault).removeprefix(f"{name}: ")))
+    if not found:
+        raise RecordingError(f"{path}: no run can be used, the first: {skipped[-1].reason}", "see cdtool info")
+    return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
+
+
+detect_runs = by_keywords(DetectionOptions, detect_log_runs)
+
+
+@dataclass(frozen=True)
+class _OneDetector:
+    """A detector with its thresholds and all settings: what `detect` needs for any recording."""
+
+    machine_file: MachineFile
+    detector: Detector
+    thresholds: tuple[FittedThreshold, ...]
+    described: str
+    activation: Activation
+    joints: tuple[str, ...]
+    section: LogSection
+    operations: str
+    rules: ScoringRules
+    learned: frozenset[str]
+    ranges: PlausibleRanges | None
+    normals: NormalMotions
+    notes: tuple[RecordingFinding, ...]
+
+    @classmethod
+    def of(cls, options: DetectionOptions) -> _OneDetector:
+        """Return the detector and threshold of the options; raises what `detect` raises for wrong ones."""
+        machine_file = options.machine_file()
+        signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
+        if [signature is not None, bool(limit), options.warm_up is not None].count(True) != 1:
+            hint = "give one of --signature FILE, --limit VALUE, --warm-up SECONDS"
+            raise UsageError("give a signature, a limit or a warm-up", hint)
+        thresholds: tuple[FittedThreshold, ...]
+        learned: set[str] = set()
+        ranges: PlausibleRanges | None = None
+        normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
+        if signature is not None:
+            from cdtool.signature_store import read_signature
+            from cdtool.workflows.signature.normal_runs import normals_of, notes_on
+
+            stored = read_signature(signature)
+            instance = machine_file.detector(detector or stored.detector)
+            stored.check(machine_file.machine, instance)
+            if joints:
+                hint = "a signature monitors the joints that it was learned for"
+                raise UsageError("joints require a limit or a warm-up", hint)
+            thresholds, joints, ranges = stored.current, stored.joints, stored.plausible
+            learned = {run.sha256 for run in stored.runs}
+            raised_by, described = stored.activation, stored.described
+            normals = normals_of(stored)
+            notes = notes_on(stored)
+        else:
+            if detector is None:
+                what = "limit" if limit else "warm-up"
+                raise UsageError(f"a {what} requires a detector", "give --detector NAME; see cdtool list detectors")
+            instance = machine_file.detector(detector)
+            check_joints(joints, machine_file.machine)
+            raised_by = Activation()
+            if options.warm_up is None:
+                thresholds = (Limit.given(limit),)
+                described = f"limit {', '.join(map(digits, limit))} {instance.unit(machine_file.machine)} set by hand"
+            else:
+                sides = machine_file.machine.default_sides
+                baseline = Baseline(warm_up=options.warm_up, sides=sides).fit([])
+                thresholds, normals = (baseline,), NormalMotions(absent=Absence.PER_RUN)
+                first = f"the first {digits(baseline.warm_up)} s in motion"
+                described = f"baseline of {first}, safety factor {baseline.safety_factor:g}"
+        stored_one, raised_by = raised_by, raised_by.changed(options.activation or {})
+        if raised_by != stored_one and signature is not None:
+            described += ", with an activation different from the file's"
+        return cls(
+            machine_file,
+            instance,
+            thresholds,
+            described,
+            raised_by,
+            tuple(joints),
+            options.section,
+            options.operations,
+            options.rules or ScoringRules(),
+            frozenset(learned),
+            ranges,
+            normals,
+            tuple(notes),
+        )
+
+    def detect(self, whole: Recording) -> Detected:
+        """Return the result for a recording, or for the section of it; raises RecordingError."""
+        rules, machine = self.rules, self.machine_file.machine
+        recording = self.section.of(whole)
+        parts = operations_of(recording, self.operations)
+        hold = max(HOLD, rules.window)
+        detections = tuple(
+            detect_operations(parts, machine, self.detector, self.thresholds, self.activation, self.joints, hold)
+        )
+        contacts = any_contacts(whole, rules)
+        contacts = list(self.section.contacts_of(whole, contacts)) if self.section else contacts
+        detected = DetectedLog(recording, parts, self.operations, contacts, [[item] for item in detections])
+        matched = match_log(detected, "", rules, self.activation.wait)
+        return Detected(
+            recording,
+            detections,
+            tuple(contacts),
+            tuple(item.matchings[0] for item in matched.judged),
+            self.described,
+            self.activation,
+            recording.digest in self.learned,
+            rules.window,
+            matched.contacts,
+            matched.not_scored,
+            (*matched.findings, *rules.findings, *self.notes),
+            self.normals,
+            rules.onset.described,
+        )
+
+
+def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> DetectedRuns:
     """Return the detection as `cdtool benchmark` scores it; raises RecordingError if it leaves the log out."""
-    scored = benchmark.score(log)
+    every = benchmark.score(log)
+    skipped, findings, found = list[Skipped](), list[RecordingFinding](), list[Detected]()
+    if benchmark.setup.has_runs:
+        skipped, findings, every = every[0].skipped, every[0].findings, every[1:]
+    for scored in every:
+        detected = _detected(scored, log, benchmark)
+        if detected is None:
+            skipped += scored.skipped or [Skipped(str(log), "no operation is assessable")]
+        else:
+            found.append(detected)
+    if not found:
+        reason = skipped[0].reason if skipped else "no operation is assessable"
+        raise RecordingError(reason if str(log) in reason else f"{log}: {reason}")
+    return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
+
+
+def _detected(scored: Scored, log: Path, benchmark: PreparedBenchmark) -> Detected | None:
+    """Return the detection in a scored recording; None if it was left out."""
     matched = scored.matched
     judged = (
         [(item, rows) for item, rows in zip(matched.judged, matched.contacts, strict=True) if item.detections]
@@ -190,8 +322,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> Detected:
         else []
     )
     if scored.log is None or matched is None or not judged:
-        reason = scored.skipped[0].reason if scored.skipped else "no operation is assessable"
-        raise RecordingError(reason if str(log) in reason else f"{log}: {reason}")
+        return None
     return Detected(
         scored.log,
         tuple(item.detections[0] for item, _ in judged),

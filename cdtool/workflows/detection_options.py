@@ -11,6 +11,7 @@ from cdtool.activation import ActivationSettings
 from cdtool.errors import UsageError
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.operations import RunCut
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
 if TYPE_CHECKING:
@@ -43,7 +44,8 @@ class DetectionOptions:
     section : LogSection, optional
         The part of the log that is used; the whole log by default.
     operations : str, optional
-        How the log is cut into operations: whole, motion or trigger.
+        How the log is cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
+        clock-reset.
     activation : ActivationSettings, optional
         Settings of the activation that replace those of the signature, or the default: debounce [samples], rearm [s],
         hysteresis [share], latch.
@@ -78,6 +80,14 @@ class DetectionOptions:
         from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
 
         return prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether the log is cut into runs; a benchmark file must have been read."""
+        benchmark = self.benchmark
+        if benchmark is not None and not isinstance(benchmark, str | Path):
+            return benchmark.setup.has_runs
+        return RunCut.of(self.operations) is not None
 
     def machine_file(self) -> MachineFile:
         """Return the machine file, read; raises UsageError if none is given."""

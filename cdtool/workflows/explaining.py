@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cdtool.errors import UsageError
 from cdtool.evaluation.explanation.explanation import Explanation, explain_operation
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.machine_file import MachineFile
 from cdtool.pipeline import Detection
-from cdtool.workflows.detection import Detected, detect_log
+from cdtool.workflows.detection import Detected, detect_log_runs
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.detector_inputs import inputs_of
 from cdtool.workflows.keyword_options import by_keywords
@@ -59,12 +62,70 @@ def explain_log(log: str | Path, options: DetectionOptions) -> Explained:
     >>> [type(explanation).__name__ for _, explanation in explained.events]
     ['AlarmExplanation']
     """
+    found = explain_log_runs(log, options).runs
+    if len(found) > 1:
+        raise UsageError(f"{log}: has {len(found)} runs", "name one, as LOG#ID, or call explain_runs")
+    return found[0]
+
+
+explain = by_keywords(DetectionOptions, explain_log)
+
+
+@dataclass(frozen=True)
+class ExplainedRuns:
+    """The explanations for the runs of a log, in its order; `skipped` are runs left out, `findings` concern the log."""
+
+    runs: tuple[Explained, ...]
+    skipped: tuple[Skipped, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
+
+
+def explain_log_runs(log: str | Path, options: DetectionOptions) -> ExplainedRuns:
+    """Explain the alarms and missed contacts in each run of a log; a log that is not cut into runs is one.
+
+    Parameters
+    ----------
+    log : str or Path
+        The log, or LOG#ID for some of its runs.
+    options : DetectionOptions
+        The machine, the detector and its threshold.
+
+    Returns
+    -------
+    ExplainedRuns
+        The same as `explain` for each run, and what was left out.
+
+    Raises
+    ------
+    UsageError
+        No threshold is given, or two are.
+    SignatureError
+        The signature belongs to another machine or to other gains.
+    RecordingError
+        The log cannot be read, or has no channel that the detector needs.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> machine = "sample_logs/gate/machine.toml"
+    >>> found = cdtool.explain_runs("sample_logs/gate/stiff/03.csv", machine, detector="momentum", limit=[400.0])
+    >>> [len(run.events) for run in found.runs]
+    [1]
+    """
     if benchmark := options.prepared():
         options, machine_file = DetectionOptions(benchmark=benchmark), benchmark.setup.machine_file
     else:
         machine_file = options.machine_file()
         options = replace(options, machine=machine_file)
-    found = detect_log(log, options)
+    detected = detect_log_runs(log, options)
+    runs = tuple(_explained(found, machine_file) for found in detected.runs)
+    return ExplainedRuns(runs, detected.skipped, detected.findings)
+
+
+explain_runs = by_keywords(DetectionOptions, explain_log_runs)
+
+
+def _explained(found: Detected, machine_file: MachineFile) -> Explained:
     explanations = tuple(
         explain_operation(
             detection, matching, found.activation, inputs_of(detection.detector, machine_file), found.normals
@@ -72,6 +133,3 @@ def explain_log(log: str | Path, options: DetectionOptions) -> Explained:
         for detection, matching in zip(found.detections, found.matchings, strict=True)
     )
     return Explained(found, explanations)
-
-
-explain = by_keywords(DetectionOptions, explain_log)

@@ -24,8 +24,8 @@ from cdtool.workflows.workers import Progress, in_order
 
 # The name of its group and the path of each log.
 Logs = Sequence[tuple[str, Path]]
-# Returns the outcome of the log of a group.
-ScoreLog = Callable[[str, Path, WantedTraces], LogOutcome]
+# Returns the outcome of the log of a group, or of each of its runs.
+ScoreLog = Callable[[str, Path, WantedTraces], list[LogOutcome]]
 
 # A process receives several logs at once: sending one costs as much as a twentieth of scoring it. At the beginning and
 # the end they are few, so that no process waits for the others.
@@ -48,7 +48,7 @@ class _PieceScoring:
 
     score: ScoreLog
 
-    def __call__(self, piece: _Piece) -> list[LogOutcome]:
+    def __call__(self, piece: _Piece) -> list[list[LogOutcome]]:
         choice = piece.choice
         numbered = enumerate(piece.logs, piece.first)
         return [self.score(group, path, WantedTraces(log, choice)) for log, (group, path) in numbered]
@@ -93,8 +93,9 @@ class Gathering:
         """
         sizes = list(_sizes(len(logs), jobs))
         pieces = in_order(_PieceScoring(score), self._pieces(logs, sizes), len(sizes), jobs)
-        for log, outcome in enumerate(outcome for piece in pieces for outcome in piece):
-            self._add(log, logs[log][0], outcome)
+        for log, outcomes in enumerate(of_log for piece in pieces for of_log in piece):
+            for outcome in outcomes:
+                self._add(log, logs[log][0], outcome)
             if progress:
                 progress(log + 1, len(logs))
 
@@ -171,18 +172,35 @@ class Gathering:
             sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
             calibration=tuple(calibration),
             skipped=tuple(self.skipped),
-            findings=(*self.findings, *unchecked(self._unchecked)),
+            findings=self._findings(),
         )
 
+    def _findings(self) -> tuple[RecordingFinding, ...]:
+        """Return all findings; one about a file of which several groups have runs is the same in each of them."""
+        findings = (*self.findings, *unchecked(self._unchecked))
+        return tuple(dict.fromkeys(findings)) if self.setup.has_runs else findings
+
+    @property
+    def scored(self) -> frozenset[str]:
+        """Return the names of the recordings that were scored."""
+        return frozenset(item.recording.recording for item in self.outcomes if item.recording)
+
     def _refuse_learned(self, recording: RecordingResult) -> None:
-        before = self._scored.setdefault(recording.sha256, recording.recording) if recording.sha256 else ""
-        if before and before != recording.recording:
+        before = self._scored.get(recording.sha256, "") if recording.sha256 else ""
+        self._scored[recording.sha256] = recording.recording
+        if before and before == recording.recording:
+            raise ConfigurationError(
+                f"{self.setup.path}: {before} is scored twice", "name each run in one group only, and once"
+            )
+        if before:
             raise ConfigurationError(
                 f"{self.setup.path}: {recording.recording} and {before} have identical content", "score each log once"
             )
-        if recording.sha256 and self.learned.get(recording.sha256, recording.recording) != recording.recording:
+        learned = self.learned.get(recording.sha256, "") if recording.sha256 else ""
+        # A log in [learn] up to its contact and in a group is scored with what was learned from the others.
+        if learned and not (self.setup.both and learned == recording.recording):
             raise ConfigurationError(
-                f"{self.setup.path}: {recording.recording} has the same content as {self.learned[recording.sha256]}, "
+                f"{self.setup.path}: {recording.recording} has the same content as {learned}, "
                 "which is used for learning",
                 "use a recording either in [learn] or for scoring",
             )

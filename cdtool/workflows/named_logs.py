@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.truth.labels import CLOCKS, Labels, read_labels
 from cdtool.evaluation.truth.named_rows import by_recording
+from cdtool.ingest.run_reading import split_run
 from cdtool.log_section import MARK_HINT, LogSection, Mark
 from cdtool.machine_file import MachineFile
 from cdtool.tables import Table
@@ -15,44 +17,51 @@ from cdtool.value_words import value_in_words
 from cdtool.workflows.runs import find_logs, shown_path
 
 
-def logs_of(table: Table, base: Path, machine_file: MachineFile) -> tuple[Path, ...]:
-    """Return the files that `logs` names below `base`; raises ConfigurationError for no match and for unknown keys.
+@dataclass(frozen=True)
+class LogsOf:
+    """Finds the logs that the tables of a benchmark file name below `base`; with `runs` also LOG#ID for some runs.
 
     A file that belongs to another one of them, as that of its load cell, is not a log.
     """
-    logs = find_logs(table.texts("logs"), base, table.key("logs"))
-    table.finish()
-    return _without_files_beside(logs, machine_file)
 
+    base: Path
+    machine_file: MachineFile
+    runs: bool = False
 
-def _without_files_beside(logs: Sequence[Path], machine_file: MachineFile) -> tuple[Path, ...]:
-    beside = {path.resolve(): log for log in logs for path in machine_file.files_beside(log)}
-    return tuple(log for log in logs if not beside or beside.get(log.resolve(), log) == log)
+    def of(self, table: Table) -> tuple[Path, ...]:
+        """Return the files that `logs` names; raises ConfigurationError for no match and for unknown keys."""
+        logs = find_logs(table.texts("logs"), self.base, table.key("logs"), runs=self.runs)
+        table.finish()
+        return self._without_files_beside(logs)
 
+    def sections(self, table: Table) -> dict[Path, LogSection]:
+        """Return the files that `logs` names, with the part of each that is used.
 
-def sectioned_logs(table: Table, base: Path, machine_file: MachineFile) -> dict[Path, LogSection]:
-    """Return the files that `logs` names below `base`, with the part of each that is used.
+        `from` and `to` of the table are for all of them; an entry `{ path = "...", from = "...", to = "..." }` has its
+        own. Raises ConfigurationError for no match, for unknown keys, and for a log with two different parts.
+        """
+        common = _section(table)
+        entries = table.raw("logs")
+        found: dict[Path, LogSection] = {}
+        for number, entry in enumerate(entries if isinstance(entries, list) else [entries]):
+            section, pattern = common, entry
+            if isinstance(entry, dict):
+                own = Table(entry, table.where, f"{table.prefix}logs[{number}].")
+                pattern, section = own.text("path"), _section(own).within(common)
+                own.finish()
+            texts = Table({"logs": pattern}, table.where, table.prefix).texts("logs")
+            for path in find_logs(texts, self.base, table.key("logs"), runs=self.runs):
+                if found.setdefault(path, section) != section:
+                    raise table.fault("logs", f"names {path} with two different parts", "name each log once")
+        table.finish()
+        return {path: found[path] for path in self._without_files_beside(list(found))}
 
-    `from` and `to` of the table are for all of them; an entry `{ path = "...", from = "...", to = "..." }` has its own.
-    A file that belongs to another one of them, as that of its load cell, is not a log. Raises ConfigurationError for no
-    match, for unknown keys, and for a log with two different parts.
-    """
-    common = _section(table)
-    entries = table.raw("logs")
-    found: dict[Path, LogSection] = {}
-    for number, entry in enumerate(entries if isinstance(entries, list) else [entries]):
-        section, pattern = common, entry
-        if isinstance(entry, dict):
-            own = Table(entry, table.where, f"{table.prefix}logs[{number}].")
-            pattern, section = own.text("path"), _section(own).within(common)
-            own.finish()
-        paths = find_logs(Table({"logs": pattern}, table.where, table.prefix).texts("logs"), base, table.key("logs"))
-        for path in paths:
-            if found.setdefault(path, section) != section:
-                raise table.fault("logs", f"names {path} with two different parts", "name each log once")
-    table.finish()
-    logs = _without_files_beside(list(found), machine_file)
-    return {path: found[path] for path in logs}
+    def _without_files_beside(self, logs: Sequence[Path]) -> tuple[Path, ...]:
+        beside = {path.resolve(): log for log in logs for path in self.machine_file.files_beside(self._file(log))}
+        return tuple(log for log in logs if not beside or beside.get(self._file(log).resolve(), log) == log)
+
+    def _file(self, log: Path) -> Path:
+        return split_run(log)[0] if self.runs else log
 
 
 def _section(table: Table) -> LogSection:
@@ -74,8 +83,10 @@ def _mark(table: Table, name: str) -> Mark | None:
         raise table.fault(name, fault.message, fault.hint) from fault
 
 
-def named_logs(table: Table, base: Path, scored: Sequence[Path], machine_file: MachineFile) -> dict[Path, str]:
+def named_logs(table: Table, found_logs: LogsOf, scored: Sequence[Path]) -> dict[Path, str]:
     """Return the campaign or test point of each of the `scored` logs, independent of how its path is written.
+
+    A run, LOG#ID, is named as it is in its group.
 
     Raises ConfigurationError for a log that is not scored, or that belongs to two of them.
     """
@@ -84,7 +95,7 @@ def named_logs(table: Table, base: Path, scored: Sequence[Path], machine_file: M
     for name in table.values:
         if not name.strip():
             raise table.fault(name, "has no name", "give it a name")
-        for log in logs_of(table.table(name), base, machine_file):
+        for log in found_logs.of(table.table(name)):
             path = known.get(log.resolve())
             if path is None:
                 raise table.fault(name, f"names {log}, which is not in a group of [impacts]", "name only scored logs")
@@ -94,10 +105,11 @@ def named_logs(table: Table, base: Path, scored: Sequence[Path], machine_file: M
     return found
 
 
-def labels_of(onset: Table, base: Path, scored: Sequence[Path]) -> Labels | None:
+def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path]) -> Labels | None:
     """Return the label file, whose rows must all be about one of the `scored` logs; None without a file.
 
-    Raises ConfigurationError for a row that matches no log, or for a file name that matches several.
+    If logs are cut into runs, each row is about a run of a log, LOG#ID. Raises ConfigurationError for a row that
+    matches no log, or for a file name that matches several.
     """
     settings = {"clock": onset.choice("labels_clock", CLOCKS, "recording"), "zone": onset.text("labels_zone", "")}
     not_contacts = onset.texts("not_contacts", ())
@@ -106,10 +118,16 @@ def labels_of(onset: Table, base: Path, scored: Sequence[Path]) -> Labels | None
             if key in onset:
                 raise onset.fault(key, "is only for a label file", "name one: labels")
         return None
+    base = logs.base
     path = base / onset.text("labels")
     labels = read_labels(path, not_contacts=not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
-    recordings = [shown_path(log, base) for log in scored]
-    for name, recording in by_recording(path, labels.contacts, set(recordings)).items():
+    runs = logs.runs
+    recordings = [shown_path(split_run(log)[0] if runs else log, base) for log in scored]
+    for name, recording in by_recording(path, labels.contacts, set(recordings), runs=runs).items():
+        if runs and recording in recordings:
+            raise ConfigurationError(
+                f"{labels.lines[name][0]}: '{name}' is cut into runs", f"name the run, as {recording}#1"
+            )
         if recording is None:
             raise ConfigurationError(
                 f"{labels.lines[name][0]}: '{name}' is not a scored recording",

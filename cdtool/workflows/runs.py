@@ -13,10 +13,11 @@ from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
 from cdtool.findings.channels import AbsentTruth
-from cdtool.ingest.reading import read_as_logged, read_recording
+from cdtool.ingest.reading import is_bag_folder, read_as_logged, read_recording
+from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.operations import Operation, operations_of
+from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
@@ -34,16 +35,34 @@ class Runs:
     ranges: PlausibleRanges
 
 
-def find_logs(patterns: Iterable[str], base: Path, key: str) -> list[Path]:
-    """Return the files that the patterns name below `base`, each once, in order; ConfigurationError for no match."""
+def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = False) -> list[Path]:
+    """Return the logs that the patterns name below `base`, each once, in order; ConfigurationError for no match.
+
+    A log is a file, or a folder that rosbag2 wrote.
+
+    With `runs`, a pattern may name runs of a log, as cycles.csv#7 or cycles.csv#free*.
+    """
     found: dict[Path, None] = {}
     for pattern in patterns:
-        path = base / pattern
-        matches = [path] if path.is_file() else sorted(_glob(path))
-        if not matches:
-            raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", "check the path")
-        found.update(dict.fromkeys(matches))
+        matches = _matches(base / pattern)
+        of_runs = [] if matches else _runs_matching(pattern, base)
+        if not matches and not (runs and of_runs):
+            hint = 'to name runs of a file, set operations = "column:NAME"' if of_runs else "check the path"
+            raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", hint)
+        found.update(dict.fromkeys(matches or of_runs))
     return list(found)
+
+
+def _matches(path: Path) -> list[Path]:
+    return [path] if path.is_file() or is_bag_folder(path) else sorted(_glob(path))
+
+
+def _runs_matching(pattern: str, base: Path) -> list[Path]:
+    """Return FILE#IDS for each file that the part before a # names; a file name may contain the mark, too."""
+    for place in (i for i, character in enumerate(pattern) if character == "#"):
+        if files := _matches(base / pattern[:place]):
+            return [Path(f"{file}{pattern[place:]}") for file in files]
+    return []
 
 
 def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
@@ -111,19 +130,47 @@ def read_named(
     return with_scalar_force(recording, onset or OnsetRule())
 
 
+def named_on_load_side(
+    logged: LoggedRecording,
+    path: Path,
+    machine_file: MachineFile,
+    base: Path | None,
+    ranges: PlausibleRanges | None,
+    onset: OnsetRule,
+) -> Recording:
+    """Return what `read_named` returns, of a log or run that has been read."""
+    recording = replace(logged.on_load_side(machine_file.machine, ranges), name=shown_path(path, base))
+    return with_scalar_force(recording, onset)
+
+
+def runs_of(path: Path, machine_file: MachineFile, cut: RunCut | None) -> LogRuns:
+    """Return the runs of a log as logged; without a cut the whole log is one. Raises CdtoolError naming the file."""
+    if cut is not None:
+        return read_runs(path, machine_file, cut)
+    logged = read_as_logged(path, machine_file)
+    _with_channels(path, logged.recording)
+    return LogRuns((logged,))
+
+
+def reported(runs: LogRuns, path: Path, base: Path | None = None) -> tuple[list[Skipped], list[RecordingFinding]]:
+    """Return the runs of a log that were left out, and the losses and warnings about the log itself."""
+    name = shown_path(split_run(path)[0], base)
+    skipped = [Skipped(shown_path(run, base), reason) for run, reason in runs.left_out]
+    return skipped, [RecordingFinding.of(name, item) for item in runs.findings if item.severity != "note"]
+
+
 @dataclass(frozen=True)
 class _AsLogged:
-    """Reads a log through a machine file; one that cannot be read gives the error."""
+    """Reads the runs of a log through a machine file; one that cannot be read gives the error."""
 
     machine_file: MachineFile
+    cut: RunCut | None
 
-    def __call__(self, path: Path) -> LoggedRecording | CdtoolError:
+    def __call__(self, path: Path) -> LogRuns | CdtoolError:
         try:
-            logged = read_as_logged(path, self.machine_file)
-            _with_channels(path, logged.recording)
+            return runs_of(path, self.machine_file, self.cut)
         except CdtoolError as fault:
             return fault
-        return logged
 
 
 def _with_channels(path: Path, recording: Recording) -> Recording:
@@ -171,9 +218,23 @@ def load_runs(
     by_bytes: dict[str, str] = {}
     without: list[tuple[str, Finding]] = []
 
-    logged = list(in_order(_AsLogged(machine_file), paths, len(paths), jobs, reading.progress))
-    known = ranges or PlausibleRanges.learned([item.recording for item in logged if isinstance(item, LoggedRecording)])
-    for path, item in zip(paths, logged, strict=True):
+    cut = RunCut.of(reading.operations)
+    logs = list(in_order(_AsLogged(machine_file, cut), paths, len(paths), jobs, reading.progress))
+    known = ranges or PlausibleRanges.learned(
+        [item.recording for log in logs if isinstance(log, LogRuns) for item in log.runs]
+    )
+    logged: list[tuple[Path, LoggedRecording | CdtoolError]] = []
+    for path, log in zip(paths, logs, strict=True):
+        if isinstance(log, CdtoolError):
+            logged.append((path, log))
+        elif cut is None:
+            logged += [(path, item) for item in log.runs]
+        else:
+            logged += [(Path(item.recording.source), item) for item in log.runs]
+            of_log, about_log = reported(log, path, base)
+            skipped += of_log
+            findings += about_log
+    for path, item in logged:
         try:
             if isinstance(item, CdtoolError):
                 raise item
@@ -186,10 +247,14 @@ def load_runs(
         except CdtoolError as fault:
             skipped.append(unread(path, base, fault))
             continue
-        first = by_bytes.setdefault(recording.digest, recording.name) if recording.digest else recording.name
-        if first != recording.name:
-            skipped.append(Skipped(recording.name, f"has the same content as {first}: used once"))
+        first = by_bytes.get(recording.digest)
+        if first is not None:
+            again = first == recording.name  # a run that two patterns name
+            why = "given more than once, used once" if again else f"has the same content as {first}: used once"
+            skipped.append(Skipped(recording.name, why))
             continue
+        if recording.digest:
+            by_bytes[recording.digest] = recording.name
         contacts = contacts_shown(recording, rule) if contacts is None else contacts
         free, touched = without_contacts(parts, contacts)
         operations.extend(free)
@@ -247,5 +312,6 @@ def _glob(path: Path) -> Iterator[Path]:
     return (
         match
         for match in root.glob(pattern)
-        if all(part in written_out for part in match.parts if part.startswith(".")) and match.is_file()
+        if all(part in written_out for part in match.parts if part.startswith("."))
+        and (match.is_file() or is_bag_folder(match))
     )

@@ -14,11 +14,12 @@ from cdtool.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.limits import ALL
-from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.evaluation.results import RecordingFinding, RecordingResult, Skipped
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.findings import Finding
 from cdtool.findings.scoring import RecordingsWithoutRow
+from cdtool.ingest.run_reading import split_run
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
@@ -26,7 +27,7 @@ from cdtool.registry import plugin_packages
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
-from cdtool.workflows.benchmark.scoring import Scored, score_log
+from cdtool.workflows.benchmark.scoring import Scored, score_runs
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.workers import Progress
@@ -35,6 +36,8 @@ from cdtool.workflows.workers import Progress
 _HELD = 0.5
 _CLOCK_RATE = 1000.0
 _STRANGER = "not scored by the benchmark file: its rows are left out"
+_CUT_LOG = "is cut into runs: its rows are left out (name a run, as {name}#1)"
+_NO_RUN = "no such run is scored: its rows are left out"
 
 
 @dataclass(frozen=True)
@@ -98,16 +101,19 @@ def score(
     setup = read_benchmark_file(benchmark, learning=False, also_known=names)
     base = setup.path.parent
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-    known = {shown_path(path, base) for _, path in work}
-    said, strangers = given.assigned(known)
+    runs = setup.has_runs
+    known = {shown_path(split_run(path)[0] if runs else path, base) for _, path in work}
+    said, strangers = given.assigned(known, runs)
     gathered = Gathering(setup, names, {}, {})
     gathered.skipped += [Skipped(name, _STRANGER) for name in strangers]
-    gathered.findings += _unlisted(given, said, known, listed_only)
-
-    if listed_only:
-        work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
-    scoring = _TriggerScoring(setup, said, clock, listed_only)
+    if not runs:
+        gathered.findings += _unlisted(given.path, said, known, listed_only)
+        if listed_only:
+            work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
+    scoring = _TriggerScoring(setup, given.path, said, clock, listed_only)
     gathered.score(scoring, work, jobs, progress)
+    if runs:
+        gathered.skipped += _without_run(said, known, gathered.scored)
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
     return Score(evaluate(results, rules), gathered.traces, (Path(triggers), *setup.inputs))
@@ -115,31 +121,55 @@ def score(
 
 @dataclass(frozen=True)
 class _TriggerScoring:
-    """Scores one log by the triggers that are `said` about it, by detector and recording."""
+    """Scores one log by the triggers that are `said` about it in the file at `path`, by detector and recording."""
 
     setup: BenchmarkFile
+    path: Path
     said: Mapping[str, Mapping[str, Triggered]]
     clock: str
     listed_only: bool
 
-    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> LogOutcome:
-        scored = score_log(self.setup, group, path, self._detect, {})
-        for name, said in self.said.items():
-            scored.skipped += _beside(scored, name, said, self.clock)
-        return outcome_of(scored, self.setup, NormalMotions(), wanted)
+    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> list[LogOutcome]:
+        found = score_runs(self.setup, group, path, lambda _: (self._detect, []), {})
+        if self.setup.has_runs:
+            found = self._listed_runs(found)
+        for scored in found:
+            for name, said in self.said.items():
+                scored.skipped += _beside(scored, name, said, self.clock)
+        return [outcome_of(scored, self.setup, NormalMotions(), wanted) for scored in found]
+
+    def _listed_runs(self, found: list[Scored]) -> list[Scored]:
+        """Return the runs of a log that are scored, and report those without a row."""
+        about_log, *runs = found
+        known = {scored.recording.recording for scored in runs if scored.recording is not None}
+        about_log.findings += _unlisted(self.path, self.said, known, self.listed_only)
+        if self.listed_only:
+            runs = [scored for scored in runs if scored.recording is None or self._is_listed(scored.recording)]
+        return [about_log, *runs]
+
+    def _is_listed(self, run: RecordingResult) -> bool:
+        return any(run.recording in by_name for by_name in self.said.values())
 
     def _detect(self, operations: Sequence[Operation], _: Scored) -> list[list[Detection]]:
         return [self._of_operation(operation) for operation in operations]
 
     def _of_operation(self, operation: Operation) -> list[Detection]:
-        log = operation.name.removesuffix(f"#{operation.number}")
+        log = operation.whole.name
         shift = operation.recording.origin if self.clock == "source" else 0.0
         asked = [name for name, said in self.said.items() if log in said or not self.listed_only]
         return [_detection(operation, name, self.said[name].get(log, Triggered()), shift) for name in asked]
 
 
+def _without_run(
+    said: Mapping[str, Mapping[str, Triggered]], logs: Collection[str], runs: Collection[str]
+) -> list[Skipped]:
+    """Return the names that have rows, but are not those of runs that were scored."""
+    names = sorted({name for by_name in said.values() for name in by_name} - set(runs))
+    return [Skipped(name, _CUT_LOG.format(name=name) if name in logs else _NO_RUN) for name in names]
+
+
 def _unlisted(
-    given: TriggerFile, said: Mapping[str, Mapping[str, Triggered]], known: Collection[str], listed_only: bool
+    path: Path, said: Mapping[str, Mapping[str, Triggered]], known: Collection[str], listed_only: bool
 ) -> list[RecordingFinding]:
     """Return how many recordings have no row for a detector, and how they are counted."""
     found = []
@@ -147,7 +177,7 @@ def _unlisted(
         missing = sorted(set(known) - set(by_name))
         if missing:
             fact = RecordingsWithoutRow(detector, len(missing), len(known), listed_only, missing[0])
-            found.append(RecordingFinding.of(str(given.path), Finding(fact)))
+            found.append(RecordingFinding.of(str(path), Finding(fact)))
     return found
 
 

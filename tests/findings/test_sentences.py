@@ -23,6 +23,7 @@ from cdtool.findings import (
     messages,
     motion,
     parts,
+    runs,
     scoring,
     tables,
     truth,
@@ -54,7 +55,7 @@ SENTENCES: list[tuple[Fact, str]] = [
         clocks.BackwardStamps(3, 20, (3, 4, 5), "line", clocks.ClockRestart()),
         (
             "3 time stamps run backward (line 3, 4, 5), dropped (15 % of the rows); the clock starts again "
-            "there, or has jumped ahead before: cut the log there, or correct its stamps"
+            "there, or has jumped ahead before: cut the log there (--operations clock-reset), or correct its stamps"
         ),
     ),
     (
@@ -570,6 +571,23 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         scoring.PeakUnseen(1, 0.03),
         ("load-cell samples are missing for 30 ms during contact 1: its peak may be larger than the one reported"),
+    ),
+    (
+        containers.BagNotClosed("log.db3-wal"),
+        "the bag was not closed: read from a temporary copy, with its journal log.db3-wal",
+    ),
+    (containers.DamagedRows(1), "1 row is left out: no time, topic or payload that can be read"),
+    (
+        containers.StandardDefinitions(("std_msgs/msg/Float64",)),
+        "does not contain message definitions: read as the standard ones of std_msgs/msg/Float64",
+    ),
+    (
+        runs.SamplesOutsideRuns(3, 900, "run_id"),
+        "3 of 900 samples belong to no run, as 'run_id' has no value there: left out",
+    ),
+    (
+        runs.ReturningIds(("A/2",), "run_id"),
+        "1 run has an id in 'run_id' that an earlier run has, too: named A/2",
     ),
     (scoring.NoForce(1, "the acceleration is missing"), "contact 1: no force: the acceleration is missing"),
     (

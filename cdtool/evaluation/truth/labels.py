@@ -62,9 +62,15 @@ class Labels:
         return tuple(kind for kind in kinds if kind not in self.not_contacts)
 
     def name_of(self, recording: str) -> str | None:
-        """Return the name of a recording in the file: its path, or only the file's name; None if it is not there."""
-        short = PurePosixPath(recording).name
-        return recording if recording in self.contacts else short if short in self.contacts else None
+        """Return the name of a recording in the file: its path, or only the file's name; None if it is not there.
+
+        The name of a run may contain slashes after the file's name: `logs/cycles.csv#push/2`.
+        """
+        if recording in self.contacts:
+            return recording
+        file, mark, run = recording.partition("#")
+        names = (PurePosixPath(recording).name, f"{PurePosixPath(file).name}{mark}{run}")
+        return next((name for name in names if name in self.contacts), None)
 
     def contacts_in(self, recording: Recording) -> list[Contact]:
         """Return the contacts of a recording that the file names, on the recording's clock.

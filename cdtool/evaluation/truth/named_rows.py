@@ -65,7 +65,9 @@ def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str]
         ) from fault
 
 
-def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) -> dict[str, str | None]:
+def by_recording(
+    path: Path, names: Iterable[str], recordings: Collection[str], *, runs: bool = False
+) -> dict[str, str | None]:
     """Return which recording each name of a file means.
 
     Parameters
@@ -76,6 +78,8 @@ def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) 
         Names in the file: paths relative to the benchmark file, or only file names.
     recordings : collection of str
         Paths of the recordings, relative to the benchmark file.
+    runs : bool, optional
+        A name may also be that of a run, the name of its recording with # and the run's id.
 
     Returns
     -------
@@ -91,18 +95,34 @@ def by_recording(path: Path, names: Iterable[str], recordings: Collection[str]) 
     --------
     >>> by_recording(Path("triggers.csv"), ["01.csv", "stiff/02.csv", "09.csv"], {"soft/01.csv", "stiff/02.csv"})
     {'01.csv': 'soft/01.csv', 'stiff/02.csv': 'stiff/02.csv', '09.csv': None}
+    >>> by_recording(Path("triggers.csv"), ["01.csv#7"], {"soft/01.csv"}, runs=True)
+    {'01.csv#7': 'soft/01.csv#7'}
     """
     found: dict[str, str | None] = {}
     for name in names:
-        meant = [name] if name in recordings else []
-        if not meant and "/" not in name:
-            meant = sorted(item for item in recordings if PurePosixPath(item).name == name)
+        meant = _meant(name, recordings)
+        if not meant and runs:
+            meant = _meant_runs(name, recordings)
         if len(meant) > 1:
             raise ConfigurationError(
                 f"{path}: '{name}' fits {first_of(meant)}", "give a path relative to the benchmark file"
             )
         found[name] = meant[0] if meant else None
     return found
+
+
+def _meant(name: str, recordings: Collection[str]) -> list[str]:
+    """Return the recordings that a path, or a file name alone, may mean."""
+    if name in recordings:
+        return [name]
+    return [] if "/" in name else sorted(item for item in recordings if PurePosixPath(item).name == name)
+
+
+def _meant_runs(name: str, recordings: Collection[str]) -> list[str]:
+    """Return the names of runs that NAME#ID may mean; a file name may also contain the mark."""
+    places = (i for i, character in enumerate(name) if character == "#")
+    meant = ((recording, i) for i in places for recording in _meant(name[:i], recordings))
+    return [f"{recording}{name[i:]}" for recording, i in meant]
 
 
 def _check_header(path: Path, header: Sequence[str], required: Sequence[str], known: Sequence[str]) -> None:

@@ -32,12 +32,16 @@ class TriggerFile:
     rows: Mapping[str, Mapping[str, Triggered]]
     digest: str
 
-    def assigned(self, recordings: Collection[str]) -> tuple[dict[str, dict[str, Triggered]], list[str]]:
+    def assigned(
+        self, recordings: Collection[str], runs: bool = False
+    ) -> tuple[dict[str, dict[str, Triggered]], list[str]]:
         """Return each detector's rows for each of the recordings, and the names that belong to none of them.
 
-        Raises ConfigurationError if a file name fits several.
+        With `runs`, the rows are about runs of the recordings, named RECORDING#ID. Raises ConfigurationError if a file
+        name fits several.
         """
-        meant = by_recording(self.path, {name for by_name in self.rows.values() for name in by_name}, recordings)
+        named = {name for by_name in self.rows.values() for name in by_name}
+        meant = by_recording(self.path, named, recordings, runs=runs)
         said: dict[str, dict[str, Triggered]] = {}
         for detector, by_name in self.rows.items():
             of_detector = said.setdefault(detector, {})

@@ -108,6 +108,7 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
         table.values[clock] = table.values[clock] + table.origin
     channels = [key for key in keys if key != clock]
     columns, origin, findings = columns_by_own_clock(path, dialect, clocks, channels, table.values)
+    columns |= {key: replace(columns[key], words=words) for key, words in table.words.items()}
     table.values, table.findings = {}, [*table.findings, *findings]
     origin = origin or written_origin(path)
     return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
@@ -117,7 +118,12 @@ def _source(path: Path, dialect: Dialect, table: TextTable) -> Source:
     from cdtool.formats.csv.several_clocks import unit_from_header
 
     columns = {
-        key: Column(key, values, unit="s" if key in table.stamped else unit_from_header(dialect, key))
+        key: Column(
+            key,
+            values,
+            unit="s" if key in table.stamped else unit_from_header(dialect, key),
+            words=table.words.get(key, {}),
+        )
         for key, values in table.values.items()
     }
     return Source(

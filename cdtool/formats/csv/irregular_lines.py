@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cdtool.columns import Categories
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.tables import (
@@ -55,6 +56,7 @@ class IrregularLines:
     not rows, with their lines. `left_out` are the columns that are not numeric, with the finding. `cut_line` is the
     incomplete last line (0: none); `ends_skipped`: the last line has no line end but is skipped. `blank` are blank
     lines, `empty` those of them that are rows, and `words` (row, line, text) may be the first line of a footer.
+    `categories` are the columns whose texts are categories.
     """
 
     path: Path
@@ -70,6 +72,7 @@ class IrregularLines:
     blank: list[int] = field(default_factory=list)
     empty: list[int] = field(default_factory=list)
     words: tuple[int, int, str] | None = None
+    categories: dict[int, Categories] = field(default_factory=dict)
 
     def read(self, irregular: IrregularLine, first_line: int, rows: Rows) -> None:
         """Read one line into `rows`; lines come in the file's order. `first_line` is the first line of its block."""
@@ -197,7 +200,7 @@ class IrregularLines:
                 rows.stamps[STAMP - target, row] = stamp
                 return
         else:
-            value = self._number(cell)
+            value = self._category(column, cell) if column in self.categories else self._number(cell)
             if value is not None:
                 rows.numbers[target, row] = value
                 return
@@ -238,6 +241,11 @@ class IrregularLines:
         if cell in self.dialect.missing:
             return float("nan")
         return number(cell, self.dialect.marks.decimal, self.dialect.marks.thousands)
+
+    def _category(self, column: int, cell: str) -> float:
+        """Return a number as it is, NaN for an empty cell or a mark of a missing value, else the text's code."""
+        value = self._number(cell)
+        return self.categories[column].code(cell) if value is None else value
 
     def _stamp(self, column: int, cell: str) -> int | None:
         return self.dialect.stamped[column].layouts[0].read(cell)

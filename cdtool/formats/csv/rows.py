@@ -26,6 +26,7 @@ from cdtool.formats.csv.row_arrays import Rows
 from cdtool.formats.csv.row_kernel import EMPTY, LEFT, STAMP, Integers, count_lines, read_rows
 from cdtool.formats.csv.stamp_kernel import STEPS
 from cdtool.formats.csv.text import AFTER
+from cdtool.formats.csv.word_cells import WordCells
 
 _THREADS = 4
 
@@ -63,6 +64,7 @@ class RowReader:
             self.programs[k] = dialect.stamped[column].layouts[0].program
         self.shape = (len(numeric), len(stamped))
         self.ended = True
+        self.words: WordCells | None = None  # the columns of categories
 
     def read(self, irregular: IrregularLines) -> Rows:
         """Return all rows in one pair of arrays, into which several threads write; raises RecordingError."""
@@ -140,6 +142,9 @@ class RowReader:
         empty = np.empty(0, dtype=np.int64)
         if self.dialect.blank_is_missing:
             block, size, empty = fill_blank_lines(block, size, end)
+        if self.words is not None:
+            content = self.words.coded(bytes(memoryview(block)[:size]))
+            block, size = bytearray(content + end * AFTER), len(content)
         data = np.frombuffer(block, dtype=np.uint8)
         blank = np.empty(count, dtype=np.int64)
         irregular = np.empty((count, 4), dtype=np.int64)

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.channels import ChannelMap
-from cdtool.columns import Piece
+from cdtool.columns import Categories, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import WrittenTimes
 from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd
+from cdtool.formats.column_names import column_key
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
@@ -28,6 +29,7 @@ from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.several_clocks import Clocks, clock_findings
 from cdtool.formats.csv.stamps import NS, Layout, seconds_since, unwrap
+from cdtool.formats.csv.word_cells import WordCells
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
 
@@ -108,7 +110,7 @@ class TextTable:
     """The columns of a text table with findings.
 
     `stamped` are the columns of dates or times of day; `origin` [s] was subtracted from the columns with a date.
-    `unbroken`: every line after the first row is a row.
+    `unbroken`: every line after the first row is a row. `words` are the texts of columns of categories.
     """
 
     values: dict[str, FloatArray]
@@ -116,6 +118,7 @@ class TextTable:
     origin: float = 0.0
     stamped: set[str] = field(default_factory=set)
     unbroken: bool = True
+    words: dict[str, dict[float, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -145,12 +148,21 @@ class _TableReader:
     """Reader of one table: the requested columns, their readers, and the irregular lines so far."""
 
     def __init__(
-        self, path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, survey: bool = True
+        self,
+        path: Path,
+        dialect: Dialect,
+        keys: Collection[str],
+        clock: str | None = None,
+        survey: bool = True,
+        worded: Collection[str] = (),
     ) -> None:
         self.path, self.dialect, self.survey = path, dialect, survey
         self.requested = RequestedColumns.of(path, dialect, keys, clock, survey)
         self.reader = RowReader(path, dialect, self.requested.numeric, self.requested.stamps)
         self.irregular = IrregularLines(path, dialect, survey, self.reader.targets, left_out=self.requested.left_out)
+        self.irregular.categories = {dialect.names.index(key): Categories() for key in worded}
+        if worded:
+            self.reader.words = WordCells(dialect, self.irregular.categories)
         self.stamped = StampColumns(dialect, self.requested.stamps, self.requested.dates)
 
     def columns(self, rows: Rows) -> dict[str, FloatArray]:
@@ -181,14 +193,17 @@ class _TableReader:
         findings += self.stamped.findings()
         if self.survey and not remaining:
             raise RecordingError(f"{self.path}: no column has only numbers", str(findings[0]) if findings else "")
-        return TextTable(remaining, findings, (self.stamped.origin or 0) / NS, set(self.stamped.names), unbroken)
+        words = {self.dialect.names[column]: each.words for column, each in self.irregular.categories.items()}
+        return TextTable(remaining, findings, (self.stamped.origin or 0) / NS, set(self.stamped.names), unbroken, words)
 
 
 def read_table(
     path: Path, dialect: Dialect, keys: Collection[str], clock: str | None = None, wanted: ChannelMap | None = None
 ) -> TextTable:
     """Return the columns `keys`; `clock` is the machine file's time column. Raises RecordingError."""
-    reading = _TableReader(path, dialect, keys, clock, survey=wanted is None)
+    named = wanted.worded if wanted is not None else ()
+    worded = {key for name in named if (key := column_key(name, dialect.names))}
+    reading = _TableReader(path, dialect, keys, clock, survey=wanted is None, worded=worded)
     rows = reading.reader.read(reading.irregular)
     findings = reading.end(rows)
     table = reading.table(reading.columns(rows), findings, not len(rows.not_rows))

@@ -37,6 +37,10 @@ def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, sche
             from cdtool.messages.layouts.protobuf import parse_protobuf
 
             return protobuf_decoder(parse_protobuf(schema_name, schema_data))
+        case "cdr", "" if schema_name:
+            raise UndecodableError(
+                f"the log has no definition of the message type '{schema_name}' (`ros2 bag convert` to MCAP adds it)"
+            )
     described = f"schema encoding '{schema_encoding}'" if schema_encoding else "no schema"
     raise UndecodableError(
         f"message encoding '{message_encoding}' with {described} is not supported (supported: json, ROS 1, ROS 2 cdr "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -37,7 +37,7 @@ from cdtool.workflows.benchmark.benchmark_file import (
 )
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds, that_can_run
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
-from cdtool.workflows.benchmark.scoring import detect_with, score_log
+from cdtool.workflows.benchmark.scoring import Detect, detect_with, score_runs
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normals_for
@@ -142,6 +142,7 @@ def benchmark(
     scoring = _LogScoring(setup, tuple(used), thresholds, learned.unusable, factors, learn.ranges, normals)
     gathered.score(scoring, work, jobs, progress)
     seconds = {"reading": seconds["reading"] + gathered.reading, "detecting": seconds["detecting"] + gathered.detecting}
+    gathered.skipped += _labels_without_run(setup, gathered.scored)
     provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))
     provenance["units"] |= gathered.units
     results = gathered.results(provenance, learned.calibration)
@@ -150,7 +151,7 @@ def benchmark(
 
 @dataclass(frozen=True)
 class _LogScoring:
-    """Scores one log with every detector: what `score_log` needs for any log of the benchmark."""
+    """Scores one log with every detector: what `score_runs` needs for any log of the benchmark."""
 
     setup: BenchmarkFile
     detectors: tuple[Detector, ...]
@@ -160,12 +161,25 @@ class _LogScoring:
     ranges: PlausibleRanges
     normals: NormalMotions
 
-    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> LogOutcome:
-        thresholds, findings = self.thresholds.without(path)
-        detect = detect_with(self.setup, self.detectors, thresholds, self.unusable)
-        scored = score_log(self.setup, group, path, detect, self.factors, self.ranges)
-        scored.findings += findings
-        return outcome_of(scored, self.setup, self.normals, wanted)
+    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> list[LogOutcome]:
+        scored = score_runs(self.setup, group, path, self._detection_of, self.factors, self.ranges)
+        return [outcome_of(item, self.setup, self.normals, wanted) for item in scored]
+
+    def _detection_of(self, log: Path) -> tuple[Detect, list[RecordingFinding]]:
+        thresholds, findings = self.thresholds.without(log)
+        return detect_with(self.setup, self.detectors, thresholds, self.unusable), findings
+
+
+def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[Skipped]:
+    """Return the names in the label file that no run has; rows about whole logs were checked before reading."""
+    if setup.labels is None or not setup.has_runs:
+        return []
+    used = {setup.labels.name_of(name) for name in scored}
+    return [
+        Skipped(name, f"no such run is scored: {', '.join(lines)} left out")
+        for name, lines in setup.labels.lines.items()
+        if name not in used
+    ]
 
 
 def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, FloatArray]:

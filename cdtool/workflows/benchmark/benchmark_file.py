@@ -19,16 +19,17 @@ from cdtool.evaluation.limits import ALL, LimitRule, read_limits
 from cdtool.evaluation.summary import kind_group
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
+from cdtool.ingest.run_reading import split_run
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.operations import HOW_TO_CUT
+from cdtool.operations import RunCut
 from cdtool.plain_text import counted, digits
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.named_logs import labels_of, named_logs, sectioned_logs
+from cdtool.workflows.named_logs import LogsOf, labels_of, named_logs
 from cdtool.workflows.runs import RunReading, shown_path
 from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
 
@@ -148,8 +149,14 @@ class BenchmarkFile:
         """Return every file that is read for the benchmark; none of them may be overwritten."""
         logs = (*self.learn, *(path for group in self.impacts.values() for path in group.logs))
         labels = (Path(self.labels.source),) if self.labels else ()
-        beside = (path for log in logs for path in self.machine_file.files_beside(log))
-        return (self.path, self.machine_file.path, *logs, *labels, *beside)
+        files = tuple(dict.fromkeys(split_run(log)[0] if self.has_runs else log for log in logs))
+        beside = (path for log in files for path in self.machine_file.files_beside(log))
+        return (self.path, self.machine_file.path, *files, *labels, *beside)
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether each log is cut into runs."""
+        return RunCut.of(self.operations) is not None
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -179,23 +186,25 @@ def read_benchmark_file(
         raise root.fault("detectors", "contains a detector twice", "list each detector once")
     signature = read_signature(root.table("signature"), machine_file.machine.default_sides)
     threshold, rule = read_threshold(root, signature)
+    operations = _read_operations(root)
+    found = LogsOf(base, machine_file, RunCut.of(operations) is not None)
     needs_runs = learning and not is_per_run(rule)
     learn_table = root.table("learn", required=needs_runs)
     guard = _guard(learn_table)
-    learn = sectioned_logs(learn_table, base, machine_file) if needs_runs or "learn" in root else {}
+    learn = found.sections(learn_table) if needs_runs or "learn" in root else {}
     force = root.table("force")
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
-    impacts, sections = _groups(root, base, window, force, machine_file)
+    impacts, sections = _groups(root, found, window, force)
     onset = root.table("onset")
     migrated = migrated_onset(onset)
-    labels = labels_of(onset, base, [*_scored(impacts, HOLDOUT), *(learn if guard is not None else ())])
+    labels = labels_of(onset, found, [*_scored(impacts, HOLDOUT), *(learn if guard is not None else ())])
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
         detectors=names,
         watched=_read_watched(root, machine_file.machine.joints),
-        operations=root.choice("operations", HOW_TO_CUT, "whole"),
+        operations=operations,
         threshold=threshold,
         budget=_read_budget(root),
         signature=signature,
@@ -207,8 +216,8 @@ def read_benchmark_file(
         mass_before_cell=mass_before_cell,
         learn=tuple(learn),
         impacts=impacts,
-        campaigns=named_logs(root.table("campaigns"), base, _scored(impacts, HOLDOUT), machine_file),
-        points=named_logs(root.table("points"), base, _scored(impacts), machine_file),
+        campaigns=named_logs(root.table("campaigns"), found, _scored(impacts, HOLDOUT)),
+        points=named_logs(root.table("points"), found, _scored(impacts)),
         limits=read_limits(
             root.table("limits"),
             [*_names(machine_file, names), *((name, name) for name in also_known)],
@@ -276,7 +285,7 @@ def _guard(learn: Table) -> float | None:
 
 
 def _groups(
-    root: Table, base: Path, window: float, force: Table, machine_file: MachineFile
+    root: Table, found: LogsOf, window: float, force: Table
 ) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
     """Return the groups of impacts, then the hold-out, and the sections of their logs."""
     tables = root.table("impacts")
@@ -284,7 +293,7 @@ def _groups(
         raise tables.fault(
             HOLDOUT, "is the name of the impact-free group", "choose another name for the group of impacts"
         )
-    profiles = read_force_limits(base / force.text("limits") if "limits" in force else None)
+    profiles = read_force_limits(found.base / force.text("limits") if "limits" in force else None)
     profile = force.text("profile", "")
     if profile:
         _profile(profiles, force, "profile", force)
@@ -298,11 +307,11 @@ def _groups(
         if profile and "force_profile" not in table:
             limits = profiles[profile]
         own = table.number("window_s", window, above=0.0)
-        logs = sectioned_logs(table, base, machine_file)
+        logs = found.sections(table)
         sections |= logs
         groups[name] = ImpactGroup(tuple(logs), own, limits)
     if HOLDOUT in root:
-        logs = sectioned_logs(root.table(HOLDOUT), base, machine_file)
+        logs = found.sections(root.table(HOLDOUT))
         sections |= logs
         groups[HOLDOUT] = ImpactGroup(tuple(logs), window)
     if "limits" in force and not any(group.force for group in groups.values()):
@@ -369,6 +378,21 @@ def _ends_early(benchmark: BenchmarkFile, log: Path) -> bool:
     """Return whether only a part of a log is learned from that ends before the log does."""
     ends = {path.resolve() for path, section in benchmark.learned_sections.items() if section.end}
     return benchmark.guard is not None or log in ends
+
+
+def _read_operations(root: Table) -> str:
+    """Return how logs are cut: `operations` as a text, or `by` in the table [operations]."""
+    is_table = isinstance(root.raw("operations"), dict)
+    table = root.table("operations") if is_table else root
+    key = "by" if is_table else "operations"
+    text = table.text(key, None if is_table else "whole")
+    if is_table:
+        table.finish()
+    try:
+        RunCut.of(text)
+    except UsageError as fault:
+        raise table.fault(key, f"is '{text}'", fault.hint) from fault
+    return text
 
 
 def _read_budget(table: Table) -> Budget | None:

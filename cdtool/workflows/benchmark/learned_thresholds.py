@@ -122,7 +122,7 @@ class ThresholdsByLog:
 
     def without(self, log: Path) -> tuple[Mapping[str, tuple[FittedThreshold, ...]], list[RecordingFinding]]:
         """Return the thresholds for a log, which it did not teach, by detector, and why some are missing."""
-        if log not in self.setup.both:
+        if not self.setup.both:
             return self.all_runs, []
         name = shown_path(log, self.setup.path.parent)
         thresholds, findings = dict(self.all_runs), []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,14 @@ from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.ingest.run_reading import split_run
 from cdtool.plain_text import counted
 from cdtool.plausible import PlausibleRanges
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
-from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_log
+from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
 from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normals_for, normals_of, notes_on
 
@@ -42,13 +44,13 @@ class PreparedBenchmark:
     skipped: tuple[Skipped, ...] = ()
     losses: tuple[RecordingFinding, ...] = ()
 
-    def score(self, log: Path) -> Scored:
-        """Return the log's rows as in a benchmark, with the window of its group if it has one. Raises nothing."""
+    def score(self, log: Path) -> list[Scored]:
+        """Return the rows of a log, or of each of its runs, as in a benchmark: with the window of its group, if any.
+
+        If the log is cut into runs, the first entry is about the log itself. Raises nothing.
+        """
         group, path = self._listed(log)
-        detect, findings = self.run(path)
-        scored = score_log(self.setup, group, path, detect, {}, self.ranges)
-        scored.findings += findings
-        return scored
+        return score_runs(self.setup, group, path, self.run, {}, self.ranges)
 
     def window(self, log: Path) -> float:
         """Return how long after its onset a contact of the log may be detected [s]."""
@@ -60,6 +62,8 @@ class PreparedBenchmark:
             for path in group.logs:
                 if path.resolve() == log.resolve():
                     return name, path
+                if self.setup.has_runs and _has_run(path, log):
+                    return name, log
         return "", log
 
 
@@ -133,6 +137,12 @@ def _running(
         return detect_with(thresholds.setup, [detector], own, unusable), findings
 
     return detection_of
+
+
+def _has_run(listed: Path, log: Path) -> bool:
+    """Return whether a log of a group, as a file or as FILE#IDS, has a run that is given as FILE#ID."""
+    (listed_file, ids), (file, run) = split_run(listed), split_run(log)
+    return bool(run) and listed_file.resolve() == file.resolve() and (not ids or fnmatchcase(run, ids))
 
 
 def _chosen(setup: BenchmarkFile, detector: str | None) -> str:

@@ -22,9 +22,11 @@ from cdtool.evaluation.results import (
 from cdtool.evaluation.sweep import sweep_operation
 from cdtool.findings import Finding
 from cdtool.findings.scoring import ForceUnassessable
+from cdtool.ingest.run_reading import read_runs
 from cdtool.log_section import LogSection
+from cdtool.logged_recording import LoggedRecording
 from cdtool.motion.applicable import HOLD
-from cdtool.operations import Operation, operations_of
+from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Contact, FloatArray, Recording
@@ -37,7 +39,7 @@ from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import DetectedLog, MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.runs import absent_truth, lost, read_named, unread
+from cdtool.workflows.runs import absent_truth, lost, named_on_load_side, read_named, reported, unread
 
 _WHOLE = LogSection()
 
@@ -67,6 +69,8 @@ class Scored:
 
 # Returns the detections of each operation of a log; failures are reported in the log's `Scored`.
 Detect = Callable[[Sequence[Operation], Scored], list[list[Detection]]]
+# Returns how a log, given by its path, is detected, and the findings about that.
+DetectionOf = Callable[[Path], tuple[Detect, list[RecordingFinding]]]
 
 
 def detect_with(
@@ -122,12 +126,89 @@ def score_log(
     `factors`: the safety factors of the sweep by detector. `group` is empty for a log outside all groups. Values
     outside the plausible `ranges` are masked.
     """
+    return _score(setup, group, path, detect, factors, _WholeLog(setup, path, ranges))
+
+
+def score_runs(
+    setup: BenchmarkFile,
+    group: str,
+    path: Path,
+    detection_of: DetectionOf,
+    factors: Mapping[str, FloatArray],
+    ranges: PlausibleRanges | None = None,
+) -> list[Scored]:
+    """Return the same for each run of a log, if the benchmark cuts logs into runs; the first entry is about the log.
+
+    `detection_of` returns for the path of a log or run how it is detected.
+    """
+    cut = RunCut.of(setup.operations)
+    if cut is None:
+        detect, findings = detection_of(path)
+        whole_log = score_log(setup, group, path, detect, factors, ranges)
+        whole_log.findings += findings
+        return [whole_log]
+    about_log, begin = Scored(), perf_counter()
+    try:
+        runs = read_runs(path, setup.machine_file, cut)
+    except CdtoolError as fault:
+        about_log.skipped.append(unread(path, setup.path.parent, fault))
+        return [about_log]
+    finally:
+        about_log.reading = perf_counter() - begin
+    about_log.skipped, about_log.findings = reported(runs, path, setup.path.parent)
+    scored = [about_log]
+    for logged in runs.runs:
+        run = Path(logged.recording.source)
+        detect, findings = detection_of(run)
+        scored.append(_score(setup, group, path, detect, factors, _OneRun(setup, run, logged, ranges)))
+        scored[-1].findings += findings
+    return scored
+
+
+@dataclass(frozen=True)
+class _WholeLog:
+    """Reads a log that is one recording."""
+
+    setup: BenchmarkFile
+    path: Path
+    ranges: PlausibleRanges | None
+
+    def __call__(self) -> Recording:
+        setup = self.setup
+        return read_named(self.path, setup.machine_file, setup.path.parent, self.ranges, setup.onset)
+
+
+@dataclass(frozen=True)
+class _OneRun:
+    """Converts a run that has been read; `path` is LOG#ID."""
+
+    setup: BenchmarkFile
+    path: Path
+    logged: LoggedRecording
+    ranges: PlausibleRanges | None
+
+    def __call__(self) -> Recording:
+        setup = self.setup
+        return named_on_load_side(
+            self.logged, self.path, setup.machine_file, setup.path.parent, self.ranges, setup.onset
+        )
+
+
+def _score(
+    setup: BenchmarkFile,
+    group: str,
+    log: Path,
+    detect: Detect,
+    factors: Mapping[str, FloatArray],
+    load: _WholeLog | _OneRun,
+) -> Scored:
+    """Return the rows of a log or of one of its runs; `log` is its path in the benchmark file."""
     scored = Scored()
-    rules = setup.rules_of(group)
+    rules, path = setup.rules_of(group), load.path
     begin = perf_counter()
     try:
-        whole = read_named(path, setup.machine_file, setup.path.parent, ranges, rules.onset)
-        section = setup.sections.get(path, _WHOLE)
+        whole = load()
+        section = setup.sections.get(log, _WHOLE)
         recording = section.of(whole)
         operations = operations_of(recording, setup.operations)
         contacts: Sequence[Contact] = ()
@@ -155,7 +236,7 @@ def score_log(
         if not operations:
             scored.findings += log_warnings(recording, unwanted, setup.onset)
             return scored
-    scored.recording = _recording_result(recording, group, path, len(operations), len(contacts), setup)
+    scored.recording = _recording_result(recording, group, log, len(operations), len(contacts), setup)
     found = detect(operations, scored)
     detected = DetectedLog(recording, operations, setup.operations, contacts, found)
     matched = match_log(detected, group, rules, setup.activation.wait)

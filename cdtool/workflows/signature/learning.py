@@ -59,7 +59,8 @@ class LearningOptions:
         Learn from each log up to this long [s] before its first contact on the load cell, label or event; by default a
         run with a contact is left out.
     operations : str, optional
-        How the logs are cut into operations: whole, motion or trigger.
+        How the logs are cut into operations: whole, motion or trigger; or into runs: column:NAME, label:NAME or
+        clock-reset.
     activation : ActivationSettings, optional
         Settings of the activation that replace the default: debounce [samples], rearm [s], hysteresis [share], latch.
     false_alarm_budget : str, optional

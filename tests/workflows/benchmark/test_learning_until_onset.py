@@ -102,7 +102,8 @@ def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate):
     rows = {row.recording: row.latency_ms for row in benchmark(setup).results.contacts}
     prepared = prepare_benchmark(setup.path)
     for log in sorted(gate.glob("s*/*.csv")):
-        (row,) = prepared.score(log).contacts
+        (scored,) = prepared.score(log)
+        (row,) = scored.contacts
         assert row.latency_ms == rows[row.recording]
         assert not cdtool.detect(log, benchmark=prepared).learned, "scored with what was learned from the others"
 

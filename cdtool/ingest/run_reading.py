@@ -1,0 +1,441 @@
+"""Read a log that contains several runs: cut its columns into runs before their clocks are checked.
+
+Each run becomes a recording of its own, named FILE#ID, with its own clock. In a table a run is some consecutive rows.
+Where columns have clocks of their own, the id that was logged last at or before a sample holds for it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.columns import Column
+from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.channels import AbsentTruth
+from cdtool.findings.runs import ReturningIds, SamplesOutsideRuns
+from cdtool.formats.source import Source, in_words
+from cdtool.ingest.channel_assembly import assemble_recording, file_digest
+from cdtool.ingest.parts import join_details, join_digests, join_topics, missing_part_findings, with_file_name
+from cdtool.ingest.reading import log_parts, mapped_source
+from cdtool.ingest.run_segments import Rows, Segments, segments_by_id, segments_by_reset
+from cdtool.logged_recording import LoggedRecording
+from cdtool.machine_file import MachineFile
+from cdtool.operations import RunCut
+from cdtool.plain_text import counted, first_of
+from cdtool.recording import GROUND_TRUTH, FloatArray
+
+# A run with fewer samples than this is left out: too few for a clock's usual step.
+FEWEST_SAMPLES = 8
+_ID = "run id"
+_MARK = "#"
+
+
+@dataclass(frozen=True)
+class LogRuns:
+    """The runs of a log in its order; `findings` are about the log, `left_out` are runs with the reason."""
+
+    runs: tuple[LoggedRecording, ...]
+    findings: tuple[Finding, ...] = ()
+    left_out: tuple[tuple[Path, str], ...] = ()
+
+
+def split_run(log: Path) -> tuple[Path, str]:
+    """Return the file of LOG#ID, and the id.
+
+    Parameters
+    ----------
+    log : Path
+        A log, or LOG#ID. A file whose name contains the mark is a log.
+
+    Returns
+    -------
+    file : Path
+        The log.
+    ids : str
+        The id of a run, or a pattern such as `free*`; empty for a whole log.
+
+    Examples
+    --------
+    >>> file, ids = split_run(Path("cycles.csv#7*"))
+    >>> file.name, ids
+    ('cycles.csv', '7*')
+    """
+    text = str(log)
+    if log.exists() or _MARK not in text:
+        return log, ""
+    places = [i for i, character in enumerate(text) if character == _MARK]
+    place = next((i for i in places if Path(text[:i]).exists()), places[-1])
+    return Path(text[:place]), text[place + 1 :]
+
+
+def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
+    """Return the runs of a log, or of LOG#ID only those with this id, which may be a pattern.
+
+    Parameters
+    ----------
+    log : Path
+        A file, or a folder of parts written by rosbag2.
+    machine_file : MachineFile
+        The machine and its map of channels.
+    cut : RunCut
+        How the log is cut.
+
+    Returns
+    -------
+    LogRuns
+        The recordings as logged, each with the log's path and its id as `source`.
+
+    Raises
+    ------
+    RecordingError
+        The log cannot be read or has no such column, or no run of it can be used.
+    ConfigurationError
+        The machine file does not fit the log.
+    """
+    path, pattern = split_run(log)
+    whole = _CutLog.of(path, machine_file, cut)
+    segments = whole.segments
+    lengths = whole.lengths
+    long_enough = np.flatnonzero(lengths >= FEWEST_SAMPLES)
+    if not len(long_enough):
+        raise whole.no_run(int(lengths.max(initial=0)))
+    names = segments.names(long_enough)
+    chosen = [(int(run), name) for run, name in zip(long_enough, names, strict=True) if _fits(name, pattern)]
+    if not chosen:
+        raise RecordingError(f"{path}: no run '{pattern}'", f"its runs are {first_of(names)}")
+    digest = join_digests([file_digest(part) for part in whole.files])
+    runs: list[LoggedRecording] = []
+    left_out: list[tuple[Path, str]] = []
+    for run, name in chosen:
+        try:
+            runs.append(whole.recording(run, name, digest))
+        except RecordingError as fault:
+            left_out.append((Path(f"{path}{_MARK}{name}"), str(fault).removeprefix(f"{path}{_MARK}{name}: ")))
+    if not runs:
+        raise RecordingError(f"{left_out[0][0]}: {left_out[0][1]}", "check the log with cdtool info")
+    findings = [*whole.source.findings, *whole.outside()]
+    later = tuple(name for (run, name) in chosen if segments.number[run])
+    if later and cut.by == "column":
+        findings.append(Finding(ReturningIds(later, cut.column)))
+    short = np.flatnonzero(lengths < FEWEST_SAMPLES)
+    if pattern:
+        fits = [_fits(name, pattern) for name in segments.names(short)]
+        short = short[np.array(fits, dtype=bool)]
+    if len(short):
+        left_out.append((path, _too_short(segments, short, lengths)))
+    return LogRuns(tuple(runs), tuple(findings), tuple(left_out))
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return not pattern or name == pattern or fnmatchcase(name, pattern)
+
+
+def _too_short(segments: Segments, short: Rows, lengths: Rows) -> str:
+    names = first_of(segments.names(short[:4])) if len(short) <= 4 else ", ".join(segments.names(short[:3])) + ", ..."
+    samples = int(lengths[short].sum())
+    what = "is" if len(short) == 1 else "are"
+    return (
+        f"{counted(len(short), 'run')} ({names}) with {counted(samples, 'sample')} in all {what} shorter than "
+        f"{FEWEST_SAMPLES} samples: left out"
+    )
+
+
+def id_source(cut: RunCut, topics: bool) -> ChannelSource:
+    """Return the source of the ids of a cut; raises RecordingError if topics have no such field or no such cut."""
+    if not topics:
+        column = int(cut.column) if cut.column.isdecimal() else cut.column  # a number as in [channels]
+        return ChannelSource(_ID, (column,), words=True)
+    topic, _, field_name = cut.column.partition(" ")
+    if not field_name.strip():
+        raise RecordingError(
+            f"operations '{cut.by}:{cut.column}': does not name a field of a topic", f"write {cut.by}:TOPIC FIELD"
+        )
+    return ChannelSource(_ID, topic=topic, field=field_name.strip(), words=True)
+
+
+@dataclass(frozen=True)
+class _CutLog:
+    """The columns of a log, and where its runs are.
+
+    `rows` are those of each clock by run; a clock is known by its identity, that of a table by 0. `begins` (r,) is when
+    the runs begin [s], where ids have a clock of their own.
+    """
+
+    path: Path
+    source: Source
+    channels: ChannelMap
+    cut: RunCut
+    machine_file: MachineFile
+    files: tuple[Path, ...]
+    segments: Segments
+    rows: Mapping[int, _RunRows] = field(default_factory=dict)
+    begins: FloatArray | None = None
+
+    @classmethod
+    def of(cls, path: Path, machine_file: MachineFile, cut: RunCut) -> _CutLog:
+        """Read and cut a log; raises RecordingError."""
+        files = tuple(log_parts(path))
+        also = None if cut.by == "clock-reset" else (lambda topics: id_source(cut, topics))
+        mapped = [mapped_source(file, machine_file, also) for file in files]
+        channels = _common_map(path, [item for _, item in mapped])
+        source = _joined(path, [item for item, _ in mapped]) if path.is_dir() else mapped[0][0]
+        ids: Column | None = None
+        if cut.by != "clock-reset":
+            *others, last = channels.sources
+            ids = source.columns[last.keys[0]]
+            if ids.words and any(last.keys[0] in other.keys for other in others):
+                raise RecordingError(f"{path}: column '{cut.column}' has texts", "map another column to the channel")
+            channels = replace(channels, sources=tuple(others))
+        log = cls(path, source, channels, cut, machine_file, files, _none())
+        return log._by_reset() if ids is None else log._by_id(ids)
+
+    def _by_id(self, ids: Column) -> _CutLog:
+        values = ids.values.reshape(len(ids.values), -1)
+        if values.shape[1] != 1:
+            raise RecordingError(
+                f"{self.path}: column '{self.cut.column}' (channel '{_ID}') has {values.shape[1]} values per sample",
+                "select one element, e.g. data[0]",
+            )
+        bridged = self.cut.by == "column"
+        if not self.channels.topics:
+            segments = segments_by_id(values[:, 0], ids.words, bridged)
+            return replace(self, segments=segments, rows={0: _RunRows.consecutive(segments, len(values))})
+        assert ids.time is not None
+        time, id_values = ids.time, values[:, 0]
+        if np.any(time[1:] < time[:-1]):
+            order = np.argsort(time, kind="stable")
+            time, id_values = time[order], id_values[order]
+        segments = segments_by_id(id_values, ids.words, bridged)
+        begins = time[segments.start]
+        ends = np.append(time, np.inf)[segments.stop]
+        rows = {id(clock): _RunRows.between(clock, begins, ends) for clock in self._clocks()}
+        return replace(self, segments=segments, rows=rows, begins=begins)
+
+    def _by_reset(self) -> _CutLog:
+        if any(item.topic for item in self.channels.sources):
+            raise RecordingError(
+                f"{self.path}: messages are in the order of their times: their clock cannot start again",
+                'cut them by a field: by = "column:TOPIC FIELD"',
+            )
+        if not self.channels.topics:
+            if self.channels.time.column is None:
+                raise RecordingError(
+                    f"{self.path}: has no clock that could start again: [channels] time states a rate",
+                    'cut it by a column: by = "column:NAME"',
+                )
+            stamps = self.source.columns[self.channels.time.key].values
+            segments = segments_by_reset(stamps)
+            return replace(self, segments=segments, rows={0: _RunRows.consecutive(segments, len(stamps))})
+        found: dict[int, Segments] = {id(clock): segments_by_reset(clock) for clock in self._clocks()}
+        counts = sorted({len(item) for item in found.values()})
+        if len(counts) > 1:
+            raise RecordingError(
+                f"{self.path}: its clocks start again at different numbers of places: "
+                f"{' and '.join(str(count - 1) for count in counts)}",
+                'cut it by a column: by = "column:NAME"',
+            )
+        rows = {id(clock): _RunRows.consecutive(found[id(clock)], len(clock)) for clock in self._clocks()}
+        return replace(self, segments=next(iter(found.values())), rows=rows)
+
+    def _clocks(self) -> Iterator[FloatArray]:
+        """Yield each clock of the channels once."""
+        known: set[int] = set()
+        for item in self.channels.sources:
+            for key in item.keys:
+                time = self.source.columns[key].time
+                if time is not None and id(time) not in known:
+                    known.add(id(time))
+                    yield time
+
+    @property
+    def lengths(self) -> Rows:
+        """The samples (r,) of each run, in the channel with most of them."""
+        counts = [item.counts for item in self.rows.values()]
+        return np.max(counts, axis=0) if counts else np.zeros(0, dtype=np.intp)
+
+    def recording(self, run: int, name: str, digest: str) -> LoggedRecording:
+        """Return a run as logged; raises RecordingError if a channel has no sample in it."""
+        path = Path(f"{self.path}{_MARK}{name}")
+        source, first_row = self.source, self.source.first_row
+        columns: dict[str, Column] = {}
+        known: dict[int, FloatArray] = {}
+        for key, column in source.columns.items():
+            rows = self.rows.get(id(column.time) if self.channels.topics else 0)
+            if rows is None:  # not of a channel
+                continue
+            time = column.time if self.channels.topics else None
+            if time is not None:
+                if id(time) not in known:
+                    known[id(time)] = rows.of(time, run)
+                time = known[id(time)]
+            columns[key] = replace(column, values=rows.of(column.values, run), time=time)
+        if first_row and 0 in self.rows:
+            first_row += int(self.segments.start[run])
+        columns, origin = self._from_start(run, columns)
+        part = replace(source, path=path, columns=columns, origin=origin, first_row=first_row, findings=())
+        channels, absent = self._present(columns)
+        mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
+        part = replace(part, findings=tuple(absent))
+        recording = assemble_recording(part, channels, self.machine_file.machine, mark)
+        recording = replace(recording, name=f"{self.path.stem}{_MARK}{name}")
+        factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
+        details = in_words(source.details, source.topics)
+        return LoggedRecording(recording, factors, channels.speed_low_pass, source.format, details, source.dialect)
+
+    def _from_start(self, run: int, columns: dict[str, Column]) -> tuple[dict[str, Column], float]:
+        """Return the columns of a run with times from its own start if the log counts from its start; the new origin.
+
+        A message's time, and one that counts from an epoch, then is what it is in a file with this run alone.
+        """
+        time, origin = self.channels.time, self.source.origin
+        if not self.channels.topics:
+            if not origin or time.column is None:
+                return columns, origin
+            clock = columns[time.key]
+            first = float(next(iter(clock.values[np.isfinite(clock.values)]), 0.0))
+            columns = columns | {time.key: replace(clock, values=clock.values - first)}
+            return columns, origin + first * time.factor
+        if not origin and not any(item.topic for item in self.channels.sources):
+            return columns, origin
+        starts = [float(column.time[0]) for column in columns.values() if column.time is not None and len(column.time)]
+        first = float(self.begins[run]) if self.begins is not None else min(starts, default=0.0)
+        shifted: dict[int, FloatArray] = {}
+        for key, column in columns.items():
+            if column.time is not None:
+                if id(column.time) not in shifted:
+                    shifted[id(column.time)] = column.time - first
+                columns[key] = replace(column, time=shifted[id(column.time)])
+        return columns, origin + first
+
+    def _present(self, columns: Mapping[str, Column]) -> tuple[ChannelMap, list[Finding]]:
+        """Return the map without ground truth that has no sample in a run, each with a note."""
+        absent = [
+            item
+            for item in self.channels.sources
+            if item.channel in GROUND_TRUTH and not all(len(columns[key].values) for key in item.keys)
+        ]
+        notes = [Finding(AbsentTruth("column", item.described, ""), item.channel, "note") for item in absent]
+        sources = tuple(item for item in self.channels.sources if item not in absent)
+        return replace(self.channels, sources=sources), notes
+
+    def outside(self) -> Iterator[Finding]:
+        """Yield a warning for each clock with samples that are in no run."""
+        if self.cut.by == "clock-reset":
+            return
+        for clock, rows in self.rows.items():
+            if rows.outside:
+                fact = SamplesOutsideRuns(rows.outside, rows.total, self.cut.column)
+                yield Finding(fact, self._channel(clock) if self.channels.topics else "")
+
+    def _channel(self, clock: int) -> str:
+        of = (item for item in self.channels.sources if id(self.source.columns[item.keys[0]].time) == clock)
+        return next((item.channel for item in of), "")
+
+    def no_run(self, longest: int) -> RecordingError:
+        """Return the error for a log without a run that can be used."""
+        if not len(self.segments):
+            return RecordingError(
+                f"{self.path}: column '{self.cut.column}' has no value in any sample", "name the column of the runs"
+            )
+        return RecordingError(
+            f"{self.path}: none of {counted(len(self.segments), 'run')} by {_described(self.cut)} has "
+            f"{FEWEST_SAMPLES} samples: the longest has {longest}",
+            "see cdtool info" if self.cut.by == "clock-reset" else "name a column whose value stays the same in a run",
+        )
+
+
+@dataclass(frozen=True)
+class _RunRows:
+    """The rows of one clock by run: from `begins` (r,) up to, not including, `stops` (r,).
+
+    `order` (total,) sorts the rows by run; None if they are in this order.
+    """
+
+    order: Rows | None
+    begins: Rows
+    stops: Rows
+    total: int
+
+    @classmethod
+    def consecutive(cls, segments: Segments, total: int) -> _RunRows:
+        """Return the rows of runs of consecutive rows."""
+        return cls(None, segments.start, segments.stop, total)
+
+    @classmethod
+    def between(cls, time: FloatArray, begins: FloatArray, ends: FloatArray) -> _RunRows:
+        """Return the rows whose time [s] is at least the beginning of a run (r,) and below its end (r,)."""
+        run = np.searchsorted(begins, time, side="right") - 1
+        inside = (run >= 0) & (time < np.append(ends, -np.inf)[run])  # run -1 is the last one, which is -inf
+        run[~inside] = len(begins)
+        order = None if np.all(run[1:] >= run[:-1]) else np.argsort(run, kind="stable")
+        ordered = run if order is None else run[order]
+        numbers = np.arange(len(begins))
+        first, stop = (np.searchsorted(ordered, numbers, side=side) for side in ("left", "right"))
+        return cls(order, first, stop, len(time))
+
+    @property
+    def counts(self) -> Rows:
+        """The number of rows (r,) of each run."""
+        return self.stops - self.begins
+
+    @property
+    def outside(self) -> int:
+        """The number of rows in no run."""
+        return self.total - int(self.counts.sum())
+
+    def of(self, values: FloatArray, run: int) -> FloatArray:
+        """Return the values in a run, in the order of the file."""
+        rows = slice(int(self.begins[run]), int(self.stops[run]))
+        return values[rows] if self.order is None else values[self.order[rows]]
+
+
+def _none() -> Segments:
+    nothing = np.empty(0, dtype=np.intp)
+    return Segments(nothing, nothing, np.empty(0), nothing, {})
+
+
+def _described(cut: RunCut) -> str:
+    return cut.by if cut.by == "clock-reset" else f"{cut.by} '{cut.column}'"
+
+
+def _common_map(path: Path, maps: Sequence[ChannelMap]) -> ChannelMap:
+    """Return the map of all parts of a log; raises RecordingError if their channels differ."""
+    for other in maps[1:]:
+        if [item.channel for item in other.sources] != [item.channel for item in maps[0].sources]:
+            raise RecordingError(f"{path}: its parts have different channels", "cut each part as a log of its own")
+    return maps[0]
+
+
+def _joined(path: Path, parts: Sequence[Source]) -> Source:
+    """Return the columns of the parts of a log one after the other, on the clock of the first part."""
+    first = min(parts, key=lambda part: part.origin)
+    ordered = sorted(parts, key=lambda part: part.origin)
+    columns: dict[str, Column] = {}
+    clocks: dict[tuple[int, ...], FloatArray] = {}
+    for key in first.columns:
+        own = [part.columns[key] for part in ordered]
+        if len({item.values.shape[1:] for item in own}) > 1:
+            raise RecordingError(f"{path}: the length of '{key}' differs between its parts", "select one element")
+        times = [item.time for item in own if item.time is not None]
+        clock = tuple(map(id, times))
+        if clock not in clocks:
+            shifted = [time + (part.origin - first.origin) for time, part in zip(times, ordered, strict=True)]
+            clocks[clock] = np.concatenate(shifted)
+        columns[key] = replace(own[0], values=np.concatenate([item.values for item in own]), time=clocks[clock])
+    findings = [item for part in ordered for item in with_file_name(part.path, part.findings)]
+    findings += missing_part_findings(path, [part.path for part in ordered])
+    return replace(
+        first,
+        path=path,
+        columns=columns,
+        findings=tuple(findings),
+        details=join_details(ordered),
+        topics=join_topics(ordered),
+    )

@@ -1,0 +1,126 @@
+"""Texts of a column of categories are read alike, whether the compiled loop or the slow path reads their line."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.channels import ChannelMap, ChannelSource, TimeSource
+from cdtool.columns import Categories
+from cdtool.formats.csv import Csv
+from cdtool.formats.csv.irregular_lines import IrregularLines
+from cdtool.formats.csv.word_cells import WordCells
+
+TEXTS = [
+    "a",
+    "b c",
+    "run_A",
+    "ü",
+    "x'y",
+    "7",
+    "-0.5",
+    "",
+    "nan",
+    "2024-05-01",
+    'say "hi"',
+    "semi;colon",
+    "com,ma",
+    "tab\there",
+]
+
+
+def wanted(column: str) -> ChannelMap:
+    sources = tuple(ChannelSource(name, (name,)) for name in ("speed", "torque"))
+    return ChannelMap(TimeSource("t", unit="s"), (*sources, ChannelSource("id", (column,), words=True)), ("axis",))
+
+
+def ids(source, column: str) -> list[str | float]:
+    column_read = source.columns[column]
+    return [column_read.words.get(value, value) for value in column_read.values.tolist()]
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(st.sampled_from(TEXTS), min_size=12, max_size=40),
+    st.sampled_from([",", ";", "\t"]),
+    st.integers(0, 3),
+    st.sampled_from([csv.QUOTE_MINIMAL, csv.QUOTE_NONNUMERIC]),
+)
+def test_texts_are_those_that_a_csv_reader_finds(tmp_path_factory, texts, separator, place, quoting):
+    path = tmp_path_factory.mktemp("words") / "log.csv"
+    names = ["t", "speed", "torque"]
+    names.insert(place, "phase")
+    lines = io.StringIO()
+    writer = csv.writer(lines, delimiter=separator, quoting=quoting, lineterminator="\n")
+    writer.writerow(names)
+    for i, text in enumerate(texts):
+        row: list[object] = [i / 100, i * 1.5, -i]
+        row.insert(place, text)
+        writer.writerow(row)
+    path.write_text(lines.getvalue(), encoding="utf-8")
+    source = Csv().columns(path, wanted("phase"))
+    expected = [float(text) if text in ("7", "-0.5") else np.nan if text in ("", "nan") else text for text in texts]
+    assert ids(source, "phase") == pytest.approx(expected, nan_ok=True)
+    assert source.columns["torque"].values.tolist() == [-float(i) for i in range(len(texts))]
+
+
+@pytest.mark.parametrize("separator", [" ", "   ", "\t"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_words_between_blanks_comments_and_repeated_headers_are_no_obstacle(tmp_path, separator, end):
+    rows = [separator.join((f"{i / 100}", word, f"{i}", f"{-i}")) for i, word in enumerate(["on", "off"] * 10)]
+    head = separator.join(("t", "phase", "speed", "torque"))
+    rows.insert(10, "# made by hand at lunch")
+    rows.insert(5, head)
+    path = tmp_path / "log.txt"
+    path.write_bytes(end.join([head, *rows, ""]).encode())
+    source = Csv().columns(path, wanted("phase"))
+    assert ids(source, "phase") == ["on", "off"] * 10
+    assert source.columns["speed"].values.tolist() == list(range(20))
+
+
+def test_a_text_has_the_same_code_in_every_block_of_a_long_table(tmp_path):
+    count = 60_000
+    words = [f"run {i // 20_000}" for i in range(count)]
+    path = tmp_path / "log.csv"
+    path.write_text("t,phase,speed,torque\n" + "".join(f"{i}e-3,{word},{i}.25,1\n" for i, word in enumerate(words)))
+    source = Csv().columns(path, wanted("phase"))
+    assert ids(source, "phase") == words and len(source.columns["phase"].words) == 3
+
+
+def test_a_number_beside_words_stays_a_number_with_a_decimal_comma(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t;phase;speed;torque\n" + "".join(f"0,{i:02d};{['1,5', 'x'][i % 2]};{i},5;1\n" for i in range(20)))
+    assert ids(Csv().columns(path, wanted("phase")), "phase") == [1.5, "x"] * 10
+
+
+def test_codes_are_exact_and_depend_on_the_text_alone():
+    first, second = Categories(), Categories()
+    texts = ["a", "b", "c", "\ud800"]
+    codes = [first.code(text) for text in texts]
+    assert codes == [second.code(text) for text in reversed(texts)][::-1]
+    assert all(-(2.0**53) < code <= -(2.0**52) and code == int(code) for code in codes) and len(set(codes)) == 4
+    assert first.words == dict(zip(codes, texts, strict=True))
+
+
+def test_hostile_lines_take_no_exponential_time():
+    from cdtool.formats.csv.word_cells import _pattern
+
+    for line in (b'"' * 5000, b" " * 20000, b'" ' * 5000, b"," * 5000, b'"a' * 3000 + b","):
+        assert WordCells is not None and _pattern(",", 40).sub(b"", line) is not None
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+@pytest.mark.parametrize("place", [0, 2])
+def test_usual_texts_do_not_make_their_lines_irregular(tmp_path, monkeypatch, separator, place):
+    monkeypatch.setattr(IrregularLines, "read", lambda *_: pytest.fail("the line is read slowly"))
+    rows = [["phase", "speed", "torque"]] + [[f"run_{i // 5}", f"{i}.5", "-1"] for i in range(20)]
+    for row in rows:
+        row.insert(place, row.pop(0))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(separator.join(["t" if i == 0 else f"{i}.0", *row]) for i, row in enumerate(rows)) + "\n")
+    assert ids(Csv().columns(path, wanted("phase")), "phase") == [f"run_{i // 5}" for i in range(20)]
