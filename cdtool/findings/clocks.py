@@ -239,7 +239,7 @@ class AssumedClock(Fact):
     """The column is taken to be the clock, in a unit that follows from its header, `start` or steps."""
 
     unit: str
-    evidence: Literal["header", "epoch", "excel", "steps"]
+    evidence: Literal["header", "name", "epoch", "excel", "steps"]
     start: float
     step: float
 
@@ -247,6 +247,7 @@ class AssumedClock(Fact):
         """Return unit and evidence."""
         why = {
             "header": "its header says so",
+            "name": "its name says so",
             "epoch": f"from its start, {self.start:.0f} after 1970",
             "excel": f"as Excel counts them, from its start {self.start:.9g} and its steps of {self.step:.3g}",
             "steps": f"from its steps of {self.step:.4g}",

@@ -6,7 +6,7 @@ from typing import Literal
 
 from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.frozen import frozen
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, first_of
 
 
 @frozen
@@ -22,15 +22,63 @@ class ColumnLeftOut(TemplateFact):
 
 
 @frozen
-class VariableLeftOut(TemplateFact):
-    """A MATLAB variable without real numbers; `what` it is instead."""
+class VariableLeftOut(Fact):
+    """A MATLAB variable without real numbers; `what` it is instead, and what to write in MATLAB (empty: nothing)."""
 
     variable: str
     what: str
+    advice: str = ""
 
     subject_field = "variable"
     variant_field = "what"
-    words = "variable '{variable}' is {what}: left out"
+
+    def sentence(self) -> str:
+        """Return variable, kind and advice."""
+        return f"variable '{self.variable}' is {self.what}: left out{f'; {self.advice}' if self.advice else ''}"
+
+
+@frozen
+class WithoutClock(Fact):
+    """A field of a struct of which `rows` values have no clock: the clocks of its struct have other lengths."""
+
+    variable: str
+    rows: int
+
+    subject_field = "variable"
+
+    def sentence(self) -> str:
+        """Return variable and length."""
+        values = counted(self.rows, "value")
+        return f"variable '{self.variable}' has {values}, and no clock of its struct is as long: left out"
+
+
+@frozen
+class RunsOfStructs(TemplateFact):
+    """The elements of an array of structs have clocks of their own: they are runs, one after the other."""
+
+    array: str
+    runs: int
+    rows: int
+
+    subject_field = "array"
+    words = (
+        "'{array}' is an array of structs with clocks of their own: {runs} runs one after the other, {rows} rows; "
+        "column '{array}(:)' is the number of the run, '{array}(2).NAME' a field of one run"
+    )
+
+
+@frozen
+class RunsWithoutRows(Fact):
+    """Elements of an array of structs whose clock is empty."""
+
+    array: str
+    runs: tuple[int, ...]
+
+    subject_field = "array"
+
+    def sentence(self) -> str:
+        """Return the elements."""
+        return f"{first_of([f'{self.array}({run})' for run in self.runs])} of '{self.array}': no rows, left out"
 
 
 @frozen

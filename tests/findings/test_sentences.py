@@ -97,6 +97,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (
+        clocks.AssumedClock("ms", "name", 0.0, 10.0),
+        "taken to be the clock, in ms (its name says so); a machine file says it for sure",
+    ),
+    (
         clocks.AssumedClock("ms", "header", 0.0, 10.0),
         "taken to be the clock, in ms (its header says so); a machine file says it for sure",
     ),
@@ -266,7 +270,20 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.LastLineDropped(99, "0."), "the last line (99) has no line end, and '0.' may be cut off, dropped"),
     # containers
     (containers.ColumnLeftOut("note", "of texts"), "column 'note' is of texts: left out"),
-    (containers.VariableLeftOut("note", "a char"), "variable 'note' is a char: left out"),
+    (containers.VariableLeftOut("note", "a cell"), "variable 'note' is a cell: left out"),
+    (containers.VariableLeftOut("d", "a duration", "seconds(d)"), "variable 'd' is a duration: left out; seconds(d)"),
+    (
+        containers.WithoutClock("log.gains", 7),
+        "variable 'log.gains' has 7 values, and no clock of its struct is as long: left out",
+    ),
+    (
+        containers.RunsOfStructs("trial", 3, 120),
+        (
+            "'trial' is an array of structs with clocks of their own: 3 runs one after the other, 120 rows; "
+            "column 'trial(:)' is the number of the run, 'trial(2).NAME' a field of one run"
+        ),
+    ),
+    (containers.RunsWithoutRows("trial", (4, 7)), "trial(4), trial(7) of 'trial': no rows, left out"),
     (containers.RowsAsColumns("variable", "q", 3, 500), "variable 'q' is 3 x 500: its rows are taken as columns"),
     (containers.PackedValues(0.01, 20.0), "packed (CF): times 0.01, plus 20"),
     (
