@@ -82,6 +82,44 @@ class RunsWithoutRows(Fact):
 
 
 @frozen
+class SheetLeftOut(TemplateFact):
+    """A sheet of a workbook without a table; `reason` is why."""
+
+    sheet: str
+    reason: str
+
+    subject_field = "sheet"
+    variant_field = "reason"
+    words = "sheet '{sheet}' is left out: {reason}"
+
+
+@frozen
+class ErrorCells(Fact):
+    """Cells of a workbook that contain an error; `error` is the first of them, in row `row`."""
+
+    count: int
+    error: str
+    row: int
+
+    def sentence(self) -> str:
+        """Return how many, and the first one."""
+        return f"{counted(self.count, 'cell')} with an error (first {self.error} in row {self.row}): taken as missing"
+
+
+@frozen
+class FormulasWithoutValue(Fact):
+    """Formulas of a workbook that was never calculated; `row` is that of the first."""
+
+    count: int
+    row: int
+
+    def sentence(self) -> str:
+        """Return how many, and what to do."""
+        formulas = counted(self.count, "formula")
+        return f"{formulas} without a value (first in row {self.row}): taken as missing; open and save it in Excel"
+
+
+@frozen
 class RowsAsColumns(TemplateFact):
     """A matrix with more columns than rows is read across."""
 

@@ -284,6 +284,12 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (containers.RunsWithoutRows("trial", (4, 7)), "trial(4), trial(7) of 'trial': no rows, left out"),
+    (containers.SheetLeftOut("Notes", "no numbers"), "sheet 'Notes' is left out: no numbers"),
+    (containers.ErrorCells(2, "#N/A", 6), "2 cells with an error (first #N/A in row 6): taken as missing"),
+    (
+        containers.FormulasWithoutValue(1, 4),
+        "1 formula without a value (first in row 4): taken as missing; open and save it in Excel",
+    ),
     (containers.RowsAsColumns("variable", "q", 3, 500), "variable 'q' is 3 x 500: its rows are taken as columns"),
     (containers.PackedValues(0.01, 20.0), "packed (CF): times 0.01, plus 20"),
     (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,15 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.channels import ChannelMap
-from cdtool.clock.plausible_unit import SECONDS, unit_since_1970
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import AssumedClock
 from cdtool.findings.containers import VariableLeftOut
-from cdtool.formats.column_names import requested_keys
+from cdtool.formats.clock_beside import assumed_clock
+from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.container_checks import check_size, library, one_line_errors
-from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.epoch_clock import common_origin
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.layout import Layout, arrange_columns, as_table
 from cdtool.formats.mat.leaves import MatColumn
@@ -29,11 +27,6 @@ from cdtool.formats.mat.variables import Numbers, Variables
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
-
-# A clock's unit at the end of its name: `t_ms`.
-_UNIT_IN_NAME = re.compile(r"_(s|ms|us|ns)$")
-# Upper limit of the median step -> unit, as for the clock of a table.
-_UNITS = ((0.5, "s"), (500.0, "ms"), (5e5, "us"), (np.inf, "ns"))
 
 
 @dataclass(frozen=True)
@@ -58,7 +51,9 @@ class Mat:
             names = layout.names
             keys = list(layout.columns) if wanted is None else requested_keys(path, wanted, names)
             reader = _Reader(path, layout)
-            columns = reader.columns(keys)
+            # A machine file that names a clock reads it as it is.
+            own_clocks = layout.own_clocks and (wanted is None or wanted.time.column == OWN_CLOCK)
+            columns = reader.columns(keys, own_clocks)
             if wanted is not None and reader.complex:
                 raise RecordingError(f"{path}: column '{reader.complex[0]}' is complex", "save its real part")
             if not columns:
@@ -95,11 +90,11 @@ class _Reader:
         self.complex: list[str] = []
         self.origin = 0.0
 
-    def columns(self, keys: list[str]) -> dict[str, Column]:
-        """Return these columns, with times [s] after `origin` if the file has several clocks."""
+    def columns(self, keys: list[str], own_clocks: bool) -> dict[str, Column]:
+        """Return these columns; with `own_clocks`, each with its times [s] after `origin`."""
         found = {**self._layout.hidden, **self._layout.columns}
         self._check_sizes([found[key] for key in keys])
-        times = self._times(keys) if self._layout.own_clocks else {}
+        times = self._times(keys) if own_clocks else {}
         columns = {}
         for key in keys:
             values = self._values(key, found[key])
@@ -121,19 +116,10 @@ class _Reader:
             if key in found and found[key].clock and found[key].clock not in raw:
                 stamps = self._values(found[key].clock, found[found[key].clock])
                 raw[found[key].clock] = np.empty(0) if stamps is None else stamps
-        clocks = {name: self._clock(name, stamps) for name, stamps in raw.items() if len(stamps)}
+        clocks = {name: assumed_clock(name, stamps, self.findings) for name, stamps in raw.items() if len(stamps)}
         origin = common_origin(clocks.values())
         self.origin = float(origin)
         return {name: clock.times(0, len(raw[name]), origin) for name, clock in clocks.items()}
-
-    def _clock(self, name: str, stamps: npt.NDArray[Any]) -> EpochClock:
-        """Return a clock, in the unit at the end of its name, or that of its start after 1970 or of its steps."""
-        start, step = float(stamps[0]), _usual_step(stamps)
-        in_name, epoch = _UNIT_IN_NAME.search(name), unit_since_1970(start)
-        unit = in_name[1] if in_name else epoch or next(unit for most, unit in _UNITS if step < most)
-        evidence = AssumedClock(unit, "name" if in_name else "epoch" if epoch else "steps", start, step)
-        self.findings.append(Finding(evidence, name, "note" if unit == "s" or in_name or epoch else "warning"))
-        return EpochClock(lambda start, end: stamps[start:end], SECONDS[unit])
 
     def _values(self, key: str, column: MatColumn) -> npt.NDArray[Any] | None:
         """Return the values of a column as the file has them; None for a complex column."""
@@ -155,10 +141,3 @@ class _Reader:
         if values.dtype.kind in "iu":
             self.findings += rounding_finding(key, rounded_integers(as_float64(values)))
         return values
-
-
-def _usual_step(stamps: npt.NDArray[Any]) -> float:
-    """Return the median step forward between time stamps; 0 without one."""
-    steps = np.diff(as_float64(stamps))
-    steps = steps[steps > 0.0]
-    return float(np.median(steps)) if len(steps) else 0.0

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from cdtool.findings import Finding
 from cdtool.findings.containers import RowsAsColumns, VariableLeftOut, WithoutClock
-from cdtool.formats.mat.leaves import Leaf, MatColumn, Section, is_clock_name
+from cdtool.formats.clock_beside import is_clock_name
+from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
 from cdtool.formats.mat.runs import StructRuns, short_name
 from cdtool.formats.mat.variables import Cells, Numbers, Structs, Text, Value, Variables, left_out
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -10,14 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.formats.clock_beside import is_clock_name
 from cdtool.formats.mat.variables import Numbers
-
-_CLOCK = re.compile(r"^(t|ts|time|tout|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
-
-
-def is_clock_name(name: str) -> bool:
-    """Return whether a variable or field has the name of a clock."""
-    return _CLOCK.match(name) is not None
 
 
 @dataclass(frozen=True)
