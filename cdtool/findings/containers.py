@@ -207,6 +207,38 @@ class LibraryMessage(TemplateFact):
 
 
 @frozen
+class CutWithinMessage(Fact):
+    """The last bytes of a file are an incomplete message."""
+
+    size: int
+
+    def sentence(self) -> str:
+        """Return how many bytes."""
+        return f"the last {counted(self.size, 'byte')} are not a complete message: cut off or damaged, and lost"
+
+
+@frozen
+class MessagesDamaged(TemplateFact):
+    """Messages of a file are damaged, and its library skipped them without a count."""
+
+    words = "the file is damaged: messages that cannot be read are lost"
+
+
+@frozen
+class LoggerDropouts(Fact):
+    """The logger could not write for a while: `count` times, `total` [s] in all, the longest [s]."""
+
+    count: int
+    total: float
+    longest: float
+
+    def sentence(self) -> str:
+        """Return how often and for how long."""
+        dropouts = counted(self.count, "dropout")
+        return f"{dropouts} of the logger, {self.total:.3g} s in all, at most {self.longest:.3g} s: messages are lost"
+
+
+@frozen
 class BagDamaged(TemplateFact):
     """A ROS bag is damaged where the count of its messages does not show it; `reason` is its library's."""
 

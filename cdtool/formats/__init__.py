@@ -31,6 +31,7 @@ FORMATS = Registry(
         "mdf": "cdtool.formats.mdf:Mdf",
         "tdms": "cdtool.formats.tdms:Tdms",
         "rosbag": "cdtool.formats.rosbag:Rosbag",
+        "ulog": "cdtool.formats.ulog:Ulog",
         "xlsx": "cdtool.formats.xlsx:Xlsx",
     },
     contract=("name", "suffixes", "sniff", "columns"),

@@ -284,6 +284,15 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (containers.RunsWithoutRows("trial", (4, 7)), "trial(4), trial(7) of 'trial': no rows, left out"),
+    (
+        containers.CutWithinMessage(7),
+        "the last 7 bytes are not a complete message: cut off or damaged, and lost",
+    ),
+    (containers.MessagesDamaged(), "the file is damaged: messages that cannot be read are lost"),
+    (
+        containers.LoggerDropouts(2, 0.32, 0.3),
+        "2 dropouts of the logger, 0.32 s in all, at most 0.3 s: messages are lost",
+    ),
     (containers.SheetLeftOut("Notes", "no numbers"), "sheet 'Notes' is left out: no numbers"),
     (containers.ErrorCells(2, "#N/A", 6), "2 cells with an error (first #N/A in row 6): taken as missing"),
     (
