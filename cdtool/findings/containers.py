@@ -107,6 +107,26 @@ class ErrorCells(Fact):
 
 
 @frozen
+class NumbersAmongTexts(Fact):
+    """A column of a workbook has numbers as texts with a comma, the first in row `row`, and large integers.
+
+    A program whose decimal mark is the point reads the text 1,234 as 1234 and keeps 1,5 as a text.
+    """
+
+    count: int
+    text: str
+    row: int
+    integers: int
+
+    def sentence(self) -> str:
+        """Return how many, and what may have happened."""
+        return (
+            f"{counted(self.count, 'number')} as text with a comma ('{self.text}' in row {self.row}) and "
+            f"{self.integers} of 1000 and more without decimals: was 1,234 taken for 1234 when a table was opened?"
+        )
+
+
+@frozen
 class FormulasWithoutValue(Fact):
     """Formulas of a workbook that was never calculated; `row` is that of the first."""
 

@@ -296,6 +296,13 @@ SENTENCES: list[tuple[Fact, str]] = [
     (containers.SheetLeftOut("Notes", "no numbers"), "sheet 'Notes' is left out: no numbers"),
     (containers.ErrorCells(2, "#N/A", 6), "2 cells with an error (first #N/A in row 6): taken as missing"),
     (
+        containers.NumbersAmongTexts(2, "1,5", 4, 3),
+        (
+            "2 numbers as text with a comma ('1,5' in row 4) and 3 of 1000 and more without decimals: "
+            "was 1,234 taken for 1234 when a table was opened?"
+        ),
+    ),
+    (
         containers.FormulasWithoutValue(1, 4),
         "1 formula without a value (first in row 4): taken as missing; open and save it in Excel",
     ),

@@ -152,6 +152,22 @@ def test_simulink_logs_use_the_clock_of_the_outer_struct(source_of):
     assert source.details["out.signals(2).label"] == "tau"
 
 
+def test_of_many_single_numbers_the_first_are_shown_and_the_rest_counted(source_of):
+    source = source_of({"t": T, "par": {f"p{i:03d}": float(i) for i in range(100)}})
+    assert source.details["par.p007"] == "7" and source.details["more numbers and texts"] == "40"
+
+
+def test_a_machine_file_that_names_a_clock_reads_it_as_it_is(tmp_path, machine):
+    log = {"t": 1.7e9 + T, "v": T, "t_cell": 1.7e9 + np.arange(90) / 1000, "F": np.ones(90)}
+    path = save_v7(tmp_path / "log.mat", {"log": log})
+    for clock in ('column = "log.t"', 'column = "time"'):
+        mapped = machine(
+            f'[channels]\ntime = {{ {clock}, unit = "s" }}\nspeed = {{ column = "log.v", unit = "rad/s" }}\n'
+        )
+        recording = read_as_logged(path, mapped).recording
+        assert recording.origin == pytest.approx(1.7e9) and recording["speed"].time[0] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_large_integers_are_counted(source_of):
     source = source_of({"log": {"n": np.array([1, 2**60 + 1], dtype=np.int64)}})
     assert [str(finding) for finding in source.findings if finding.channel == "log.n"] != []
@@ -254,7 +270,7 @@ def _value(kind: str, random: np.random.Generator):
     }[kind]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(fields=FIELDS, elements=st.integers(1, 3), clock=st.booleans(), packed=st.booleans(), seed=st.integers(0, 9999))
 def test_any_struct_has_the_same_columns_in_both_versions(tmp_path_factory, fields, elements, clock, packed, seed):
     pytest.importorskip("h5py")

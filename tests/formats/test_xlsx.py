@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
-from cdtool.findings.containers import ErrorCells, FormulasWithoutValue, SheetLeftOut
+from cdtool.findings.containers import ErrorCells, FormulasWithoutValue, NumbersAmongTexts, SheetLeftOut
 from cdtool.formats.csv import Csv
 from cdtool.formats.xlsx import Xlsx
 from cdtool.ingest.reading import choose_format, read_as_logged, survey
@@ -100,6 +100,15 @@ def test_texts_with_a_decimal_comma_are_numbers(tmp_path):
     assert source.columns["t"].values.tolist() == [0.01 * i for i in range(20)]
 
 
+def test_a_table_opened_with_the_wrong_decimal_mark_is_a_warning(tmp_path):
+    """1,234 became 1234, and 1,5 stayed a text."""
+    rows = [[0.01 * i, 1234 if i % 5 == 0 else f"1,{i}"] for i in range(20)]
+    source = survey(save(tmp_path / "log.xlsx", Run=[["t", "F"], *rows]))
+    (finding,) = [finding for finding in source.findings if isinstance(finding.fact, NumbersAmongTexts)]
+    assert (finding.channel, finding.severity) == ("F", "warning")
+    assert finding.fact == NumbersAmongTexts(16, "1,1", 3, 4)
+
+
 @pytest.mark.parametrize("epoch", ["1900", "1904"])
 def test_dates_are_a_clock_to_the_microsecond(tmp_path, epoch):
     workbook = openpyxl.Workbook()
@@ -130,6 +139,17 @@ def test_times_of_day_and_elapsed_times_are_seconds(tmp_path):
     source = survey(save(tmp_path / "log.xlsx", Run=[["clock", "elapsed", "F"], *rows]))
     assert np.diff(source.columns["clock"].values).tolist() == pytest.approx([1.0] * 19, abs=1e-5)
     assert source.columns["elapsed"].values[0] == pytest.approx(108000.0)
+
+
+def test_a_time_of_day_in_any_format_passes_midnight(tmp_path):
+    workbook = openpyxl.Workbook()
+    workbook.active.append(["t", "F"])
+    for i in range(40):
+        workbook.active.append([1.0 + (i - 20) / 86400, 1.0 * i])
+        workbook.active.cell(i + 2, 1).number_format = "[$-de-DE]hh:mm:ss"
+    workbook.save(tmp_path / "log.xlsx")
+    steps = np.diff(survey(tmp_path / "log.xlsx").columns["t"].values)
+    np.testing.assert_allclose(steps, 1.0, rtol=0.0, atol=1e-5)
 
 
 def test_excel_days_without_a_date_format_are_the_clock_in_days(tmp_path):

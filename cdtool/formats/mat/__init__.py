@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -27,6 +28,9 @@ from cdtool.formats.mat.variables import Numbers, Variables
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
+
+# So many single numbers and texts of a file are shown.
+_MOST_DETAILS = 60
 
 
 @dataclass(frozen=True)
@@ -58,9 +62,18 @@ class Mat:
                 raise RecordingError(f"{path}: column '{reader.complex[0]}' is complex", "save its real part")
             if not columns:
                 raise RecordingError(f"{path}: has no vector or matrix of numbers", "list its variables with `whos`")
-            details = {name: f"{numbers.read().ravel()[0]:g}" for name, numbers in layout.numbers.items()}
+            details = _details(layout)
         findings = tuple(dict.fromkeys((*layout.findings, *reader.findings)))
-        return Source(path, self.name, columns, reader.origin, findings, {**details, **layout.texts}, names)
+        return Source(path, self.name, columns, reader.origin, findings, details, names)
+
+
+def _details(layout: Layout) -> dict[str, str]:
+    """Return the first single numbers and texts of a file, and how many more there are."""
+    shown = list(islice((*layout.numbers, *layout.texts), _MOST_DETAILS))
+    numbers = {name: f"{layout.numbers[name].read().ravel()[0]:g}" for name in shown if name in layout.numbers}
+    texts = {name: layout.texts[name] for name in shown if name in layout.texts}
+    more = len(layout.numbers) + len(layout.texts) - len(shown)
+    return {**numbers, **texts, **({"more numbers and texts": str(more)} if more else {})}
 
 
 @contextmanager

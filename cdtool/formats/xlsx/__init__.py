@@ -18,7 +18,7 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import ErrorCells, FormulasWithoutValue, SheetLeftOut
+from cdtool.findings.containers import ErrorCells, FormulasWithoutValue, NumbersAmongTexts, SheetLeftOut
 from cdtool.formats.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys, split_unit
 from cdtool.formats.container_checks import check_size, library, one_line_errors
@@ -107,6 +107,8 @@ class _Sheet:
         shown = {i: name for i, name in enumerate(source.names) if name in source.columns}
         errors = {i: found for i, found in self.text.errors.items() if i in shown}
         findings = [Finding(ErrorCells(*found), shown[i], "warning") for i, found in errors.items()]
+        for i in self.text.commas.keys() & self.text.integers.keys() & shown.keys():
+            findings.append(Finding(NumbersAmongTexts(*self.text.commas[i], self.text.integers[i]), shown[i]))
         formulas = {i: found for i, found in self.formulas.items() if i in shown or i >= len(source.names)}
         return findings + [
             Finding(FormulasWithoutValue(*found), shown.get(i, ""), "loss") for i, found in formulas.items()

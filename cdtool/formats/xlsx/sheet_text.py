@@ -23,8 +23,11 @@ SEPARATOR = "\t"
 _MOST_ROWS, _MOST_COLUMNS = 1_048_576, 4096
 _TEXT_NUMBER = re.compile(r"\s*[+-]?[0-9][0-9., ]*([eE][+-]?[0-9]+)?\s*")
 _DAY_US = 86_400_000_000
+# Days in the first year of Excel's calendar are times of day, which may have passed midnight.
+_FIRST_DATE = 366.0
 # The lines are counted in blocks of so many, in which the size of the text is checked.
 _BLOCK = 1000
+_THOUSAND = 1000.0
 
 
 @dataclass
@@ -32,7 +35,8 @@ class SheetText:
     """What is known about a sheet after its text is written.
 
     `columns` is the width of its widest row, `rows_of_numbers` the number of rows with a number. By column, from 0:
-    `dates` are those with dates, `errors` the number of cells with an error, the first of them and its row.
+    `dates` are those with dates, `errors` the number of cells with an error, the first of them and its row, `commas`
+    the same of texts that are numbers with a comma, `integers` the number of cells with an integer from 1000 on.
     """
 
     columns: int = 0
@@ -42,6 +46,8 @@ class SheetText:
     decimal_point: bool = False
     dates: set[int] = field(default_factory=set)
     errors: dict[int, tuple[int, str, int]] = field(default_factory=dict)
+    commas: dict[int, tuple[int, str, int]] = field(default_factory=dict)
+    integers: dict[int, int] = field(default_factory=dict)
 
 
 def write_sheet(path: Path, rows: Callable[[], Iterable[Any]], epoch: datetime, target: Path) -> SheetText:
@@ -120,20 +126,25 @@ class _Cells:
             self.found.errors[column] = (count + 1, first, first_row)
             return "nan"
         if isinstance(value, str):
-            return self._word(value)
+            return self._word(value, column, row)
         if isinstance(value, bool):
             return "true" if value else "false"
         self._has_number = True
         if isinstance(value, int | float):
-            kind = _kind(cell.number_format)
+            kind = _kind(cell.number_format) if cell.has_style else ""
+            if abs(value) >= _THOUSAND and value == int(value):
+                self.found.integers[column] = self.found.integers.get(column, 0) + 1
             return self._number(value) if not kind else self._date(float(value), kind, column)
         self.found.dates.add(column)
         return _moment(value)
 
-    def _word(self, text: str) -> str:
+    def _word(self, text: str, column: int, row: int) -> str:
         if _TEXT_NUMBER.fullmatch(text):
             self._has_number = True
-            self.found.decimal_comma |= "," in text
+            if "," in text:
+                self.found.decimal_comma = True
+                count, first, first_row = self.found.commas.get(column, (0, text.strip(), row))
+                self.found.commas[column] = (count + 1, first, first_row)
             self.found.decimal_point |= "." in text and "," not in text
         return " ".join(text.replace('"', "'").split())
 
@@ -147,7 +158,7 @@ class _Cells:
             if kind == "elapsed":
                 return self._number(moment.total_seconds())
             self.found.dates.add(column)
-            if kind == "time" and 0.0 <= days < 1.0:
+            if 0.0 <= days < _FIRST_DATE:
                 return (datetime.min + moment).time().isoformat("microseconds")
             return (self._epoch + moment).isoformat(timespec="microseconds")
         except (OverflowError, ValueError):  # not a day that a calendar has
@@ -156,12 +167,12 @@ class _Cells:
 
 @cache
 def _kind(number_format: str | None) -> str:
-    """Return what a number format shows: "elapsed" time, a "date", "time" or "datetime"; empty for a number."""
-    from openpyxl.styles.numbers import is_datetime, is_timedelta_format
+    """Return what a number format shows: an "elapsed" time, or a "date" or time of day; empty for a number."""
+    from openpyxl.styles.numbers import is_date_format, is_timedelta_format
 
     if number_format is None or number_format == "General":
         return ""
-    return "elapsed" if is_timedelta_format(number_format) else is_datetime(number_format) or ""
+    return "elapsed" if is_timedelta_format(number_format) else "date" if is_date_format(number_format) else ""
 
 
 def _moment(value: Any) -> str:
