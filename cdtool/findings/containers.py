@@ -122,7 +122,7 @@ class NumbersAmongTexts(Fact):
         """Return how many, and what may have happened."""
         return (
             f"{counted(self.count, 'number')} as text with a comma ('{self.text}' in row {self.row}) and "
-            f"{self.integers} of 1000 and more without decimals: was 1,234 taken for 1234 when a table was opened?"
+            f"{self.integers} of 1000 and more without decimals: was 1,234 read as 1234 when a table was opened?"
         )
 
 

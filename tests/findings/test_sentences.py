@@ -299,7 +299,7 @@ SENTENCES: list[tuple[Fact, str]] = [
         containers.NumbersAmongTexts(2, "1,5", 4, 3),
         (
             "2 numbers as text with a comma ('1,5' in row 4) and 3 of 1000 and more without decimals: "
-            "was 1,234 taken for 1234 when a table was opened?"
+            "was 1,234 read as 1234 when a table was opened?"
         ),
     ),
     (

@@ -36,7 +36,7 @@ class SheetText:
 
     `columns` is the width of its widest row, `rows_of_numbers` the number of rows with a number. By column, from 0:
     `dates` are those with dates, `errors` the number of cells with an error, the first of them and its row, `commas`
-    the same of texts that are numbers with a comma, `integers` the number of cells with an integer from 1000 on.
+    the same of texts that are numbers with a comma, `integers` the number of integers of 1000 and more.
     """
 
     columns: int = 0
