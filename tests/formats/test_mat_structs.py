@@ -18,6 +18,7 @@ from cdtool.findings.containers import RunsOfStructs, RunsWithoutRows, VariableL
 from cdtool.formats.mat import Mat
 from cdtool.formats.mat.version_5 import read_variables
 from cdtool.ingest.reading import read_as_logged, survey
+from tests.formats import bombs
 from tests.formats.mat_files import save_v7, save_v73
 
 T = np.arange(40) * 0.01
@@ -320,6 +321,20 @@ def test_structs_nested_without_end_are_refused(tmp_path):
         nested = {"a": nested}
     with pytest.raises(RecordingError, match="more than 32 levels of structs and cells: refused"):
         Mat().columns(save_v7(tmp_path / "b.mat", {"s": nested}))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [(bombs.hdf5_one_chunk, "unpacks to 4096 MiB"), (bombs.hdf5_packed_twice, "compressed more than once: refused")],
+)
+def test_a_bomb_inside_of_a_struct_is_refused(tmp_path, make, message):
+    h5py = pytest.importorskip("h5py")
+    path = make(tmp_path / "a.mat")
+    with h5py.File(path, "a") as file:
+        file.create_group("s").attrs["MATLAB_class"] = np.bytes_("struct")
+        file.move("a", "s/a")
+    with pytest.raises(RecordingError, match=message):
+        Mat().columns(path)
 
 
 def test_references_without_number_are_refused(tmp_path):

@@ -61,6 +61,7 @@ class _Reader:
             return Opaque(matlab_class or "object")
         shape = _shape(node)
         if "MATLAB_empty" in node.attrs and 0 < node.size <= _MOST_DIMENSIONS:  # its values are the dimensions
+            check_chunks(self._path, node.name, node)
             shape = tuple(int(size) for size in node[()].ravel().tolist())
             empty: dict[str, Value] = {"cell": Cells(()), "struct": Structs(()), "char": Text("")}
             return empty.get(matlab_class, Numbers(shape if 0 in shape else (0, 0), partial(np.empty, (0, 0))))
