@@ -425,6 +425,15 @@ class StampsAsSeconds(TemplateFact):
 
 
 @frozen
+class DaysOfMatlab(TemplateFact):
+    """A column of days as MATLAB's datenum counts them, since `start`, an ISO date."""
+
+    start: str
+
+    words = "counts days, as MATLAB's datenum does: read in s since {start}"
+
+
+@frozen
 class UnusableClock(TemplateFact):
     """A dataset with a unit of time cannot be a clock."""
 

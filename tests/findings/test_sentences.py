@@ -97,6 +97,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (
+        clocks.DaysOfMatlab("2024-05-06T12:00:00.250"),
+        "counts days, as MATLAB's datenum does: read in s since 2024-05-06T12:00:00.250",
+    ),
+    (
         clocks.AssumedClock("ms", "name", 0.0, 10.0),
         "taken to be the clock, in ms (its name says so); a machine file says it for sure",
     ),

@@ -13,7 +13,7 @@ from scipy.io import loadmat, savemat
 from scipy.sparse import csc_array
 
 from cdtool.errors import RecordingError
-from cdtool.findings.clocks import AssumedClock
+from cdtool.findings.clocks import AssumedClock, DaysOfMatlab
 from cdtool.findings.containers import RunsOfStructs, RunsWithoutRows, VariableLeftOut, WithoutClock
 from cdtool.formats.mat import Mat
 from cdtool.formats.mat.version_5 import read_variables
@@ -167,6 +167,35 @@ def test_a_machine_file_that_names_a_clock_reads_it_as_it_is(tmp_path, machine):
         )
         recording = read_as_logged(path, mapped).recording
         assert recording.origin == pytest.approx(1.7e9) and recording["speed"].time[0] == pytest.approx(0.0, abs=1e-6)
+
+
+NOON = 739_385.5  # 2024-05-13 12:00
+
+
+def test_days_of_datenum_are_seconds_since_the_first(source_of):
+    source = source_of({"log": {"t": NOON + T / 86400, "v": T}})
+    assert source.columns["log.t"].unit == "s" and source.origin == 1_715_601_600.0
+    np.testing.assert_allclose(source.columns["log.t"].values, T, rtol=0.0, atol=1.1e-5)
+    assert [fact.start for fact in facts(source, DaysOfMatlab)] == ["2024-05-13T12:00:00.000"]
+
+
+def test_a_machine_file_reads_a_clock_in_days_in_seconds(tmp_path, machine):
+    path = save_v7(tmp_path / "log.mat", {"t": NOON + T / 86400, "v": T})
+    mapped = machine('[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "v", unit = "rad/s" }\n')
+    recording = read_as_logged(path, mapped).recording
+    np.testing.assert_allclose(recording["speed"].time, T, rtol=0.0, atol=1.1e-5)
+    assert recording.origin == 1_715_601_600.0
+
+
+def test_several_clocks_in_days_start_together(source_of):
+    later = NOON + (5.0 + T) / 86400
+    source = source_of({"a": {"t": NOON + T / 86400, "x": T}, "b": {"t": later, "y": T}})
+    np.testing.assert_allclose(source.columns["b.y"].time, 5.0 + T, rtol=0.0, atol=1.1e-5)
+    assert source.columns["a.x"].time[0] == 0.0 and source.origin == 1_715_601_600.0
+
+
+def test_a_column_without_the_name_of_a_clock_is_not_read_as_days(source_of):
+    assert source_of({"log": {"n": NOON + T / 86400, "t": T}}).columns["log.n"].values[0] == NOON
 
 
 def test_large_integers_are_counted(source_of):

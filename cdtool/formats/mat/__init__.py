@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar
@@ -16,12 +17,14 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
+from cdtool.findings.clocks import DaysOfMatlab
 from cdtool.findings.containers import VariableLeftOut
-from cdtool.formats.clock_beside import assumed_clock
+from cdtool.formats.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.container_checks import check_size, library, one_line_errors
-from cdtool.formats.epoch_clock import common_origin
+from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.mat import version_5, version_73
+from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
 from cdtool.formats.mat.layout import Layout, arrange_columns, as_table
 from cdtool.formats.mat.leaves import MatColumn
 from cdtool.formats.mat.variables import Numbers, Variables
@@ -112,8 +115,17 @@ class _Reader:
         for key in keys:
             values = self._values(key, found[key])
             if values is not None:
-                columns[key] = Column(key, as_float64(values), times.get(found[key].clock))
+                columns[key] = self._column(key, values, times.get(found[key].clock))
         return columns
+
+    def _column(self, key: str, values: npt.NDArray[Any], time: FloatArray | None) -> Column:
+        """Return a column; a clock that counts days is read in seconds."""
+        if not is_clock_name(key.rpartition(".")[2]) or not is_datenum(values):
+            return Column(key, as_float64(values), time)
+        seconds, start = since_first(values)
+        self.findings.append(Finding(DaysOfMatlab(str(np.datetime64(round(start * 1000), "ms"))), key, "note"))
+        self.origin = self.origin or start
+        return Column(key, seconds, time, "s")
 
     def _check_sizes(self, columns: list[MatColumn]) -> None:
         """Raise RecordingError if the columns are far larger than the file: it is a decompression bomb."""
@@ -129,10 +141,15 @@ class _Reader:
             if key in found and found[key].clock and found[key].clock not in raw:
                 stamps = self._values(found[key].clock, found[found[key].clock])
                 raw[found[key].clock] = np.empty(0) if stamps is None else stamps
-        clocks = {name: assumed_clock(name, stamps, self.findings) for name, stamps in raw.items() if len(stamps)}
+        clocks = {name: self._clock(name, stamps) for name, stamps in raw.items() if len(stamps)}
         origin = common_origin(clocks.values())
         self.origin = float(origin)
         return {name: clock.times(0, len(raw[name]), origin) for name, clock in clocks.items()}
+
+    def _clock(self, name: str, stamps: npt.NDArray[Any]) -> EpochClock:
+        if is_datenum(stamps):
+            return EpochClock(lambda start, end: stamps[start:end], DAY_S, Fraction(-DAY_1970 * int(DAY_S)))
+        return assumed_clock(name, stamps, self.findings)
 
     def _values(self, key: str, column: MatColumn) -> npt.NDArray[Any] | None:
         """Return the values of a column as the file has them; None for a complex column."""
