@@ -198,6 +198,12 @@ def test_a_column_without_the_name_of_a_clock_is_not_read_as_days(source_of):
     assert source_of({"log": {"n": NOON + T / 86400, "t": T}}).columns["log.n"].values[0] == NOON
 
 
+def test_an_image_in_a_struct_is_left_out_by_name(source_of):
+    source = source_of({"log": {"t": T, "image": np.ones((70, 90))}})
+    assert list(source.columns) == ["log.t"]
+    assert [fact.what for fact in facts(source, VariableLeftOut)] == ["a 70 x 90 matrix, too wide for a log"]
+
+
 def test_large_integers_are_counted(source_of):
     source = source_of({"log": {"n": np.array([1, 2**60 + 1], dtype=np.int64)}})
     assert [str(finding) for finding in source.findings if finding.channel == "log.n"] != []

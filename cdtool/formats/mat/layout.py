@@ -20,6 +20,8 @@ from cdtool.formats.mat.runs import StructRuns, short_name
 from cdtool.formats.mat.variables import Cells, Numbers, Structs, Text, Value, Variables, left_out
 
 _DETAIL = 80
+# A matrix in a struct with more columns than this is an image or a model.
+_WIDEST = 64
 
 
 @dataclass
@@ -113,6 +115,8 @@ class _Walk:
             self.findings.append(left_out(name, f"{' x '.join(map(str, shape))} array"))
         elif shape == (1, 1):
             self.numbers[name] = value
+        elif structs and min(shape) > _WIDEST:
+            self.findings.append(left_out(name, f"{shape[0]} x {shape[1]} matrix, too wide for a log"))
         else:
             self.leaves.append(Leaf(name, last, structs, value))
 
