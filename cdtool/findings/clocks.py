@@ -242,7 +242,7 @@ class AssumedClock(Fact):
     """The column is taken to be the clock, in a unit that follows from its header, `start` or steps."""
 
     unit: str
-    evidence: Literal["header", "epoch", "excel", "steps"]
+    evidence: Literal["header", "name", "epoch", "excel", "steps"]
     start: float
     step: float
 
@@ -250,6 +250,7 @@ class AssumedClock(Fact):
         """Return unit and evidence."""
         why = {
             "header": "its header says so",
+            "name": "its name says so",
             "epoch": f"from its start, {self.start:.0f} after 1970",
             "excel": f"as Excel counts them, from its start {self.start:.9g} and its steps of {self.step:.3g}",
             "steps": f"from its steps of {self.step:.4g}",
@@ -424,6 +425,15 @@ class StampsAsSeconds(TemplateFact):
     start: str
 
     words = "time stamps: taken as seconds from {start}"
+
+
+@frozen
+class DaysOfMatlab(TemplateFact):
+    """A column of days as MATLAB's datenum counts them, since `start`, an ISO date."""
+
+    start: str
+
+    words = "counts days, as MATLAB's datenum does: read in s since {start}"
 
 
 @frozen

@@ -22,15 +22,121 @@ class ColumnLeftOut(TemplateFact):
 
 
 @frozen
-class VariableLeftOut(TemplateFact):
-    """A MATLAB variable without real numbers; `what` it is instead."""
+class VariableLeftOut(Fact):
+    """A MATLAB variable without real numbers; `what` it is instead, and what to write in MATLAB (empty: nothing)."""
 
     variable: str
     what: str
+    advice: str = ""
 
     subject_field = "variable"
     variant_field = "what"
-    words = "variable '{variable}' is {what}: left out"
+
+    def sentence(self) -> str:
+        """Return variable, kind and advice."""
+        return f"variable '{self.variable}' is {self.what}: left out{f'; {self.advice}' if self.advice else ''}"
+
+
+@frozen
+class WithoutClock(Fact):
+    """A field of a struct of which `rows` values have no clock: the clocks of its struct have other lengths."""
+
+    variable: str
+    rows: int
+
+    subject_field = "variable"
+
+    def sentence(self) -> str:
+        """Return variable and length."""
+        values = counted(self.rows, "value")
+        return f"variable '{self.variable}' has {values}, and no clock of its struct is as long: left out"
+
+
+@frozen
+class RunsOfStructs(TemplateFact):
+    """The elements of an array of structs have clocks of their own: they are runs, one after the other."""
+
+    array: str
+    runs: int
+    rows: int
+
+    subject_field = "array"
+    words = (
+        "'{array}' is an array of structs with clocks of their own: {runs} runs one after the other, {rows} rows; "
+        "column '{array}(:)' is the number of the run, '{array}(2).NAME' a field of one run"
+    )
+
+
+@frozen
+class RunsWithoutRows(Fact):
+    """Elements of an array of structs whose clock is empty."""
+
+    array: str
+    runs: tuple[int, ...]
+
+    subject_field = "array"
+
+    def sentence(self) -> str:
+        """Return the elements."""
+        return f"{first_of([f'{self.array}({run})' for run in self.runs])} of '{self.array}': no rows, left out"
+
+
+@frozen
+class SheetLeftOut(TemplateFact):
+    """A sheet of a workbook without a table; `reason` is why."""
+
+    sheet: str
+    reason: str
+
+    subject_field = "sheet"
+    variant_field = "reason"
+    words = "sheet '{sheet}' is left out: {reason}"
+
+
+@frozen
+class ErrorCells(Fact):
+    """Cells of a workbook that contain an error; `error` is the first of them, in row `row`."""
+
+    count: int
+    error: str
+    row: int
+
+    def sentence(self) -> str:
+        """Return how many, and the first one."""
+        return f"{counted(self.count, 'cell')} with an error (first {self.error} in row {self.row}): taken as missing"
+
+
+@frozen
+class NumbersAmongTexts(Fact):
+    """A column of a workbook has numbers as texts with a comma, the first in row `row`, and large integers.
+
+    A program whose decimal mark is the point reads the text 1,234 as 1234 and keeps 1,5 as a text.
+    """
+
+    count: int
+    text: str
+    row: int
+    integers: int
+
+    def sentence(self) -> str:
+        """Return how many, and what may have happened."""
+        return (
+            f"{counted(self.count, 'number')} as text with a comma ('{self.text}' in row {self.row}) and "
+            f"{self.integers} of 1000 and more without decimals: was 1,234 read as 1234 when a table was opened?"
+        )
+
+
+@frozen
+class FormulasWithoutValue(Fact):
+    """Formulas of a workbook that was never calculated; `row` is that of the first."""
+
+    count: int
+    row: int
+
+    def sentence(self) -> str:
+        """Return how many, and what to do."""
+        formulas = counted(self.count, "formula")
+        return f"{formulas} without a value (first in row {self.row}): taken as missing; open and save it in Excel"
 
 
 @frozen
@@ -118,6 +224,38 @@ class LibraryMessage(TemplateFact):
 
     variant_field = "text"
     words = "{library} says: {text}"
+
+
+@frozen
+class CutWithinMessage(Fact):
+    """The last bytes of a file are an incomplete message."""
+
+    size: int
+
+    def sentence(self) -> str:
+        """Return how many bytes."""
+        return f"the last {counted(self.size, 'byte')} are not a complete message: cut off or damaged, and lost"
+
+
+@frozen
+class MessagesDamaged(TemplateFact):
+    """Messages of a file are damaged, and its library skipped them without a count."""
+
+    words = "the file is damaged: messages that cannot be read are lost"
+
+
+@frozen
+class LoggerDropouts(Fact):
+    """The logger could not write for a while: `count` times, `total` [s] in all, the longest [s]."""
+
+    count: int
+    total: float
+    longest: float
+
+    def sentence(self) -> str:
+        """Return how often and for how long."""
+        dropouts = counted(self.count, "dropout")
+        return f"{dropouts} of the logger, {self.total:.3g} s in all, at most {self.longest:.3g} s: messages are lost"
 
 
 @frozen

@@ -32,6 +32,8 @@ FORMATS = Registry(
         "tdms": "cdtool.formats.tdms:Tdms",
         "rosbag": "cdtool.formats.rosbag:Rosbag",
         "rosbag2": "cdtool.formats.rosbag2:Rosbag2",
+        "ulog": "cdtool.formats.ulog:Ulog",
+        "xlsx": "cdtool.formats.xlsx:Xlsx",
     },
     contract=("name", "suffixes", "sniff", "columns"),
 )

@@ -20,7 +20,8 @@ from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
-_NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
+# The last part of a name counts: `log.t` of a struct, `Sheet1!time` of a workbook.
+_NAMES = re.compile(r"^([^\[]*[.!])?(t|ts|time|timestamp|zeit|clock|tempo|temps)([^a-z]|$)", re.IGNORECASE)
 # Upper limit of the median step -> unit: it covers sample rates of 2 Hz to 2 MHz in each unit.
 _UNITS = ((0.5, "s"), (500.0, "ms"), (5e5, "us"), (np.inf, "ns"))
 # The years 2000 to 2100 in Excel's days since 1899-12-30, and the longest step of such a clock [days]; a clock in

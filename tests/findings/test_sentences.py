@@ -98,6 +98,14 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (
+        clocks.DaysOfMatlab("2024-05-06T12:00:00.250"),
+        "counts days, as MATLAB's datenum does: read in s since 2024-05-06T12:00:00.250",
+    ),
+    (
+        clocks.AssumedClock("ms", "name", 0.0, 10.0),
+        "taken to be the clock, in ms (its name says so); a machine file says it for sure",
+    ),
+    (
         clocks.AssumedClock("ms", "header", 0.0, 10.0),
         "taken to be the clock, in ms (its header says so); a machine file says it for sure",
     ),
@@ -267,7 +275,42 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.LastLineDropped(99, "0."), "the last line (99) has no line end, and '0.' may be cut off, dropped"),
     # containers
     (containers.ColumnLeftOut("note", "of texts"), "column 'note' is of texts: left out"),
-    (containers.VariableLeftOut("note", "a char"), "variable 'note' is a char: left out"),
+    (containers.VariableLeftOut("note", "a cell"), "variable 'note' is a cell: left out"),
+    (containers.VariableLeftOut("d", "a duration", "seconds(d)"), "variable 'd' is a duration: left out; seconds(d)"),
+    (
+        containers.WithoutClock("log.gains", 7),
+        "variable 'log.gains' has 7 values, and no clock of its struct is as long: left out",
+    ),
+    (
+        containers.RunsOfStructs("trial", 3, 120),
+        (
+            "'trial' is an array of structs with clocks of their own: 3 runs one after the other, 120 rows; "
+            "column 'trial(:)' is the number of the run, 'trial(2).NAME' a field of one run"
+        ),
+    ),
+    (containers.RunsWithoutRows("trial", (4, 7)), "trial(4), trial(7) of 'trial': no rows, left out"),
+    (
+        containers.CutWithinMessage(7),
+        "the last 7 bytes are not a complete message: cut off or damaged, and lost",
+    ),
+    (containers.MessagesDamaged(), "the file is damaged: messages that cannot be read are lost"),
+    (
+        containers.LoggerDropouts(2, 0.32, 0.3),
+        "2 dropouts of the logger, 0.32 s in all, at most 0.3 s: messages are lost",
+    ),
+    (containers.SheetLeftOut("Notes", "no numbers"), "sheet 'Notes' is left out: no numbers"),
+    (containers.ErrorCells(2, "#N/A", 6), "2 cells with an error (first #N/A in row 6): taken as missing"),
+    (
+        containers.NumbersAmongTexts(2, "1,5", 4, 3),
+        (
+            "2 numbers as text with a comma ('1,5' in row 4) and 3 of 1000 and more without decimals: "
+            "was 1,234 read as 1234 when a table was opened?"
+        ),
+    ),
+    (
+        containers.FormulasWithoutValue(1, 4),
+        "1 formula without a value (first in row 4): taken as missing; open and save it in Excel",
+    ),
     (containers.RowsAsColumns("variable", "q", 3, 500), "variable 'q' is 3 x 500: its rows are taken as columns"),
     (containers.PackedValues(0.01, 20.0), "packed (CF): times 0.01, plus 20"),
     (

@@ -45,11 +45,12 @@ def test_scalars_are_details_and_integers_become_float64(saved):
     assert source.columns["n"].values.dtype == np.float64
 
 
-def test_structs_cells_and_texts_are_named_and_left_out(saved):
+def test_what_has_no_column_is_named_and_single_numbers_and_texts_are_details(saved):
     cells = np.array([["a"], [2.0]], dtype=object)
     source = Mat().columns(saved({"t": np.arange(3.0), "s": {"a": 1}, "c": cells, "w": "words", "z": np.ones(3) * 1j}))
     left_out = {(finding.fact.variable, finding.fact.what) for finding in source.findings}
-    assert left_out == {("s", "a struct"), ("c", "a cell"), ("w", "a char"), ("z", "complex")}
+    assert left_out == {("c", "a cell"), ("z", "complex")}
+    assert source.details == {"s.a": "1", "w": "words"}
     assert list(source.columns) == ["t"]
 
 

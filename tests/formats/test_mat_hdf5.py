@@ -15,49 +15,9 @@ from cdtool.errors import RecordingError
 from cdtool.formats.mat import Mat
 from cdtool.ingest.reading import choose_format, read_recording, survey
 from cdtool.machine_file import read_machine_file
-from tests.formats.bombs import with_mat_header
+from tests.formats.mat_files import CLASSES, save_v73
 
 h5py = pytest.importorskip("h5py")
-
-CLASSES = {"f8": "double", "f4": "single", "i2": "int16", "u4": "uint32", "i8": "int64", "b1": "logical", "u1": "uint8"}
-_COMPLEX = np.dtype([("real", "f8"), ("imag", "f8")])
-
-
-def save_v73(path: Path, variables: dict[str, object], **options) -> Path:
-    """Write variables like MATLAB: reverse dimensions, class as an attribute, texts as numbers, cells as references."""
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, value in variables.items():
-            _put(file, name, value, options)
-    return with_mat_header(path)
-
-
-def _put(file, name: str, value: object, options: dict) -> None:
-    if isinstance(value, dict):
-        group = file.create_group(name)
-        group.attrs["MATLAB_class"] = np.bytes_("struct")
-        for key, part in value.items():
-            _put(group, key, part, options)
-    elif isinstance(value, list):
-        target = file.require_group("#refs#").create_dataset(f"{name}_0", data=np.zeros((1, 3)))
-        cells = file.create_dataset(name, data=np.array([[target.ref]], dtype=h5py.ref_dtype))
-        cells.attrs["MATLAB_class"] = np.bytes_("cell")
-    elif isinstance(value, str):
-        codes = np.array([[ord(letter)] for letter in value], dtype=np.uint16)
-        file.create_dataset(name, data=codes).attrs["MATLAB_class"] = np.bytes_("char")
-    else:
-        array = np.atleast_2d(np.asarray(value))
-        if not array.size:
-            dataset = file.create_dataset(name, data=np.array(array.shape, dtype=np.uint64))
-            dataset.attrs["MATLAB_empty"] = np.uint8(1)
-        elif array.dtype.kind == "c":
-            both = np.empty(array.T.shape, _COMPLEX)
-            both["real"], both["imag"] = array.T.real, array.T.imag
-            dataset = file.create_dataset(name, data=both, **options)
-        else:
-            stored = array.T.astype(np.uint8) if array.dtype == bool else array.T
-            dataset = file.create_dataset(name, data=stored, **({} if array.size == 1 else options))
-        kind = "logical" if array.dtype == bool else CLASSES.get(array.dtype.str[1:], "double")
-        dataset.attrs["MATLAB_class"] = np.bytes_(kind)
 
 
 def same(found, expected) -> None:
@@ -91,7 +51,14 @@ def test_any_matrix_has_the_same_columns_as_in_version_7(tmp_path_factory, shape
 def test_variables_other_than_vectors_and_matrices_of_numbers_are_named_and_left_out(tmp_path):
     path = save_v73(
         tmp_path / "a.mat",
-        {"t": np.arange(3.0), "s": {"a": 1.0}, "c": [1], "w": "words", "z": np.ones(3) * 1j, "e": np.empty((0, 3))}
+        {
+            "t": np.arange(3.0),
+            "s": {"a": 1.0},
+            "c": ("a", "b"),
+            "w": "words",
+            "z": np.ones(3) * 1j,
+            "e": np.empty((0, 3)),
+        }
         | {"cube": np.zeros((2, 3, 4))},
     )
     with h5py.File(path, "a") as file:
@@ -105,17 +72,16 @@ def test_variables_other_than_vectors_and_matrices_of_numbers_are_named_and_left
         file["f"].attrs["MATLAB_class"] = np.bytes_("function_handle")
     source = Mat().columns(path)
     assert list(source.columns) == ["t"]
+    assert source.details == {"s.a": "1", "w": "words"}
     left_out = {finding.fact.variable: finding.fact.what for finding in source.findings}
     assert left_out == {
-        "c": "a cell",
+        "c": "a cell of texts",
         "cube": "a 2 x 3 x 4 array",
         "e": "a 0 x 3 array",
-        "f": "a function",
+        "f": "a function handle",
         "l": "a link",
         "o": "a datetime",
-        "p": "a sparse",
-        "s": "a struct",
-        "w": "a char",
+        "p": "a sparse matrix",
         "x": "a link",
         "z": "complex",
     }

@@ -1,0 +1,173 @@
+"""MATLAB .mat files: arrays of numbers, in structs and cells too, as columns. Version 7.3 (HDF5) by h5py."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import islice
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.channels import ChannelMap
+from cdtool.columns import Column, as_float64
+from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.clocks import DaysOfMatlab
+from cdtool.findings.containers import VariableLeftOut
+from cdtool.formats.clock_beside import assumed_clock, is_clock_name
+from cdtool.formats.column_names import OWN_CLOCK, requested_keys
+from cdtool.formats.container_checks import check_size, library, one_line_errors
+from cdtool.formats.epoch_clock import EpochClock, common_origin
+from cdtool.formats.mat import version_5, version_73
+from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
+from cdtool.formats.mat.layout import Layout, arrange_columns, as_table
+from cdtool.formats.mat.leaves import MatColumn
+from cdtool.formats.mat.variables import Numbers, Variables
+from cdtool.formats.source import Source
+from cdtool.large_integers import rounded_integers, rounding_finding
+from cdtool.recording import FloatArray
+
+# So many single numbers and texts of a file are shown.
+_MOST_DETAILS = 60
+
+
+@dataclass(frozen=True)
+class Mat:
+    """MATLAB files: a vector is a column, a matrix the columns `name[0]`, `name[1]`; a field is `log.joint(2).tau`.
+
+    Columns of structs with several clocks are on the clock of their own struct that is as long.
+    """
+
+    name: ClassVar[str] = "mat"
+    suffixes: ClassVar[tuple[str, ...]] = (".mat",)
+
+    def sniff(self, path: Path) -> bool:
+        """Return whether the file starts like a MATLAB file of version 5 to 7.3."""
+        with path.open("rb") as file:
+            return file.read(len(version_5.MAGIC)) == version_5.MAGIC or version_73.is_version_73(path)
+
+    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
+        """Return the columns that `wanted` names, or all columns; raises RecordingError."""
+        with _variables(path) as variables:
+            layout = arrange_columns(variables)
+            names = layout.names
+            keys = list(layout.columns) if wanted is None else requested_keys(path, wanted, names)
+            reader = _Reader(path, layout)
+            # A machine file that names a clock reads it as it is.
+            own_clocks = layout.own_clocks and (wanted is None or wanted.time.column == OWN_CLOCK)
+            columns = reader.columns(keys, own_clocks)
+            if wanted is not None and reader.complex:
+                raise RecordingError(f"{path}: column '{reader.complex[0]}' is complex", "save its real part")
+            if not columns:
+                raise RecordingError(f"{path}: has no vector or matrix of numbers", "list its variables with `whos`")
+            details = _details(layout)
+        findings = tuple(dict.fromkeys((*layout.findings, *reader.findings)))
+        return Source(path, self.name, columns, reader.origin, findings, details, names)
+
+
+def _details(layout: Layout) -> dict[str, str]:
+    """Return the first single numbers and texts of a file, and how many more there are."""
+    shown = list(islice((*layout.numbers, *layout.texts), _MOST_DETAILS))
+    numbers = {name: f"{layout.numbers[name].read().ravel()[0]:g}" for name in shown if name in layout.numbers}
+    texts = {name: layout.texts[name] for name in shown if name in layout.texts}
+    more = len(layout.numbers) + len(layout.texts) - len(shown)
+    return {**numbers, **texts, **({"more numbers and texts": str(more)} if more else {})}
+
+
+@contextmanager
+def _variables(path: Path) -> Iterator[Variables]:
+    """Yield the variables of a file, whose numbers can be read as long as it is open."""
+    if not version_73.is_version_73(path):
+        yield version_5.read_variables(path)
+        return
+    try:
+        h5py = library("h5py", "hdf5", path)
+    except RecordingError as fault:
+        raise RecordingError(
+            f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed",
+            f"{fault.hint}; or save it in MATLAB with save(name, ..., '-v7')",
+        ) from fault
+    with one_line_errors(path, "a MATLAB 7.3 file"), h5py.File(path, "r") as file:
+        yield version_73.read_variables(path, h5py, file)
+
+
+class _Reader:
+    """Reads columns of a file; `complex` are those that are complex."""
+
+    def __init__(self, path: Path, layout: Layout) -> None:
+        self._path, self._layout = path, layout
+        self._table: tuple[Numbers | None, npt.NDArray[Any]] = (None, np.empty(0))
+        self.findings: list[Finding] = []
+        self.complex: list[str] = []
+        self.origin = 0.0
+
+    def columns(self, keys: list[str], own_clocks: bool) -> dict[str, Column]:
+        """Return these columns; with `own_clocks`, each with its times [s] after `origin`."""
+        found = {**self._layout.hidden, **self._layout.columns}
+        self._check_sizes([found[key] for key in keys])
+        times = self._times(keys) if own_clocks else {}
+        columns = {}
+        for key in keys:
+            values = self._values(key, found[key])
+            if values is not None:
+                columns[key] = self._column(key, values, times.get(found[key].clock))
+        return columns
+
+    def _column(self, key: str, values: npt.NDArray[Any], time: FloatArray | None) -> Column:
+        """Return a column; a clock that counts days is read in seconds."""
+        if not is_clock_name(key.rpartition(".")[2]) or not is_datenum(values):
+            return Column(key, as_float64(values), time)
+        seconds, start = since_first(values)
+        self.findings.append(Finding(DaysOfMatlab(str(np.datetime64(round(start * 1000), "ms"))), key, "note"))
+        self.origin = self.origin or start
+        return Column(key, seconds, time, "s")
+
+    def _check_sizes(self, columns: list[MatColumn]) -> None:
+        """Raise RecordingError if the columns are far larger than the file: it is a decompression bomb."""
+        numbers = {id(s.numbers): s.numbers for column in columns for s in column.sections if s.numbers is not None}
+        declared = sum(each.shape[0] * each.shape[1] * (1 + each.is_complex) for each in numbers.values())
+        check_size(self._path, declared + sum(section.rows for column in columns for section in column.sections))
+
+    def _times(self, keys: list[str]) -> dict[str, FloatArray]:
+        """Return the times of the clocks of these columns; they start at 0 if they count from an epoch."""
+        found = self._layout.columns
+        raw: dict[str, npt.NDArray[Any]] = {}
+        for key in keys:
+            if key in found and found[key].clock and found[key].clock not in raw:
+                stamps = self._values(found[key].clock, found[found[key].clock])
+                raw[found[key].clock] = np.empty(0) if stamps is None else stamps
+        clocks = {name: self._clock(name, stamps) for name, stamps in raw.items() if len(stamps)}
+        origin = common_origin(clocks.values())
+        self.origin = float(origin)
+        return {name: clock.times(0, len(raw[name]), origin) for name, clock in clocks.items()}
+
+    def _clock(self, name: str, stamps: npt.NDArray[Any]) -> EpochClock:
+        if is_datenum(stamps):
+            return EpochClock(lambda start, end: stamps[start:end], DAY_S, Fraction(-DAY_1970 * int(DAY_S)))
+        return assumed_clock(name, stamps, self.findings)
+
+    def _values(self, key: str, column: MatColumn) -> npt.NDArray[Any] | None:
+        """Return the values of a column as the file has them; None for a complex column."""
+        parts: list[npt.NDArray[Any]] = []
+        for section in column.sections:
+            if section.numbers is None:
+                parts.append(np.full(section.rows, np.nan))
+                continue
+            if section.numbers.is_complex:
+                self.complex.append(key)
+                self.findings.append(Finding(VariableLeftOut(section.name, "complex"), severity="note"))
+                return None
+            if self._table[0] is not section.numbers:  # the columns of a matrix follow one another
+                self._table = (None, np.empty(0))
+                whole = np.asarray(section.numbers.read())
+                self._table = section.numbers, as_table(section, whole, self.findings)
+            parts.append(section.values(self._table[1]))
+        values = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        if values.dtype.kind in "iu":
+            self.findings += rounding_finding(key, rounded_integers(as_float64(values)))
+        return values

@@ -1,0 +1,382 @@
+"""Structs, arrays of structs and cells of MATLAB files, the same for version 7 and for version 7.3."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io.matlab
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import loadmat, savemat
+from scipy.sparse import csc_array
+
+from cdtool.errors import RecordingError
+from cdtool.findings.clocks import AssumedClock, DaysOfMatlab
+from cdtool.findings.containers import RunsOfStructs, RunsWithoutRows, VariableLeftOut, WithoutClock
+from cdtool.formats.mat import Mat
+from cdtool.formats.mat.version_5 import read_variables
+from cdtool.ingest.reading import read_as_logged, survey
+from tests.formats import bombs
+from tests.formats.mat_files import save_v7, save_v73
+
+T = np.arange(40) * 0.01
+SAVE = [pytest.param(save_v7, id="7"), pytest.param(save_v73, id="7.3")]
+
+
+@pytest.fixture(params=SAVE)
+def source_of(request, tmp_path):
+    """Write variables in one of the versions; return what is read."""
+    if request.param is save_v73:
+        pytest.importorskip("h5py")
+    return lambda variables, **options: Mat().columns(request.param(tmp_path / "log.mat", variables, **options))
+
+
+def trials(rows=(30, 40, 50)):
+    random = np.random.default_rng(3)
+    return [{"t": 0.01 * np.arange(n), "q": random.random((n, 2)), "load": 1.0 * n, "tool": f"tool {n}"} for n in rows]
+
+
+def facts(source, kind):
+    return [finding.fact for finding in source.findings if isinstance(finding.fact, kind)]
+
+
+def test_a_field_has_the_name_that_a_matlab_user_writes(source_of):
+    source = source_of({"log": {"t": T, "joint": [{"tau": T, "q": 2 * T}, {"tau": 3 * T, "q": T}], "in": {"v": -T}}})
+    expected = {"log.t", "log.joint(1).tau", "log.joint(1).q", "log.joint(2).tau", "log.joint(2).q", "log.in.v"}
+    assert set(source.columns) == expected and source.findings == ()
+    assert source.columns["log.joint(2).tau"].values.tolist() == (3 * T).tolist()
+    assert all(column.time is None for column in source.columns.values())  # one clock: a table
+
+
+def test_a_matrix_in_a_cell_in_a_struct_has_columns_and_cells_of_texts_are_named(source_of):
+    source = source_of({"log": {"t": T, "c": (np.column_stack((T, -T)), "text", {"v": T}), "names": ("a", "b")}})
+    assert set(source.columns) == {"log.t", "log.c{1}[0]", "log.c{1}[1]", "log.c{3}.v"}
+    assert source.details == {"log.c{2}": "text"}
+    assert [fact.sentence() for fact in facts(source, VariableLeftOut)] == [
+        "variable 'log.names' is a cell of texts: left out"
+    ]
+
+
+def test_groups_of_one_struct_have_the_clock_that_is_as_long_and_the_rest_is_named(source_of):
+    log = {"t": T, "tau": T, "time_cell_ms": np.arange(90.0), "force": np.ones(90), "gains": np.arange(7.0)}
+    source = source_of({"log": log})
+    assert set(source.columns) == {"log.t", "log.tau", "log.time_cell_ms", "log.force"}
+    np.testing.assert_allclose(source.columns["log.force"].time, 0.001 * np.arange(90), rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(source.columns["log.tau"].time, T)
+    assert {(fact.unit, fact.evidence) for fact in facts(source, AssumedClock)} == {("s", "steps"), ("ms", "name")}
+    assert facts(source, WithoutClock) == [WithoutClock("log.gains", 7)]
+    assert "log.gains" in source.names  # a machine file may name it
+
+
+def test_structs_with_clocks_of_their_own_keep_them(source_of):
+    source = source_of({"drive": {"t": T, "tau": T}, "cell": {"t": 0.5 + np.arange(60) / 500, "f": np.ones(60)}})
+    assert source.columns["cell.f"].time[0] == 0.5 and len(source.columns["cell.f"].time) == 60
+    assert len(source.columns["drive.tau"].time) == 40
+
+
+@pytest.mark.parametrize(("unit", "since"), [("s", 1.7e9), ("ms", 1.7e12)])
+def test_clocks_that_count_from_1970_start_together(source_of, unit, since):
+    step = {"s": 0.01, "ms": 10.0}[unit]
+    one, two = since + step * np.arange(20), since + 5 * step + step * np.arange(30)
+    source = source_of({"a": {"t": one, "x": one - since}, "b": {"t": two, "y": two - since}})
+    assert source.origin == 1.7e9
+    assert source.columns["a.x"].time[0] == 0.0
+    assert source.columns["b.y"].time[0] == pytest.approx(0.05, abs=1e-6)
+    assert {fact.evidence for fact in facts(source, AssumedClock)} == {"epoch"}
+
+
+def test_a_clock_in_an_unknown_unit_is_a_warning(source_of):
+    source = source_of({"a": {"t": 1.0 * np.arange(20), "x": T[:20]}, "b": {"t": T, "y": T}})
+    (doubt,) = [finding for finding in source.findings if finding.severity == "warning"]
+    assert (doubt.channel, doubt.fact.unit) == ("a.t", "ms")
+
+
+def test_structs_with_their_own_clocks_are_runs_one_after_the_other(source_of):
+    source = source_of({"trial": trials()})
+    assert set(source.columns) == {"trial(:)", "trial(:).t", "trial(:).q[0]", "trial(:).q[1]", "trial(:).load"}
+    runs = trials()
+    values = {name: column.values for name, column in source.columns.items()}
+    assert values["trial(:)"].tolist() == [1.0] * 30 + [2.0] * 40 + [3.0] * 50
+    np.testing.assert_array_equal(values["trial(:).t"], np.concatenate([run["t"] for run in runs]))
+    np.testing.assert_array_equal(values["trial(:).q[1]"], np.concatenate([run["q"][:, 1] for run in runs]))
+    assert set(values["trial(:).load"][30:70]) == {40.0}
+    assert source.details["trial(2).tool"] == "tool 40"
+    assert facts(source, RunsOfStructs) == [RunsOfStructs("trial", 3, 120)]
+    assert {"trial(1).t", "trial(3).q[1]"} <= set(source.names)
+
+
+def test_one_run_can_be_mapped_by_its_own_name(tmp_path, machine):
+    path = save_v7(tmp_path / "log.mat", {"trial": trials()})
+    channels = 'time = { column = "trial(2).t", unit = "s" }\nspeed = { column = "trial(2).q[0]", unit = "rad/s" }\n'
+    recording = read_as_logged(path, machine(f"[channels]\n{channels}")).recording
+    np.testing.assert_array_equal(recording["speed"].values[:, 0], trials()[1]["q"][:, 0])
+
+
+def test_a_run_without_rows_is_named_and_a_field_that_a_run_has_not_is_missing(source_of):
+    runs = trials()
+    runs[1] |= {"t": np.empty((0, 0)), "q": np.empty((0, 0))}
+    runs[2]["q"] = np.empty((0, 0))
+    source = source_of({"trial": runs})
+    assert len(source.columns["trial(:)"].values) == 80
+    assert np.isnan(source.columns["trial(:).q[0]"].values[30:]).all()
+    assert facts(source, RunsWithoutRows) == [RunsWithoutRows("trial", (2,))]
+
+
+def test_parameters_of_runs_are_named_once(source_of):
+    runs = [run | {"gains": np.arange(5.0), "handle": ("a",)} for run in trials()]
+    source = source_of({"trial": runs})
+    assert facts(source, WithoutClock) == [WithoutClock("trial(:).gains", 5)]
+    assert [fact.variable for fact in facts(source, VariableLeftOut)] == ["trial(:).handle"]
+
+
+def test_structs_with_equal_clocks_or_a_second_clock_are_no_runs(source_of):
+    side = [{"t": T, "tau": T}, {"t": T, "tau": -T}]
+    second = [{"t": T * k, "x": T, "t_cell": np.arange(9.0), "f": np.ones(9)} for k in (1.0, 2.0)]
+    source = source_of({"joint": side, "run": second})
+    assert "joint(2).tau" in source.columns and "run(2).f" in source.columns
+    assert not [name for name in source.columns if "(:)" in name]
+
+
+def test_an_array_of_structs_of_single_numbers_is_a_table(source_of):
+    """table2struct(T) makes one struct per row."""
+    source = source_of({"T": [{"t": 0.1 * i, "tau": 2.0 * i, "note": "x"} for i in range(6)]})
+    assert source.columns["T(:).t"].values.tolist() == [0.1 * i for i in range(6)]
+    assert source.columns["T(:).tau"].values.tolist() == [0, 2, 4, 6, 8, 10]
+
+
+def test_simulink_logs_use_the_clock_of_the_outer_struct(source_of):
+    signals = [{"values": np.column_stack((T, 2 * T)), "label": "q"}, {"values": -T, "label": "tau"}]
+    source = source_of({"out": {"time": T, "signals": signals}, "other": {"time": np.arange(9.0), "x": np.ones(9)}})
+    assert len(source.columns["out.signals(1).values[1]"].time) == 40
+    assert source.details["out.signals(2).label"] == "tau"
+
+
+def test_of_many_single_numbers_the_first_are_shown_and_the_rest_counted(source_of):
+    source = source_of({"t": T, "par": {f"p{i:03d}": float(i) for i in range(100)}})
+    assert source.details["par.p007"] == "7" and source.details["more numbers and texts"] == "40"
+
+
+def test_a_machine_file_that_names_a_clock_reads_it_as_it_is(tmp_path, machine):
+    log = {"t": 1.7e9 + T, "v": T, "t_cell": 1.7e9 + np.arange(90) / 1000, "F": np.ones(90)}
+    path = save_v7(tmp_path / "log.mat", {"log": log})
+    for clock in ('column = "log.t"', 'column = "time"'):
+        mapped = machine(
+            f'[channels]\ntime = {{ {clock}, unit = "s" }}\nspeed = {{ column = "log.v", unit = "rad/s" }}\n'
+        )
+        recording = read_as_logged(path, mapped).recording
+        assert recording.origin == pytest.approx(1.7e9) and recording["speed"].time[0] == pytest.approx(0.0, abs=1e-6)
+
+
+NOON = 739_385.5  # 2024-05-13 12:00
+
+
+def test_days_of_datenum_are_seconds_since_the_first(source_of):
+    source = source_of({"log": {"t": NOON + T / 86400, "v": T}})
+    assert source.columns["log.t"].unit == "s" and source.origin == 1_715_601_600.0
+    np.testing.assert_allclose(source.columns["log.t"].values, T, rtol=0.0, atol=1.1e-5)
+    assert [fact.start for fact in facts(source, DaysOfMatlab)] == ["2024-05-13T12:00:00.000"]
+
+
+def test_a_machine_file_reads_a_clock_in_days_in_seconds(tmp_path, machine):
+    path = save_v7(tmp_path / "log.mat", {"t": NOON + T / 86400, "v": T})
+    mapped = machine('[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "v", unit = "rad/s" }\n')
+    recording = read_as_logged(path, mapped).recording
+    np.testing.assert_allclose(recording["speed"].time, T, rtol=0.0, atol=1.1e-5)
+    assert recording.origin == 1_715_601_600.0
+
+
+def test_several_clocks_in_days_start_together(source_of):
+    later = NOON + (5.0 + T) / 86400
+    source = source_of({"a": {"t": NOON + T / 86400, "x": T}, "b": {"t": later, "y": T}})
+    np.testing.assert_allclose(source.columns["b.y"].time, 5.0 + T, rtol=0.0, atol=1.1e-5)
+    assert source.columns["a.x"].time[0] == 0.0 and source.origin == 1_715_601_600.0
+
+
+def test_a_column_without_the_name_of_a_clock_is_not_read_as_days(source_of):
+    assert source_of({"log": {"n": NOON + T / 86400, "t": T}}).columns["log.n"].values[0] == NOON
+
+
+def test_an_image_in_a_struct_is_left_out_by_name(source_of):
+    source = source_of({"log": {"t": T, "image": np.ones((70, 90))}})
+    assert list(source.columns) == ["log.t"]
+    assert [fact.what for fact in facts(source, VariableLeftOut)] == ["a 70 x 90 matrix, too wide for a log"]
+
+
+def test_large_integers_are_counted(source_of):
+    source = source_of({"log": {"n": np.array([1, 2**60 + 1], dtype=np.int64)}})
+    assert [str(finding) for finding in source.findings if finding.channel == "log.n"] != []
+
+
+def test_sparse_matrices_are_named_with_what_makes_them_readable(tmp_path):
+    savemat(tmp_path / "log.mat", {"t": T, "s": {"p": csc_array(np.eye(3))}})
+    (finding,) = Mat().columns(tmp_path / "log.mat").findings
+    assert finding.fact.sentence() == (
+        "variable 's.p' is a sparse matrix: left out; save it as a plain matrix: full(s.p)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("matlab_class", "advice"),
+    [
+        ("table", "save it as a struct: table2struct(log.x, 'ToScalar', true)"),
+        (
+            "timetable",
+            "save it as a struct: table2struct(timetable2table(log.x), 'ToScalar', true), with its row times",
+        ),
+        ("timeseries", "struct('time', log.x.Time, 'data', log.x.Data)"),
+        ("duration", "seconds(log.x)"),
+        ("my.Class", "save its properties as a struct of numbers"),
+    ],
+)
+def test_objects_are_named_with_what_makes_them_readable(tmp_path, matlab_class, advice):
+    h5py = pytest.importorskip("h5py")
+    path = save_v73(tmp_path / "log.mat", {"t": T, "log": {"a": 1.0}})
+    with h5py.File(path, "a") as file:
+        file["log"].create_dataset("x", data=np.zeros((1, 6), np.uint32)).attrs.update(
+            {"MATLAB_class": np.bytes_(matlab_class), "MATLAB_object_decode": np.int32(3)}
+        )
+    (finding,) = Mat().columns(path).findings
+    assert advice in finding.fact.sentence() and len(str(finding)) <= 300
+
+
+def test_an_object_of_version_7_is_named_by_its_class(tmp_path):
+    """An opaque array: flags, name, type system, class, then what only MATLAB can read."""
+    path = save_v7(tmp_path / "log.mat", {"t": T})
+
+    def part(kind: int, content: bytes) -> bytes:
+        return np.array([kind, len(content)], "<u4").tobytes() + content + bytes(-len(content) % 8)
+
+    content = part(6, np.array([17, 0], "<u4").tobytes()) + part(1, b"T") + part(1, b"MCOS") + part(1, b"table")
+    path.write_bytes(path.read_bytes() + part(14, content + part(14, b"")))
+    (finding,) = Mat().columns(path).findings
+    assert (finding.fact.variable, finding.fact.what) == ("T", "a table")
+    assert "table2struct(T, 'ToScalar', true)" in finding.fact.sentence()
+
+
+# --- Files that MATLAB wrote
+
+WRITTEN = Path(scipy.io.matlab.__file__).parent / "tests" / "data"
+
+
+@pytest.mark.parametrize("version", ["6.1_SOL2", "6.5.1_GLNX86", "7.1_GLNX86", "7.4_GLNX86"])
+def test_files_that_matlab_wrote_are_read_as_scipy_reads_them(version):
+    if not WRITTEN.exists():
+        pytest.skip("this SciPy came without its test data")
+    variables = read_variables(WRITTEN / f"teststructarr_{version}.mat")
+    one, two = variables["teststructarr"].elements
+    assert one["one"].read().item() == 1 and two["two"].text == "number 2"
+    nested = read_variables(WRITTEN / f"teststructnest_{version}.mat")["teststructnest"].elements[0]
+    assert nested["two"].elements[0]["three"].text == "number 3"
+    cells = read_variables(WRITTEN / f"testcell_{version}.mat")["testcell"].elements
+    assert [cell.read().size for cell in cells[1:]] == [1, 2, 3]
+    numbers = read_variables(WRITTEN / f"testcomplex_{version}.mat")["testcomplex"]
+    assert numbers.is_complex and numbers.shape == (1, 9)
+    cube = read_variables(WRITTEN / f"test3dmatrix_{version}.mat")["test3dmatrix"].read()
+    np.testing.assert_array_equal(cube, loadmat(WRITTEN / f"test3dmatrix_{version}.mat")["test3dmatrix"])
+
+
+def test_every_file_of_scipys_tests_is_read_or_refused_in_one_line():
+    if not WRITTEN.exists():
+        pytest.skip("this SciPy came without its test data")
+    paths = sorted(WRITTEN.glob("*.mat"))
+    assert len(paths) > 80
+    for path in paths:
+        try:
+            survey(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault)
+
+
+# --- Both versions, and damage
+
+FIELDS = st.dictionaries(
+    st.sampled_from("abcd"), st.sampled_from(["vector", "matrix", "scalar", "text", "empty"]), min_size=1
+)
+
+
+def _value(kind: str, random: np.random.Generator):
+    return {
+        "vector": random.random(9),
+        "matrix": random.random((9, 3)),
+        "scalar": float(random.random()),
+        "text": "word",
+        "empty": np.empty((0, 0)),
+    }[kind]
+
+
+@settings(max_examples=25, deadline=None)
+@given(fields=FIELDS, elements=st.integers(1, 3), clock=st.booleans(), packed=st.booleans(), seed=st.integers(0, 9999))
+def test_any_struct_has_the_same_columns_in_both_versions(tmp_path_factory, fields, elements, clock, packed, seed):
+    pytest.importorskip("h5py")
+    folder, random = tmp_path_factory.mktemp("mat"), np.random.default_rng(seed)
+    array = [
+        {key: _value(kind, random) for key, kind in sorted(fields.items())}
+        | ({"t": np.sort(random.random(9))} if clock else {})
+        for _ in range(elements)
+    ]
+    variables = {"n": np.arange(5.0), "s": array if elements > 1 else array[0]}
+    old = Mat().columns(save_v7(folder / "old.mat", variables, do_compression=packed))
+    new = Mat().columns(save_v73(folder / "new.mat", variables, **({"compression": "gzip"} if packed else {})))
+    assert new.names == old.names and new.findings == old.findings and new.details == old.details
+    for name, column in old.columns.items():
+        assert new.columns[name].values.tobytes() == column.values.tobytes()
+
+
+@pytest.mark.parametrize("save", SAVE)
+def test_damaged_bytes_are_one_line_or_the_remaining_values(tmp_path, save):
+    if save is save_v73:
+        pytest.importorskip("h5py")
+    path = save(tmp_path / "a.mat", {"log": {"t": T, "c": (T, "x"), "j": trials()}})
+    whole, random = path.read_bytes(), np.random.default_rng(8)
+    for attempt in range(60):
+        wrong = bytearray(whole)
+        wrong[int(random.integers(128, len(whole)))] ^= 1 << int(random.integers(8))
+        path.write_bytes(wrong if attempt % 3 else whole[: int(random.integers(1, len(whole)))])
+        try:
+            source = survey(path)
+        except RecordingError as fault:
+            assert "\n" not in str(fault)
+        else:
+            assert all(len(column.values) for column in source.columns.values())
+
+
+def test_structs_nested_without_end_are_refused(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = save_v73(tmp_path / "a.mat", {"t": T})
+    with h5py.File(path, "a") as file:
+        cell = file.create_dataset("c", (2, 1), dtype=h5py.ref_dtype)
+        cell.attrs["MATLAB_class"] = np.bytes_("cell")
+        cell[:] = cell.ref
+    with pytest.raises(RecordingError, match="more than 32 levels of structs and cells: refused"):
+        Mat().columns(path)
+    nested: object = T
+    for _ in range(40):
+        nested = {"a": nested}
+    with pytest.raises(RecordingError, match="more than 32 levels of structs and cells: refused"):
+        Mat().columns(save_v7(tmp_path / "b.mat", {"s": nested}))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [(bombs.hdf5_one_chunk, "unpacks to 4096 MiB"), (bombs.hdf5_packed_twice, "compressed more than once: refused")],
+)
+def test_a_bomb_inside_of_a_struct_is_refused(tmp_path, make, message):
+    h5py = pytest.importorskip("h5py")
+    path = make(tmp_path / "a.mat")
+    with h5py.File(path, "a") as file:
+        file.create_group("s").attrs["MATLAB_class"] = np.bytes_("struct")
+        file.move("a", "s/a")
+    with pytest.raises(RecordingError, match=message):
+        Mat().columns(path)
+
+
+def test_references_without_number_are_refused(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = save_v73(tmp_path / "a.mat", {"t": T})
+    with h5py.File(path, "a") as file:
+        cell = file.create_dataset("c", (10**6, 1), dtype=h5py.ref_dtype, chunks=(100, 1))
+        cell.attrs["MATLAB_class"] = np.bytes_("cell")
+    with pytest.raises(RecordingError, match="more than 200000 values of structs and cells: refused"):
+        Mat().columns(path)
