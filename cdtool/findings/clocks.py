@@ -392,6 +392,35 @@ class ValuesWithoutTime(Fact):
 
 
 @frozen
+class RepeatedRows(Fact):
+    """Rows that repeat the one before, with which a program filled a channel of a lower rate."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return (
+            f"{counted(self.count, 'row')} with the time and the values of the one before: "
+            "filled with the previous value, left out"
+        )
+
+
+@frozen
+class StatedPeriodDiffers(Fact):
+    """The steps of a clock are not the period [s] that the head of the file states."""
+
+    stated: float
+    step: float
+
+    def sentence(self) -> str:
+        """Return both."""
+        return (
+            f"its clock has steps of {1e3 * self.step:.6g} ms, but the file states a sample time of "
+            f"{1e3 * self.stated:.6g} ms: is the clock right?"
+        )
+
+
+@frozen
 class WrittenTimes(Fact):
     """How dates and times are written, what their seconds count from, and how often the clock wrapped.
 

@@ -24,6 +24,7 @@ FORMATS = Registry(
     kind="format",
     table={
         "csv": "cdtool.formats.csv:Csv",
+        "twincat_scope": "cdtool.formats.twincat_scope:TwincatScope",
         "mcap": "cdtool.formats.mcap:Mcap",
         "mat": "cdtool.formats.mat:Mat",
         "parquet": "cdtool.formats.parquet:Parquet",

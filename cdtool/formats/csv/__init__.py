@@ -43,11 +43,14 @@ class Csv:
     sniffs_any_text: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
-        """Return whether the file starts with text other than markup."""
+        """Return whether the file starts with text other than markup, and is not of another format of text."""
         from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
+        from cdtool.formats.csv.foreign_heads import is_measurement, is_scope_export
         from cdtool.formats.csv.text import read_sample
 
         head = read_sample(path, HEAD_BYTES)
+        if is_measurement(head) or is_scope_export(head):
+            return False
         return bool(head.strip() or read_sample(path).strip()) and looks_like_text(head)
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:

@@ -33,7 +33,7 @@ _FIRST, _LAST = 2.0**53 / NS, 2.0**63 / NS
 # Bytes of the longest stamp: digits, a point, a sign.
 _WIDEST = 24
 # Bytes that may follow a number: blank, tab, line ends, separators.
-_AFTER_CELL = np.frombuffer(b" \t\r\n,;|", dtype=np.uint8)
+_AFTER_CELL = np.frombuffer(b" \t\r\n,;|:", dtype=np.uint8)
 
 
 def two_readings(stamps: FloatArray, factor: float) -> str:
@@ -116,6 +116,16 @@ def _cells(dialect: Dialect, rows: Rows, column: int, decimals: int) -> Iterator
         begin = _begin(data[:size], starts[is_row], dialect.separator, column)
         yield row, *_ticks(data, begin, ord(dialect.marks.decimal), decimals)
         line, row = line + len(starts), row + len(begin)
+
+
+def read_whole_numbers(data: Bytes, dialect: Dialect, column: int, blank: Integers) -> tuple[Integers, BoolArray]:
+    """Return the integers (n,) of a column in complete lines without the `blank` ones, and which cells are integers.
+
+    They are exact up to 18 digits.
+    """
+    ends = np.flatnonzero(data == dialect.text.line_end[0])
+    starts = np.delete(np.concatenate(([0], ends[:-1] + 1)), blank)
+    return _ticks(data, _begin(data, starts, dialect.separator, column), -1, 0)
 
 
 def _begin(data: Bytes, starts: Integers, separator: str, column: int) -> Integers:
