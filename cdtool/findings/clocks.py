@@ -487,6 +487,28 @@ class NoStartTime(Fact):
 
 
 @frozen
+class StartAssumed(Fact):
+    """Channels without a date and time beside others that have them."""
+
+    channels: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """Return the channels, and what is assumed."""
+        return f"no date and time of {first_of(self.channels)}: taken to begin with the first of the others"
+
+
+@frozen
+class DerivedTimes(Fact):
+    """Channels that have other sample times than the one to which the column of times belongs."""
+
+    channels: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """Return the channels, and where their times come from."""
+        return f"X_Value is not the time of {first_of(self.channels)}: taken from Delta_X, in each packet of samples"
+
+
+@frozen
 class HeaderDelay(TemplateFact):
     """How much later messages were logged than stamped [ms]: the median, and 5 and 95 %."""
 

@@ -25,6 +25,7 @@ FORMATS = Registry(
     table={
         "csv": "cdtool.formats.csv:Csv",
         "twincat_scope": "cdtool.formats.twincat_scope:TwincatScope",
+        "lvm": "cdtool.formats.lvm:Lvm",
         "mcap": "cdtool.formats.mcap:Mcap",
         "mat": "cdtool.formats.mat:Mat",
         "parquet": "cdtool.formats.parquet:Parquet",
