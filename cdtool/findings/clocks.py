@@ -381,6 +381,37 @@ class OwnClocks(Fact):
 
 
 @frozen
+class LowerRate(Fact):
+    """A channel of a table has a value in a `share` of the rows only, at a rate [Hz] of its own."""
+
+    rate: float
+    share: float
+
+    def sentence(self) -> str:
+        """Return the rate, and what its empty cells are."""
+        return (
+            f"has a value in {100.0 * self.share:.3g} % of the rows: a rate of its own, {self.rate:.6g} Hz, "
+            "and its empty cells are no samples"
+        )
+
+
+@frozen
+class ClockUnitAssumed(Fact):
+    """Clocks of a table without a unit in the header, which are read in s; the first of them has this step."""
+
+    clocks: tuple[str, ...]
+    step: float
+
+    def sentence(self) -> str:
+        """Return the clocks, the rate that follows, and what to write."""
+        rate = f", at {1.0 / self.step:.6g} Hz" if self.step > 0.0 else ""
+        return (
+            f"no unit in the header of {first_of(self.clocks)}: read in s{rate}; "
+            f"write the unit in the header if that is wrong, e.g. '{self.clocks[0]} [ms]'"
+        )
+
+
+@frozen
 class ValuesWithoutTime(Fact):
     """Values in rows in which their clock is empty."""
 
