@@ -170,6 +170,31 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (clocks.OwnClocks(("time1", "time2")), "each channel is on the clock beside it: 'time1', 'time2'"),
+    (
+        clocks.ClockUnitAssumed(("t1", "t2"), 0.0005),
+        "no unit in the header of t1, t2: read in s, at 2000 Hz; "
+        "write the unit in the header if that is wrong, e.g. 't1 [ms]'",
+    ),
+    (
+        clocks.LowerRate(250.0, 0.25),
+        "has a value in 25 % of the rows: a rate of its own, 250 Hz, and its empty cells are no samples",
+    ),
+    (
+        clocks.RepeatedRows(2),
+        "2 rows with the time and the values of the one before: filled with the previous value, left out",
+    ),
+    (
+        clocks.StatedPeriodDiffers(0.002, 0.004),
+        "its clock has steps of 4 ms, but the file states a sample time of 2 ms: is the clock right?",
+    ),
+    (
+        clocks.StartAssumed(("a",)),
+        "no date and time of a: taken to begin with the first of the others",
+    ),
+    (
+        clocks.DerivedTimes(("a", "b")),
+        "X_Value is not the time of a, b: taken from Delta_X, in each packet of samples",
+    ),
     (clocks.ValuesWithoutTime(1), "1 value in rows in which its clock is empty: left out"),
     (
         clocks.WrittenTimes("%H:%M:%S.%f", "midnight", wraps="midnight", wrapped=3),
@@ -265,6 +290,10 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.LastLineKept(99, "0.5"), "the last line (99) has no line end: its last cell '0.5' is taken to be whole"),
     (tables.LastLineDropped(99, "0."), "the last line (99) has no line end, and '0.' may be cut off, dropped"),
     # containers
+    (
+        containers.SegmentCutOff(24, 100, 40),
+        "the segment from line 24 on has 40 of the 100 rows that its head states",
+    ),
     (containers.ColumnLeftOut("note", "of texts"), "column 'note' is of texts: left out"),
     (containers.VariableLeftOut("note", "a char"), "variable 'note' is a char: left out"),
     (containers.RowsAsColumns("variable", "q", 3, 500), "variable 'q' is 3 x 500: its rows are taken as columns"),
