@@ -52,6 +52,8 @@ _SEGMENT_KEYS = {"Channels", "Samples", "Delta_X", "X_Dimension"}
 _SEPARATOR_WORDS = {"tab": "\t", "comma": ","}
 # No recording has more segments, or more columns in a segment.
 _MOST_SEGMENTS, _MOST_COLUMNS = 10_000, 1 << 14
+# Statements of more samples are no more precise, but may not fit into 64 bits.
+_MOST_SAMPLES = 1 << 40
 _DATE = re.compile(r"(?P<year>\d{4})/(?P<month>\d{1,2})/(?P<day>\d{1,2})")
 _TIME = re.compile(r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2})(?:[.,](?P<fraction>\d+))?")
 # Seconds from 1904, where LabVIEW's times begin, to 1970. Later stamps are absolute, others count from the start.
@@ -202,6 +204,10 @@ class _Head:
         value = number(cell, "," if "," in cell else ".") if cell else None
         return value if value is not None and np.isfinite(value) else default
 
+    def samples(self, column: int, default: int = 0) -> int:
+        """Return how many samples of a channel are stated."""
+        return int(min(self.number("Samples", column, default), _MOST_SAMPLES))
+
     def started(self, column: int) -> Fraction | None:
         """Return the date and time [s] of a channel since 1970, without a time zone; None if unknown."""
         return _instant(self.cell("Date", column), self.cell("Time", column))
@@ -237,12 +243,12 @@ def _read_measurement(path: Path, pins: TablePins) -> _Measurement:
     empty: dict[str, None] = {}
     segments = []
     for head in heads:
-        channels = {at: key for at, key in head.channels.items() if head.number("Samples", at, 1.0) > 0.0}
+        channels = {at: key for at, key in head.channels.items() if head.samples(at, 1) > 0}
         empty |= dict.fromkeys(key for at, key in head.channels.items() if at not in channels)
         for at, key in channels.items():
             units.setdefault(key, head.cell("Y_Unit_Label", at) or None)
         groups = _groups(head, channels, style, origin, absolute, findings)
-        stated = int(max((head.number("Samples", at, 0.0) for at in channels), default=0.0))
+        stated = max(map(head.samples, channels), default=0)
         segments.append(_Segment(_dialect(text, pins, head, style), tuple(groups), stated))
     findings += [left_out_finding(key, "empty") for key in empty if key not in units]
     details = {
@@ -407,7 +413,9 @@ def _origin(heads: Sequence[_Head], style: _Style, findings: list[Finding]) -> t
         value
         for head in heads
         for at in head.clocks
-        if at < len(head.row) and (value := number(head.row[at], style.decimal)) is not None and value > _ABSOLUTE
+        if at < len(head.row)
+        and (value := number(head.row[at], style.decimal)) is not None
+        and _ABSOLUTE < value < np.inf
     ]
     if stamps and not style.counted:
         return Fraction(0), min(stamps)
@@ -436,7 +444,7 @@ def _groups(
     offsets = {at: float((starts[at] or usual) - origin) if known else 0.0 for at in channels}
     steps = {at: head.number("Delta_X", at, 0.0) for at in channels}
     firsts = {at: head.number("X0", at, 0.0) for at in channels}
-    samples = {at: int(head.number("Samples", at, 0.0)) for at in channels}
+    samples = {at: head.samples(at) for at in channels}
     rows = max(samples.values(), default=0)
     clocks = head.clocks
     alike: dict[tuple[float, ...], list[int]] = {}

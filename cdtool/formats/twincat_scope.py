@@ -23,6 +23,8 @@ import numpy as np
 
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.findings.tables import NamesOfSymbols
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import SEPARATORS, kind, number, split_line
@@ -55,6 +57,8 @@ _TICKS_PER_S, _TICKS_1970 = 1e7, 116_444_736_000_000_000
 # Ticks have 18 digits; no export is long enough for as many milliseconds.
 _FEWEST_TICKS = 10**16
 _EXPORT_AGAIN = "export it again with 'Timelines' set to 'For each sampletime' or 'All'"
+# A unit with its quantity in parentheses, `(None)`, or any other word.
+_BETWEEN_BLANKS = re.compile(r"[^ ]+ \((?!None\))[^()]*\)|[^ ]+")
 _WORDED_UNIT = re.compile(r"(?P<unit>[^(]*?)\s*\([^()]*\)")
 
 
@@ -149,9 +153,10 @@ def _read_export(path: Path, pins: TablePins) -> _Export:
         raise RecordingError(f"{path}: is empty", "was the export stopped, or the copy cut off?")
     text, stream = detect_text(path, sample, pins.encoding, content)
     head = _read_head(path, text, stream)
+    findings: tuple[Finding, ...] = ()
     if head.separator == " ":
         _refuse_empty_cells(path, text, head)
-        head = replace(head, of_channels=_between_blanks(head.of_channels))
+        head, findings = _between_blanks(head)
     # A line in which a cell contains the separator is wider than the others: it would be read in the wrong columns.
     usual = Counter(map(len, head.of_channels.values())).most_common(1)[0][0]
     head = replace(head, of_channels={key: line for key, line in head.of_channels.items() if len(line) == usual})
@@ -162,7 +167,7 @@ def _read_export(path: Path, pins: TablePins) -> _Export:
     periods = {at: _number(head.cell((_PERIOD, "SampleTime"), at)) for at in range(len(names))}
     columns = _keys(head)
     units = {key: _unit(head.cell((_UNIT,), at)) for at, key in columns.items()}
-    dialect = _dialect(text, pins, head, decimal, columns)
+    dialect = replace(_dialect(text, pins, head, decimal, columns), findings=findings)
     full_stamps = _are_ticks(head, clocks)
     first = min((int(row[at]) for row in head.rows for at in clocks if full_stamps and _is_tick(row, at)), default=0)
     groups = []
@@ -202,13 +207,17 @@ def _read_head(path: Path, text: Text, stream: bytes) -> _Head:
         if cells[0] in _FILE_KEYS and i < _MOST_FILE_LINES:
             of_file[cells[0]] = cells
             of_channels.clear()  # a line Name above is that of the file
-        elif cells[0] in _CHANNEL_KEYS and len(cells) > 1:
+        elif cells[0] in _CHANNEL_KEYS and len(cells) > 1 and not _is_split_key(cells):
             of_channels[cells[0]] = cells
         start += len(line) + 1
     if len(stream) >= _MOST_HEAD - 4:
         raise RecordingError(f"{path}: has no row of numbers in its first {_MOST_HEAD >> 20} MiB", "export it again")
-    what = "no line with the names of channels" if not of_channels else "no row of numbers"
-    raise RecordingError(f"{path}: has {what}", "was the export stopped, or the copy cut off? export it again")
+    if not of_channels:
+        raise RecordingError(
+            f"{path}: has no line with the names of channels",
+            "export it again with a header that has at least the names",
+        )
+    raise RecordingError(f"{path}: has no row of numbers", "was the export stopped, or the copy cut off?")
 
 
 def _refuse_empty_cells(path: Path, text: Text, head: _Head) -> None:
@@ -221,26 +230,36 @@ def _refuse_empty_cells(path: Path, text: Text, head: _Head) -> None:
             )
 
 
-def _between_blanks(of_channels: Mapping[str, list[str]]) -> dict[str, list[str]]:
-    """Return the cells of lines that are separated by blanks, which names and units may contain.
+def _between_blanks(head: _Head) -> tuple[_Head, tuple[Finding, ...]]:
+    """Return the head with the cells of lines that are separated by blanks, which names and units may contain.
 
     Data types have no blanks: their line shows how many channels follow each column of times. Names that cannot be told
-    apart are replaced by those of the symbols, or by the numbers of their columns.
+    apart are replaced by those of the symbols, or by the numbers of their columns, with a note.
     """
-    widths = Counter(len(cells) for key, cells in of_channels.items() if key not in (NAME, _UNIT))
-    whole = {key: cells for key, cells in of_channels.items() if len(cells) == widths.most_common(1)[0][0]}
+    of_channels = head.of_channels
+    of_words = {key: cells for key, cells in of_channels.items() if key not in (NAME, _UNIT)}
+    if not of_words:
+        return head, ()
+    usual = Counter(map(len, of_words.values())).most_common(1)[0][0]
+    whole = {key: cells for key, cells in of_words.items() if len(cells) == usual}
     layout_key, layout = next(iter(whole.items()))
     clocks = [at for at, cell in enumerate(layout) if cell == layout_key]
     counts = [end - at - 1 for at, end in zip(clocks, [*clocks[1:], len(layout)], strict=True)]
     symbols = whole.get(_SYMBOL, [str(at) for at in range(len(layout))])
     names: list[str] = []
+    replaced = 0
     for count, words in zip(counts, _parts(of_channels.get(NAME, []), NAME, len(counts)), strict=True):
         names.append(NAME)
         at = len(names)
-        names += words if len(words) == count else [" ".join(words)] if count == 1 else symbols[at : at + count]
-    units = re.findall(r"\(None\)|[^ ]+ \([^()]*\)|[^ ]+", " ".join(of_channels.get(_UNIT, [])))
-    whole.pop(_UNIT, None)
-    return {**whole, NAME: names, **({_UNIT: units} if len(units) == len(layout) else {})}
+        if len(words) != count and (count > 1 or not words):
+            replaced += count
+            words = symbols[at : at + count]
+        names += [" ".join(words)] if count == 1 else words
+    units = _BETWEEN_BLANKS.findall(" ".join(of_channels.get(_UNIT, [])))
+    is_clear = len(units) == len(layout) and all(units[at] == _UNIT for at in clocks)
+    cells = {**whole, NAME: names, **({_UNIT: units} if is_clear else {})}
+    findings = (Finding(NamesOfSymbols(replaced), severity="note"),) if replaced else ()
+    return replace(head, of_channels=cells), findings
 
 
 def _parts(cells: Sequence[str], key: str, count: int) -> list[list[str]]:
@@ -334,7 +353,8 @@ def _are_ticks(head: _Head, clocks: Sequence[int]) -> bool:
 
 
 def _is_tick(row: Sequence[str], at: int) -> bool:
-    return at < len(row) and row[at].isascii() and row[at].isdigit() and int(row[at][:20]) > _FEWEST_TICKS
+    cell = row[at] if at < len(row) else ""
+    return cell.isascii() and cell.isdigit() and len(cell) <= len(str(_TICKS_1970)) and int(cell) > _FEWEST_TICKS
 
 
 def _decimal_mark(text: Text, head: _Head) -> str:
@@ -367,6 +387,11 @@ def _cells(line: str, separator: str) -> list[str]:
     if '"' in line:
         return [cell.strip(" \r\n") for cell in split_line(line, separator)]
     return [cell.strip(" \r\n") for cell in line.strip("\r\n").split(separator)]
+
+
+def _is_split_key(cells: Sequence[str]) -> bool:
+    """Return whether a blank as separator splits a key such as `Unit Offset`."""
+    return f"{cells[0]} {cells[1]}" in _CHANNEL_KEYS
 
 
 def _is_row(cells: Sequence[str]) -> bool:

@@ -230,6 +230,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     # tables
+    (
+        tables.NamesOfSymbols(2),
+        "the names of 2 channels cannot be told apart between blanks: those of their symbols are used",
+    ),
     (tables.PinnedLinesSkipped((1, 2, 3)), "lines 1 to 3 skipped, as [csv] says"),
     (tables.OtherEncoding("Latin-1"), "not valid UTF-8, read as Latin-1"),
     (tables.NamedSeparator(1, "sep=;"), "line 1 (sep=;) names the separator"),

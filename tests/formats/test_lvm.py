@@ -152,6 +152,15 @@ def test_more_rows_than_stated_are_all_read_and_fewer_are_a_loss(log):
     assert [(finding.fact, finding.severity) for finding in source.findings] == [(SegmentCutOff(24, 100, 40), "loss")]
 
 
+def test_numbers_that_no_file_can_mean_are_no_error_of_the_program(log):
+    text = measurement(Style(), [FORCE, SLOW])
+    stated = text.replace("Samples\t40\t10", "Samples\t4000000000000000000000\t10")
+    facts = [type(finding.fact) for finding in survey(log(stated, "gate.lvm")).findings]
+    assert SegmentCutOff in facts
+    source = survey(log(text.replace("0.000000\t0.000000", "1e999\t0.000000", 1), "gate.lvm"))
+    assert len(source.columns["Force"].values) == 39
+
+
 def test_mapped_channels_keep_their_clocks_for_every_command(log, machine, tmp_path):
     path = log(measurement(Style(), [FORCE, TORQUE, SLOW]), "gate.lvm")
     channels = CHANNEL_MAP.replace('torque = { column = "Torque"', 'torque = { column = "Temperature"')

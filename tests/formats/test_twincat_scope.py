@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import cdtool
 from cdtool.errors import RecordingError
 from cdtool.findings.clocks import RepeatedRows, StatedPeriodDiffers, ValuesWithoutTime
-from cdtool.findings.tables import LastLineCut, NotNumeric, WordsBelowRows
+from cdtool.findings.tables import LastLineCut, NamesOfSymbols, NotNumeric, WordsBelowRows
 from cdtool.formats.pieces import join_pieces
 from cdtool.formats.twincat_scope import TwincatScope
 from cdtool.ingest.reading import choose_format, read_recording, survey
@@ -76,9 +76,23 @@ def test_each_channel_has_its_values_and_its_own_times_whatever_the_options(tmp_
     assert [column.unit for column in source.columns.values()] == [c.unit or None if stated else None for c in order]
 
 
+def test_a_stamp_with_more_digits_than_a_filetime_is_no_time(tmp_path):
+    text = export([Channel("a", "1", ramp(20))], Options(full_stamps=True, end="\n"))
+    stamp = str(START + 50_000)
+    (tmp_path / "run.csv").write_text(text.replace(stamp, stamp + "99"))
+    source = survey(tmp_path / "run.csv")
+    assert source.columns["a"].time.tolist() == [i / 1000 for i in range(20) if i != 5]
+    assert [finding.fact for finding in source.findings] == [ValuesWithoutTime(1)]
+
+
 def test_an_export_separated_by_blanks_is_read_if_no_cell_is_empty(tmp_path):
     path = write_export(tmp_path / "run.csv", SORTED, Options(separator=" "))
-    assert_read(survey(path), SORTED)
+    source = survey(path)
+    assert_read(source, SORTED)
+    assert [column.unit for column in source.columns.values()] == [None] * 4  # "N m" is two words
+    nominal = [*SORTED[:3], replace(SORTED[3], unit="Nm")]
+    source = survey(write_export(path, nominal, Options(separator=" ")))
+    assert [column.unit for column in source.columns.values()] == [None, "mm", "mm/s", "Nm"] and not source.findings
     with pytest.raises(RecordingError, match="empty cells, which are blanks too"):
         survey(write_export(path, CHANNELS, Options(separator=" ")))
 
@@ -89,6 +103,7 @@ def test_names_that_blanks_make_ambiguous_are_replaced_by_those_of_the_symbols(t
     source = survey(write_export(tmp_path / "run.csv", channels, Options(separator=" ")))
     assert source.names == ("the fast one", "MAIN.1", "MAIN.2")
     assert [len(column.values) for column in source.columns.values()] == [20, 4, 4]
+    assert [finding.fact for finding in source.findings] == [NamesOfSymbols(2)]
 
 
 def test_a_channel_with_the_name_of_another_has_that_of_its_symbol_or_its_column(tmp_path):
@@ -203,6 +218,13 @@ def test_an_export_without_columns_of_times_is_refused_with_the_option_that_help
         survey(tmp_path / "run.csv")
 
 
+def test_an_export_without_any_name_is_refused_with_the_option_that_helps(tmp_path):
+    text = export(CHANNELS, Options(keys=(), end="\n"))
+    (tmp_path / "run.csv").write_text(text)
+    with pytest.raises(RecordingError, match=r"no line with the names of channels .*at least the names"):
+        survey(tmp_path / "run.csv")
+
+
 def test_a_row_with_more_cells_than_names_is_refused_with_its_line(tmp_path):
     text = export(CHANNELS, Options(end="\n"))
     (tmp_path / "run.csv").write_text(text + "39.2\t1\t2\t3\t4\t5\t6\t7\t8\n")
@@ -265,10 +287,12 @@ def test_any_rates_and_values_are_read_to_the_bit(tmp_path, data):
     assert_read(source, channels, options.full_stamps)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damaged_bytes_are_read_or_refused_in_one_line(tmp_path, data):
-    content = bytearray(export(CHANNELS, Options(shared=data.draw(st.booleans()))).encode())
+    options = Options(shared=data.draw(st.booleans()), separator=data.draw(st.sampled_from("\t;:, ")))
+    options = replace(options, full_stamps=data.draw(st.booleans()))
+    content = bytearray(export(SORTED, options).encode())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(content) - 1))
         kind = data.draw(st.sampled_from(["byte", "cut", "remove", "repeat"]))

@@ -196,7 +196,8 @@ class _TimedReader:
             dict(zip(self.numeric, rows.numbers, strict=True)),
             dict(zip(self.whole, rows.stamps, strict=True)),
         )
-        pieces = [group.piece(cells) for group in self.groups]
+        with np.errstate(over="ignore", invalid="ignore"):  # of damaged stamps, which are then no times
+            pieces = [group.piece(cells) for group in self.groups]
         self.values += sum(len(piece.values) * piece.rows for piece in pieces)
         check_size(self.path, self.values)
         return pieces
