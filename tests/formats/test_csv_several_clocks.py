@@ -188,6 +188,15 @@ def test_without_a_machine_file_channels_of_other_rates_have_the_clocks_beside_t
     assert {item.samples for item in cdtool.info(converted).channels} == {50, 40}
 
 
+def test_a_second_clock_without_channels_of_its_own_is_reported_and_changes_nothing(log):
+    """As in a table of a UR robot: a count of seconds and words, then a time stamp beside all channels."""
+    rows = "".join(f"{i},w{i},{i / 25},{i},{10 * i},{100 * i}\n" for i in range(200))
+    path = log("time,word,timestamp,force,torque,speed\n" + rows)
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        assert [item.channel for item in clock_warnings(source)] == ["timestamp"]
+        assert all(column.time is None for column in source.columns.values())
+
+
 def test_a_clock_of_the_same_rate_that_ends_early_is_that_of_its_channels(log):
     path = log(table(HEADERS[0], CELL, CELL[:30]))
     for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):

@@ -69,7 +69,7 @@ class Csv:
         # The last column is always read: it shows whether the file's end is complete.
         read = dialect.names if keys is None else {*keys, dialect.names[-1]}
         if len(clocks.groups) < 2:
-            table = yield from table_pieces(path, dialect, read)
+            table = yield from table_pieces(path, dialect, clocks, read)
             return _source(path, dialect, table)
         return (yield from _pieces_of_clocks(path, dialect, clocks, keys, read))
 
@@ -110,7 +110,7 @@ def _pieces_of_clocks(
     from cdtool.formats.csv.table import table_pieces
 
     names = dialect.names
-    table_of_all = table_pieces(path, dialect, {*read, *(names[column] for column in clocks.columns)})
+    table_of_all = table_pieces(path, dialect, clocks, {*read, *(names[column] for column in clocks.columns)})
     table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, table_of_all, keys)
     if findings is None:
         return _source(path, dialect, table)

@@ -109,16 +109,15 @@ def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatA
 
 
 def have_other_rates(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]) -> bool:
-    """Return whether the clocks differ in their steps or lengths, and each column is beside one of them.
+    """Return whether columns are beside clocks of different steps or lengths, and each column is beside a clock.
 
     Then no clock is that of all channels, and only the clock beside it can be a channel's own.
     """
     names, columns = dialect.names, [i for i, letter in enumerate(dialect.kinds[: len(dialect.names)]) if letter == "N"]
-    beside = {*clocks.columns, *clocks.of}
-    if len(clocks.groups) < 2 or not beside.issuperset(columns):
+    used = sorted({clocks.of[column] for column in columns if column in clocks.of})
+    if len(used) < 2 or not {*clocks.columns, *clocks.of}.issuperset(columns):
         return False
-    first = names[clocks.groups[0][0]]
-    others = [names[group[0]] for k, group in enumerate(clocks.groups) if k and k in clocks.of.values()]
+    first, *others = (names[clocks.groups[k][0]] for k in used)
     if not {first, *others} <= values.keys():
         return False
     return any(

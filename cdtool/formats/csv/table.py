@@ -200,13 +200,14 @@ def read_table(
     return table
 
 
-def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generator[Piece, None, TextTable]:
-    """Yield those of the columns `keys` that have numbers; return the table without its rows.
+def table_pieces(
+    path: Path, dialect: Dialect, clocks: Clocks, keys: Collection[str]
+) -> Generator[Piece, None, TextTable]:
+    """Yield those of the columns `keys` that have numbers; return the table, with its `clocks`, without its rows.
 
     The last row is removed from the last block if the file's end is incomplete. Raises RecordingError.
     """
     reading = _TableReader(path, dialect, keys)
-    clocks = Clocks.by_names(dialect)
     last, before, unbroken = reading.reader.allocate(0), 0, True
     first: dict[str, FloatArray] = {}
     rounded: Counter[str] = Counter()
