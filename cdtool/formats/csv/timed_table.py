@@ -146,9 +146,30 @@ class TimedTable:
 def timed_pieces(
     path: Path, dialect: Dialect, groups: Sequence[ClockGroup], keys: Collection[str], survey: bool
 ) -> Generator[Piece, None, TimedTable]:
-    """Yield the columns `keys` of a table with their times, block by block; the return value is the rest.
+    """Yield the columns of a table with their times, block by block.
 
-    With `survey`, a column that is not numeric is left out, with a finding. Raises RecordingError with the line.
+    Parameters
+    ----------
+    path
+        The file, for messages.
+    dialect
+        The dialect of the rows, with `short_rows`.
+    groups
+        The columns of the table by their clocks.
+    keys
+        The names of the columns to read.
+    survey
+        Leave out a column that is not numeric, with a finding; otherwise that is an error.
+
+    Returns
+    -------
+    generator
+        Pieces of each group's samples; its return value is what is known after the last row.
+
+    Raises
+    ------
+    RecordingError
+        A line cannot be read, the words are those of a clock, or the rows would not fit into memory.
     """
     reading = _TimedReader(path, dialect, groups, keys, survey)
     last, before = reading.reader.allocate(0), 0
