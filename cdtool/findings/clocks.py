@@ -385,6 +385,37 @@ class OwnClocks(Fact):
 
 
 @frozen
+class LowerRate(Fact):
+    """A channel of a table has a value in a `share` of the rows only, at a rate [Hz] of its own."""
+
+    rate: float
+    share: float
+
+    def sentence(self) -> str:
+        """Return the rate, and what its empty cells are."""
+        return (
+            f"has a value in {100.0 * self.share:.3g} % of the rows: a rate of its own, {self.rate:.6g} Hz, "
+            "and its empty cells are no samples"
+        )
+
+
+@frozen
+class ClockUnitAssumed(Fact):
+    """Clocks of a table without a unit in the header, which are read in s; the first of them has this step."""
+
+    clocks: tuple[str, ...]
+    step: float
+
+    def sentence(self) -> str:
+        """Return the clocks, the rate that follows, and what to write."""
+        rate = f", at {1.0 / self.step:.6g} Hz" if self.step > 0.0 else ""
+        return (
+            f"no unit in the header of {first_of(self.clocks)}: read in s{rate}; "
+            f"write the unit in the header if that is wrong, e.g. '{self.clocks[0]} [ms]'"
+        )
+
+
+@frozen
 class ValuesWithoutTime(Fact):
     """Values in rows in which their clock is empty."""
 
@@ -393,6 +424,35 @@ class ValuesWithoutTime(Fact):
     def sentence(self) -> str:
         """Return how many."""
         return f"{counted(self.count, 'value')} in rows in which its clock is empty: left out"
+
+
+@frozen
+class RepeatedRows(Fact):
+    """Rows that repeat the one before, with which a program filled a channel of a lower rate."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many."""
+        return (
+            f"{counted(self.count, 'row')} with the time and the values of the one before: "
+            "filled with the previous value, left out"
+        )
+
+
+@frozen
+class StatedPeriodDiffers(Fact):
+    """The steps of a clock are not the period [s] that the head of the file states."""
+
+    stated: float
+    step: float
+
+    def sentence(self) -> str:
+        """Return both."""
+        return (
+            f"its clock has steps of {1e3 * self.step:.6g} ms, but the file states a sample time of "
+            f"{1e3 * self.stated:.6g} ms: is the clock right?"
+        )
 
 
 @frozen
@@ -468,6 +528,28 @@ class NoStartTime(Fact):
     def sentence(self) -> str:
         """Return the channels, and what is assumed."""
         return f"no start time (wf_start_time) in {first_of(self.channels)}: taken to begin with the first of them"
+
+
+@frozen
+class StartAssumed(Fact):
+    """Channels without a date and time beside others that have them."""
+
+    channels: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """Return the channels, and what is assumed."""
+        return f"no date and time of {first_of(self.channels)}: taken to begin with the first of the others"
+
+
+@frozen
+class DerivedTimes(Fact):
+    """Channels that have other sample times than the one to which the column of times belongs."""
+
+    channels: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """Return the channels, and where their times come from."""
+        return f"X_Value is not the time of {first_of(self.channels)}: taken from Delta_X, in each packet of samples"
 
 
 @frozen

@@ -22,6 +22,17 @@ class ColumnLeftOut(TemplateFact):
 
 
 @frozen
+class SegmentCutOff(TemplateFact):
+    """A segment of rows has fewer of them than its head states."""
+
+    line: int
+    stated: int
+    rows: int
+
+    words = "the segment from line {line} on has {rows} of the {stated} rows that its head states"
+
+
+@frozen
 class VariableLeftOut(Fact):
     """A MATLAB variable without real numbers; `what` it is instead, and what to write in MATLAB (empty: nothing)."""
 

@@ -114,6 +114,15 @@ class NamesFromComment(TemplateFact):
 
 
 @frozen
+class NamesOfSymbols(TemplateFact):
+    """Names with blanks, in a table separated by blanks, are replaced by those of the channels' symbols."""
+
+    count: int
+
+    words = "the names of {count} channels cannot be told apart between blanks: those of their symbols are used"
+
+
+@frozen
 class FooterSkipped(LinesFact):
     """Lines below the rows that are no samples; `text` is the first of them."""
 

@@ -24,6 +24,8 @@ FORMATS = Registry(
     kind="format",
     table={
         "csv": "cdtool.formats.csv:Csv",
+        "twincat_scope": "cdtool.formats.twincat_scope:TwincatScope",
+        "lvm": "cdtool.formats.lvm:Lvm",
         "mcap": "cdtool.formats.mcap:Mcap",
         "mat": "cdtool.formats.mat:Mat",
         "parquet": "cdtool.formats.parquet:Parquet",

@@ -18,12 +18,13 @@ import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.clock import CleanTime, clean_time, differentiate, epoch_start, previous_value
+from cdtool.clock.lower_rate import sampled_rows
 from cdtool.clock.stamps import gaps_of, missing_findings
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings import Finding, Severity
 from cdtool.findings.channels import ImpossibleValues, InfiniteValues, MaskedValues, SaturatedValues, StuckChannel
-from cdtool.findings.clocks import ClocksApart
+from cdtool.findings.clocks import ClocksApart, LowerRate
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
@@ -33,6 +34,8 @@ from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recordin
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 # A file of at most this many bytes is read at once for its digest.
 _READ_AT_ONCE = 1 << 20
+# A channel of a lower rate has empty cells in these first rows of a table.
+_FIRST_ROWS = 1 << 12
 Counts = npt.NDArray[np.int64]
 # The kinds of masked values, in the order of convert_to_si, with their severity.
 _MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
@@ -146,13 +149,29 @@ class _Assembly:
             parts = [self.columns[key].values for key in item.keys]
             values = parts[0] if len(parts) == 1 else np.column_stack(parts)
             self._require_samples(clean, item)
-        scaled, masked = convert_to_si(item, self._select(item, values, clean.keep))
+        kept = self._select(item, values, clean.keep)
+        if self.table is not None and item.channel not in UNITLESS and np.isnan(kept[:_FIRST_ROWS]).any():
+            kept, clock, gaps = self._at_lower_rate(kept, clock, item.channel)
+        scaled, masked = convert_to_si(item, kept)
         self.findings += masked_findings(masked, item, self.channels.joints)
         self.findings += [replace(finding, channel=item.channel) for finding in gaps]
         absent = scaled.size - int(np.count_nonzero(np.isfinite(scaled)))
         self.findings += missing_findings(absent, scaled.size, item.channel, int(masked.sum()))
         series = clock.with_values(component_along(item.direction, scaled) if item.direction else scaled, item.unit)
         return Series(series.time + item.time_offset, series.values, item.unit) if item.time_offset else series
+
+    def _at_lower_rate(
+        self, values: FloatArray, clock: Series, channel: str
+    ) -> tuple[FloatArray, Series, tuple[Finding, ...]]:
+        """Return a channel's rows (n, J) in a table, its times, and its gaps; fewer rows if its rate is lower."""
+        rows = sampled_rows(values)
+        if rows is None:
+            return values, clock, ()
+        time = clock.time[rows]
+        own = Series(time, np.zeros(len(time)), "s")
+        share = clock.period / own.period if own.period > 0.0 else np.nan
+        self.findings.append(Finding(LowerRate(1.0 / own.period, share), channel, "note"))
+        return values[rows], own, tuple(gaps_of(own.time, own.period, "time"))
 
     def _topic_clock(self, stamps: FloatArray, item: ChannelSource) -> _TopicClock:
         """Return a channel's clock, cleaned once for all channels of its topic, and add the findings on its stamps."""

@@ -21,8 +21,8 @@ from cdtool.recording import FloatArray
 class ColumnStatistics:
     """A column's values so far: the count of finite ones, their extremes, and for a column of a table its steps.
 
-    `steps` counts the steps between finite values, `forward` those that are not negative. `by_one`: every step is 1 and
-    no value is missing.
+    `steps` counts the steps between finite values, `forward` those that are not negative, and `apart` those over rows
+    without a value. `by_one`: every step is 1 and no value is missing.
     """
 
     present: int = 0
@@ -30,19 +30,28 @@ class ColumnStatistics:
     maximum: float = -np.inf
     steps: int = 0
     forward: int = 0
+    apart: int = 0
     by_one: bool = True
     last: float = np.nan
 
     def add(self, values: FloatArray, in_table: bool) -> None:
         """Add the rows of a piece."""
         numbers = values.ravel()
-        present = numbers[np.isfinite(numbers)]
+        finite = np.isfinite(numbers)
+        present = numbers[finite]
+        if in_table and values.ndim == 1 and len(present) < len(numbers):
+            self.apart += int(np.count_nonzero(np.diff(np.flatnonzero(finite)) > 1))
         if in_table and values.ndim == 1:
             self._add_steps(present, len(present) == len(numbers))
         if len(present):
             self.present += len(present)
             self.minimum = min(self.minimum, float(present.min()))
             self.maximum = max(self.maximum, float(present.max()))
+
+    @property
+    def is_of_lower_rate(self) -> bool:
+        """Return whether most values of a table's column are followed by a row without one (clock.lower_rate)."""
+        return 0 < self.steps <= 2 * self.apart
 
     def _add_steps(self, present: FloatArray, all_present: bool) -> None:
         steps = np.diff(present) if self.present == 0 else np.diff(present, prepend=self.last)

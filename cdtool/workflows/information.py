@@ -122,12 +122,16 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
     known, samples = statistics.columns[column.name], statistics.rows(column.name)
     clock = table_clock if column.time is None else statistics.clocks[statistics.clock_of[column.name]]
     timed = clock is not None and clock.rows > 0
+    rate = clock.rate if clock else None
+    if column.time is None and known.is_of_lower_rate:  # its empty cells are no samples
+        rate = None if rate is None else rate * known.present / samples
+        samples = known.present
     return ChannelInfo(
         name=column.name,
         unit=column.unit or "",
         samples=samples,
         missing=samples * math.prod(column.values.shape[1:]) - known.present,
-        rate_hz=clock.rate if clock else None,
+        rate_hz=rate,
         start_s=clock.first if clock and timed else None,
         duration_s=clock.last - clock.first if clock and timed else None,
         minimum=known.minimum if known.present else None,

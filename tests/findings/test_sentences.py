@@ -179,6 +179,31 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (clocks.OwnClocks(("time1", "time2")), "each channel is on the clock beside it: 'time1', 'time2'"),
+    (
+        clocks.ClockUnitAssumed(("t1", "t2"), 0.0005),
+        "no unit in the header of t1, t2: read in s, at 2000 Hz; "
+        "write the unit in the header if that is wrong, e.g. 't1 [ms]'",
+    ),
+    (
+        clocks.LowerRate(250.0, 0.25),
+        "has a value in 25 % of the rows: a rate of its own, 250 Hz, and its empty cells are no samples",
+    ),
+    (
+        clocks.RepeatedRows(2),
+        "2 rows with the time and the values of the one before: filled with the previous value, left out",
+    ),
+    (
+        clocks.StatedPeriodDiffers(0.002, 0.004),
+        "its clock has steps of 4 ms, but the file states a sample time of 2 ms: is the clock right?",
+    ),
+    (
+        clocks.StartAssumed(("a",)),
+        "no date and time of a: taken to begin with the first of the others",
+    ),
+    (
+        clocks.DerivedTimes(("a", "b")),
+        "X_Value is not the time of a, b: taken from Delta_X, in each packet of samples",
+    ),
     (clocks.ValuesWithoutTime(1), "1 value in rows in which its clock is empty: left out"),
     (
         clocks.WrittenTimes("%H:%M:%S.%f", "midnight", wraps="midnight", wrapped=3),
@@ -214,6 +239,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     # tables
+    (
+        tables.NamesOfSymbols(2),
+        "the names of 2 channels cannot be told apart between blanks: those of their symbols are used",
+    ),
     (tables.PinnedLinesSkipped((1, 2, 3)), "lines 1 to 3 skipped, as [csv] says"),
     (tables.OtherEncoding("Latin-1"), "not valid UTF-8, read as Latin-1"),
     (tables.NamedSeparator(1, "sep=;"), "line 1 (sep=;) names the separator"),
@@ -274,6 +303,10 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.LastLineKept(99, "0.5"), "the last line (99) has no line end: its last cell '0.5' is taken to be whole"),
     (tables.LastLineDropped(99, "0."), "the last line (99) has no line end, and '0.' may be cut off, dropped"),
     # containers
+    (
+        containers.SegmentCutOff(24, 100, 40),
+        "the segment from line 24 on has 40 of the 100 rows that its head states",
+    ),
     (containers.ColumnLeftOut("note", "of texts"), "column 'note' is of texts: left out"),
     (containers.VariableLeftOut("note", "a cell"), "variable 'note' is a cell: left out"),
     (containers.VariableLeftOut("d", "a duration", "seconds(d)"), "variable 'd' is a duration: left out; seconds(d)"),

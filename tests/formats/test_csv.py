@@ -36,6 +36,14 @@ def test_all_kinds_of_line_ends_give_the_same_rows(log, end, last):
     assert not source.findings
 
 
+def test_a_trace_of_codesys_is_a_table_below_two_lines_of_words(log):
+    """The scheme of "Trace in ASCII file" in the manual of its editor."""
+    head = "BODAS Trace\nD:\\BODAS\\PROJECTS\\TRAFFICSIGNAL.PRO\nCycle PLC_PRG.COUNTER PLC_PRG.LIGHT1\n"
+    source = read(log(head + "".join(f"{i} {i // 3} {i % 2}\n" for i in range(30)), "trace.txt"))
+    assert list(source.columns) == ["Cycle", "PLC_PRG.COUNTER", "PLC_PRG.LIGHT1"]
+    assert values(source, "PLC_PRG.COUNTER") == [float(i // 3) for i in range(30)]
+
+
 def test_a_file_without_header_has_its_columns_by_number(log):
     source = read(log("0,1.5\n1,2.5\n"))
     assert list(source.columns) == ["0", "1"]

@@ -7,12 +7,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import cdtool
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import OtherClock, OwnClocks, ValuesWithoutTime
+from cdtool.findings.clocks import ClockUnitAssumed, OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.csv import Csv
 from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import read_recording
+from cdtool.workflows.convert.converting import convert
 
 OWN = """[channels]
 time = { column = "time", unit = "s" }
@@ -98,6 +100,11 @@ def test_one_clock_for_all_channels_is_refused_if_the_times_differ(log, machine,
     remaining = "force" if clock == "time1" else "torque"
     assert len(read_recording(path, machine(only))[remaining]) == 4000
     for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        if why.startswith("their steps"):
+            assert not clock_warnings(source) and source.columns["torque"].time[-1] == pytest.approx(
+                start + step * 3999
+            )
+            continue
         (warning,) = clock_warnings(source)
         assert warning.channel == "time2" and isinstance(warning.fact, OtherClock)
         assert (warning.fact.first, warning.fact.columns) == ("time1", ("torque", "speed"))
@@ -155,6 +162,58 @@ def test_values_without_a_time_are_a_loss(log, machine):
     assert len(recording["torque"]) == 49 and len(recording["force"]) == 50
     lost = [finding for finding in recording.findings if finding.severity == "loss"]
     assert lost == [Finding(ValuesWithoutTime(1), channel, "loss") for channel in ("torque", "speed")]
+
+
+@pytest.mark.parametrize("unit", ["", " [ms]"])
+def test_without_a_machine_file_channels_of_other_rates_have_the_clocks_beside_them(log, tmp_path, unit):
+    factor = 1e3 if unit else 1.0
+    text = table(f"t1{unit};torque [N m];t2{unit};position [mm];speed [mm/s]", factor * CELL, factor * DRIVE, ";")
+    path = log(text.replace(",", ";"))
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        assert list(source.columns) == ["torque [N m]", "position [mm]", "speed [mm/s]"]
+        assert source.columns["torque [N m]"].time == pytest.approx(CELL)
+        assert source.columns["speed [mm/s]"].time == pytest.approx(DRIVE)
+        assert source.columns["position [mm]"].values.tolist() == [10.0 * i for i in range(40)]
+        facts = [finding.fact for finding in source.findings]
+        assumed = [] if unit else [ClockUnitAssumed(("t1", "t2"), pytest.approx(0.0005))]
+        assert facts == [OwnClocks((f"t1{unit}", f"t2{unit}")), *assumed]
+    info = cdtool.info(path)
+    assert [(item.samples, item.missing) for item in info.channels] == [(50, 0), (40, 0), (40, 0)]
+    assert [item.rate_hz for item in info.channels] == pytest.approx([2000.0, 1000.0, 1000.0])
+    draft = cdtool.init(path, tmp_path / "draft.toml").text
+    assert 'time = { column = "time", unit = "s" }' in draft
+    clock = next(line for line in draft.splitlines() if line.startswith("time ="))
+    assert ("read in s, at 2000 Hz" in draft) is not bool(unit) and clock
+    converted = convert(path, tmp_path / "log.mcap").files[0]
+    assert {item.samples for item in cdtool.info(converted).channels} == {50, 40}
+
+
+def test_a_second_clock_without_channels_of_its_own_is_reported_and_changes_nothing(log):
+    """As in a table of a UR robot: a count of seconds and words, then a time stamp beside all channels."""
+    rows = "".join(f"{i},w{i},{i / 25},{i},{10 * i},{100 * i}\n" for i in range(200))
+    path = log("time,word,timestamp,force,torque,speed\n" + rows)
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        assert [item.channel for item in clock_warnings(source)] == ["timestamp"]
+        assert all(column.time is None for column in source.columns.values())
+
+
+def test_a_clock_of_the_same_rate_that_ends_early_is_that_of_its_channels(log):
+    path = log(table(HEADERS[0], CELL, CELL[:30]))
+    for source in (Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)):
+        assert len(source.columns["torque"].values) == 30 and len(source.columns["force"].values) == 50
+
+
+def test_a_long_table_is_read_in_pieces_with_the_times_of_the_whole(log):
+    first, second = 1.7e9 + np.arange(60_000) / 2000.0, 1.7e9 + 0.25 + np.arange(20_000) / 500.0
+    path = log(table("time1 [s],force,time2 [s],torque,speed", first, second))
+    pieces = list(Csv().pieces(path))
+    whole, joined = Csv().columns(path), join_pieces(Csv().pieces(path), sort=False)
+    assert len(pieces) > 4 and path.stat().st_size > 1 << 21
+    assert whole.origin == joined.origin == 1.7e9
+    for name, column in whole.columns.items():
+        assert np.array_equal(column.values, joined.columns[name].values)
+        assert np.array_equal(column.time, joined.columns[name].time)
+    assert joined.columns["speed"].time[0] == 0.25
 
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)

@@ -26,6 +26,7 @@ from cdtool.recording import FloatArray
 
 if TYPE_CHECKING:
     from cdtool.formats.csv.dialect import Dialect
+    from cdtool.formats.csv.several_clocks import Clocks
     from cdtool.formats.csv.table import TextTable
 
 _MARK = b"# " + PREFIX.encode()
@@ -43,11 +44,14 @@ class Csv:
     sniffs_any_text: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
-        """Return whether the file starts with text other than markup."""
+        """Return whether the file starts with text other than markup, and is not of another format of text."""
         from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
+        from cdtool.formats.csv.foreign_heads import is_measurement, is_scope_export
         from cdtool.formats.csv.text import read_sample
 
         head = read_sample(path, HEAD_BYTES)
+        if is_measurement(head) or is_scope_export(head):
+            return False
         return bool(head.strip() or read_sample(path).strip()) and looks_like_text(head)
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
@@ -57,13 +61,17 @@ class Csv:
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
+        from cdtool.formats.csv.several_clocks import Clocks
         from cdtool.formats.csv.table import table_pieces
 
         dialect = _dialect(path, TablePins())
+        clocks = Clocks.by_names(dialect)
         # The last column is always read: it shows whether the file's end is complete.
         read = dialect.names if keys is None else {*keys, dialect.names[-1]}
-        table = yield from table_pieces(path, dialect, read)
-        return _source(path, dialect, table)
+        if len(clocks.groups) < 2:
+            table = yield from table_pieces(path, dialect, clocks, read)
+            return _source(path, dialect, table)
+        return (yield from _pieces_of_clocks(path, dialect, clocks, keys, read))
 
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
@@ -78,12 +86,43 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
 
 
 def _read_all(path: Path, dialect: Dialect) -> Source:
-    from cdtool.formats.csv.several_clocks import Clocks, clock_findings
+    from cdtool.formats.csv.several_clocks import Clocks, clock_findings, have_other_rates, survey_by_own_clock
     from cdtool.formats.csv.table import read_table
 
     table = read_table(path, dialect, dialect.names)
-    table.findings += clock_findings(dialect, Clocks.by_names(dialect), table.values)
+    clocks = Clocks.by_names(dialect)
+    if have_other_rates(dialect, clocks, table.values):
+        columns, origin, findings = survey_by_own_clock(path, dialect, clocks, table.values)
+        table.values, table.findings = {}, [*table.findings, *findings]
+        return replace(
+            _source(path, dialect, table), columns=columns, origin=origin or written_origin(path), first_row=0
+        )
+    table.findings += clock_findings(dialect, clocks, table.values)
     return _source(path, dialect, table)
+
+
+def _pieces_of_clocks(
+    path: Path, dialect: Dialect, clocks: Clocks, keys: Collection[str] | None, read: Collection[str]
+) -> Pieces:
+    """Yield the columns of a table with several clocks, by clock if their rates differ."""
+    from cdtool.findings.clocks import OtherClock
+    from cdtool.formats.csv.several_clocks import pieces_by_own_clock, unit_from_header
+    from cdtool.formats.csv.table import table_pieces
+
+    names = dialect.names
+    table_of_all = table_pieces(path, dialect, clocks, {*read, *(names[column] for column in clocks.columns)})
+    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, table_of_all, keys)
+    if findings is None:
+        return _source(path, dialect, table)
+    empty = np.empty(0)
+    columns = {
+        key: Column(key, empty, empty, unit_from_header(dialect, key))
+        for key in table.values
+        if names.index(key) not in clocks.columns and (keys is None or key in keys)
+    }
+    table.findings = [*(found for found in table.findings if not isinstance(found.fact, OtherClock)), *findings]
+    table.values = {}
+    return replace(_source(path, dialect, table), columns=columns, origin=origin or written_origin(path), first_row=0)
 
 
 def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:

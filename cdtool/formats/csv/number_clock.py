@@ -32,8 +32,10 @@ _DECIMALS = {1.0: 9, 1e-3: 6, 1e-6: 3, 1e-9: 0}
 _FIRST, _LAST = 2.0**53 / NS, 2.0**63 / NS
 # Bytes of the longest stamp: digits, a point, a sign.
 _WIDEST = 24
+# Any integer with so many digits fits into 64 bits.
+_MOST_DIGITS = 18
 # Bytes that may follow a number: blank, tab, line ends, separators.
-_AFTER_CELL = np.frombuffer(b" \t\r\n,;|", dtype=np.uint8)
+_AFTER_CELL = np.frombuffer(b" \t\r\n,;|:", dtype=np.uint8)
 
 
 def two_readings(stamps: FloatArray, factor: float) -> str:
@@ -116,6 +118,19 @@ def _cells(dialect: Dialect, rows: Rows, column: int, decimals: int) -> Iterator
         begin = _begin(data[:size], starts[is_row], dialect.separator, column)
         yield row, *_ticks(data, begin, ord(dialect.marks.decimal), decimals)
         line, row = line + len(starts), row + len(begin)
+
+
+def read_whole_numbers(data: Bytes, dialect: Dialect, column: int, blank: Integers) -> tuple[Integers, BoolArray]:
+    """Return the integers (n,) of a column in complete lines without the `blank` ones, and which cells are integers.
+
+    They are exact. A cell with more than 18 digits is none of them: it may not fit into 64 bits.
+    """
+    ends = np.flatnonzero(data == dialect.text.line_end[0])
+    starts = np.delete(np.concatenate(([0], ends[:-1] + 1)), blank)
+    begin = _begin(data, starts, dialect.separator, column)
+    numbers, is_read = _ticks(data, begin, -1, 0)
+    after = data[np.minimum(begin + _MOST_DIGITS, len(data) - 1)]
+    return numbers, is_read & ((after < ord("0")) | (after > ord("9")))
 
 
 def _begin(data: Bytes, starts: Integers, separator: str, column: int) -> Integers:

@@ -21,11 +21,13 @@ from cdtool.formats.csv.cells import NARROW_BLANKS
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLine, IrregularLines
 from cdtool.formats.csv.marks import thousands_byte
+from cdtool.formats.csv.number_clock import read_whole_numbers
 from cdtool.formats.csv.number_kernel import powers
 from cdtool.formats.csv.row_arrays import Rows
-from cdtool.formats.csv.row_kernel import EMPTY, LEFT, STAMP, Integers, count_lines, read_rows
+from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers, count_lines, read_rows
+from cdtool.formats.csv.short_rows import complete_blocks
 from cdtool.formats.csv.stamp_kernel import STEPS
-from cdtool.formats.csv.text import AFTER
+from cdtool.formats.csv.text import AFTER, Bytes
 from cdtool.formats.csv.word_cells import WordCells
 
 _THREADS = 4
@@ -49,9 +51,19 @@ class _Block:
 
 
 class RowReader:
-    """Reads the rows of one file. `numeric` and `stamped` are the requested columns, by number, in order."""
+    """Reads the rows of one file. `numeric` and `stamped` are the requested columns, by number, in order.
 
-    def __init__(self, path: Path, dialect: Dialect, numeric: Sequence[int], stamped: Sequence[int]) -> None:
+    `whole` are columns of integers with more digits than float64 can represent; they follow the stamps.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        dialect: Dialect,
+        numeric: Sequence[int],
+        stamped: Sequence[int],
+        whole: Sequence[int] = (),
+    ) -> None:
         self.path = path
         self.dialect = dialect
         self.targets = np.full(dialect.width, LEFT, dtype=np.int64)
@@ -62,7 +74,8 @@ class RowReader:
         self.programs = np.zeros((len(stamped), STEPS), dtype=np.int64)
         for k, column in enumerate(stamped):
             self.programs[k] = dialect.stamped[column].layouts[0].program
-        self.shape = (len(numeric), len(stamped))
+        self.whole = tuple(whole)
+        self.shape = (len(numeric), len(stamped) + len(whole))
         self.ended = True
         self.words: WordCells | None = None  # the columns of categories
 
@@ -103,8 +116,11 @@ class RowReader:
 
     def _raw_blocks(self, whole: Rows | None) -> Iterator[tuple[bytearray, int, int, int, Rows]]:
         """Yield per block the bytes, the size of its lines, the first row, the number of rows, and their arrays."""
-        end, first = self.dialect.text.line_end[0], 0
-        for block, size in self.dialect.text.blocks(self.dialect.offset):
+        dialect = self.dialect
+        end, first, blocks = dialect.text.line_end[0], 0, dialect.text.blocks(dialect.offset)
+        if dialect.short_rows:
+            blocks = complete_blocks(blocks, dialect)
+        for block, size in blocks:
             count = int(count_lines(np.frombuffer(block, dtype=np.uint8, count=size), end)) + (block[size - 1] != end)
             yield block, size, first, count, self.allocate(count) if whole is None else whole
             first += 0 if whole is None else count
@@ -163,6 +179,8 @@ class RowReader:
             counts,
             *powers(),
         )
+        if self.whole:
+            self._read_whole(data[:size], arrays.stamps[:, first : first + int(counts[0])], blank[: counts[2]])
         final = count - 1 if unfinished else -1
         listed = [
             IrregularLine(line, row, bytes(block[begin:stop]), line == final)
@@ -171,6 +189,12 @@ class RowReader:
         return _Block(
             arrays, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed, unfinished
         )
+
+    def _read_whole(self, data: Bytes, stamps: Integers, blank: Integers) -> None:
+        """Fill the last of `stamps` (m, n) with the columns of integers; `blank` are the lines that are not rows."""
+        for row, column in zip(stamps[-len(self.whole) :], self.whole, strict=True):
+            numbers, is_read = read_whole_numbers(data, self.dialect, column, blank)
+            row[:] = np.where(is_read, numbers, MISSING_STAMP)
 
     def _marks(self) -> Integers:
         dialect = self.dialect

@@ -7,23 +7,26 @@ clock, it belongs to the columns before it. Adjacent clocks belong to the same r
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from cdtool.clock import EPOCH
-from cdtool.columns import Column
+from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import ClockDifference, OtherClock, OwnClocks, ValuesWithoutTime
+from cdtool.findings.clocks import ClockDifference, ClockUnitAssumed, OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.recording import FloatArray
 from cdtool.units import find_unit
 
+Table = TypeVar("Table")  # what the reader of a table returns after its last piece
 _NAMES = re.compile(r"^(t|ts|time|timestamp|zeit|clock|tempo|temps|x_value)([^a-z]|$)", re.IGNORECASE)
 # Ratios of two units of time: clocks whose steps have another ratio differ in their rates.
 _FACTORS = tuple(10.0**power for power in (-9, -6, -3, 0, 3, 6, 9)) + tuple(
@@ -105,6 +108,107 @@ def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatA
     return findings
 
 
+def have_other_rates(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]) -> bool:
+    """Return whether columns are beside clocks of different steps or lengths, and each column is beside a clock.
+
+    Then no clock is that of all channels, and only the clock beside it can be a channel's own.
+    """
+    names, columns = dialect.names, [i for i, letter in enumerate(dialect.kinds[: len(dialect.names)]) if letter == "N"]
+    used = sorted({clocks.of[column] for column in columns if column in clocks.of})
+    if len(used) < 2 or not {*clocks.columns, *clocks.of}.issuperset(columns):
+        return False
+    first, *others = (names[clocks.groups[k][0]] for k in used)
+    if not {first, *others} <= values.keys():
+        return False
+    return any(
+        ((difference := _difference(dialect, values, first, other)) is not None and difference.what == "steps")
+        or _end_apart(values[first], values[other])
+        for other in others
+    )
+
+
+def _end_apart(a: FloatArray, b: FloatArray) -> bool:
+    """Return whether the stamps of two clocks end in different rows, before which none is missing."""
+    counts = []
+    for stamps in (a, b):
+        known = np.isfinite(stamps)
+        counts.append(int(np.count_nonzero(known)))
+        if not known[: counts[-1]].all() or np.any(np.diff(stamps[: counts[-1]]) < 0.0):
+            return False
+    return counts[0] != counts[1] and min(counts) > 2
+
+
+def pieces_by_own_clock(
+    dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None
+) -> Generator[Piece, None, tuple[Table, list[Finding] | None, float]]:
+    """Yield the pieces of a table unchanged or, if its clocks have other rates, by clock with their times [s].
+
+    The first piece decides. The return value is that of `pieces`, the findings on the clocks (None: unchanged), and the
+    origin of the times [s].
+    """
+    piece = next(pieces)
+    if not have_other_rates(dialect, clocks, piece.values):
+        yield piece
+        return (yield from pieces), None, 0.0
+    names = dialect.names
+    of_group = {
+        k: [
+            names[column]
+            for column, nearest in clocks.of.items()
+            if nearest == k and (keys is None or names[column] in keys)
+        ]
+        for k in range(len(clocks.groups))
+    }
+    clock_names = {k: names[clocks.groups[k][0]] for k, members in of_group.items() if members}
+    factors = {k: _factor(dialect, name, 1.0) for k, name in clock_names.items()}
+    origin = _epoch_origin(piece.values[name] * factors[k] for k, name in clock_names.items())
+    lost: Counter[str] = Counter()
+    steps = {name: _step(piece.values[name]) for name in clock_names.values()}
+    while True:
+        for k, name in clock_names.items():
+            time = piece.values[name] * factors[k]
+            timed = np.isfinite(time)
+            values = {key: piece.values[key] for key in of_group[k] if key in piece.values}
+            lost.update({key: int(np.count_nonzero(np.isfinite(column[~timed]))) for key, column in values.items()})
+            rows = int(np.count_nonzero(timed))
+            yield Piece(name, time[timed] - origin, {key: column[timed] for key, column in values.items()}, rows)
+        try:
+            piece = next(pieces)
+        except StopIteration as end:
+            return end.value, _own_clock_findings(dialect, steps, lost), origin
+
+
+def _epoch_origin(clocks: Iterable[FloatArray]) -> float:
+    """Return the earliest first time [s] of clocks that count from an epoch; 0 for other clocks."""
+    starts = [float(time[np.isfinite(time)][0]) for time in clocks if np.isfinite(time).any()]
+    return min(starts) if starts and min(starts) > EPOCH else 0.0
+
+
+def _step(stamps: FloatArray) -> float:
+    known = stamps[np.isfinite(stamps)]
+    return float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+
+
+def _own_clock_findings(dialect: Dialect, steps: Mapping[str, float], lost: Mapping[str, int]) -> list[Finding]:
+    """Return the findings on a table whose channels have the clocks beside them; `steps` are those of each clock."""
+    findings = [Finding(OwnClocks(tuple(steps)), "time", "note")]
+    assumed = {name: step for name, step in steps.items() if not np.isfinite(_factor(dialect, name, np.nan))}
+    if assumed:
+        findings.append(Finding(ClockUnitAssumed(tuple(assumed), next(iter(assumed.values()))), "time"))
+    return findings + [Finding(ValuesWithoutTime(count), key, "loss") for key, count in lost.items() if count]
+
+
+def survey_by_own_clock(
+    path: Path, dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]
+) -> tuple[dict[str, Column], float, list[Finding]]:
+    """Return all columns of a table whose clocks have other rates, as `columns_by_own_clock`."""
+    keys = [key for key in values if dialect.names.index(key) not in clocks.columns]
+    columns, origin, findings = columns_by_own_clock(path, dialect, clocks, keys, values)
+    used = {clocks.of[dialect.names.index(key)] for key in keys}
+    steps = {(name := dialect.names[clocks.groups[k][0]]): _step(values[name]) for k in sorted(used)}
+    return columns, origin, [*_own_clock_findings(dialect, steps, {}), *findings[1:]]
+
+
 def columns_by_own_clock(
     path: Path, dialect: Dialect, clocks: Clocks, keys: Sequence[str], values: Mapping[str, FloatArray]
 ) -> tuple[dict[str, Column], float, list[Finding]]:
@@ -120,8 +224,7 @@ def columns_by_own_clock(
             raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
         name = dialect.names[clocks.groups[group][0]]
         times.setdefault(group, values[name] * _factor(dialect, name, 1.0))
-    starts = [float(time[np.isfinite(time)][0]) for time in times.values() if np.isfinite(time).any()]
-    origin = min(starts) if starts and min(starts) > EPOCH else 0.0
+    origin = _epoch_origin(times.values())
     used = OwnClocks(tuple(dialect.names[clocks.groups[group][0]] for group in times))
     columns, findings = {}, [Finding(used, "time", "note")]
     for key in keys:

@@ -178,7 +178,7 @@ class _TableReader:
         irregular, text = self.irregular, self.dialect.text
         findings = irregular.findings(rows.line(rows.count - 1))
         if not self.reader.ended and not irregular.cut_line and not irregular.ends_skipped:
-            findings += _check_last_line(self.dialect, rows, self.requested, before)
+            findings += check_last_line(self.dialect, rows, self.requested, before)
         if irregular.cut_line or text.padding:
             line = irregular.cut_line or rows.line(rows.count)
             findings.insert(0, Finding(LastLineCut(line), severity="loss"))
@@ -215,13 +215,14 @@ def read_table(
     return table
 
 
-def table_pieces(path: Path, dialect: Dialect, keys: Collection[str]) -> Generator[Piece, None, TextTable]:
-    """Yield those of the columns `keys` that have numbers; return the table without its rows.
+def table_pieces(
+    path: Path, dialect: Dialect, clocks: Clocks, keys: Collection[str]
+) -> Generator[Piece, None, TextTable]:
+    """Yield those of the columns `keys` that have numbers; return the table, with its `clocks`, without its rows.
 
     The last row is removed from the last block if the file's end is incomplete. Raises RecordingError.
     """
     reading = _TableReader(path, dialect, keys)
-    clocks = Clocks.by_names(dialect)
     last, before, unbroken = reading.reader.allocate(0), 0, True
     first: dict[str, FloatArray] = {}
     rounded: Counter[str] = Counter()
@@ -340,7 +341,7 @@ def _set_exact(dialect: Dialect, rows: Rows, table: TextTable, clock: str, facto
         table.values[clock], table.origin = exact
 
 
-def _check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, before: int) -> list[Finding]:
+def check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, before: int) -> list[Finding]:
     """Check a regular last line without line end: keep the row, keep it with a warning, or remove it with a loss."""
     last = dialect.width - 1
     if rows.count < 1 or dialect.trailing or last not in (*requested.numeric, *requested.stamps):

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.files import write_text
 from cdtool.findings import Finding
+from cdtool.findings.clocks import ClockUnitAssumed
 from cdtool.findings.motion import AccelerometerTurned
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
@@ -118,7 +119,8 @@ def _drafted(log: Path) -> Draft:
     side = side_of(channels, ratio, clock, messages_si)
     joints, why = _joints(path, channels, topics)
     doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
-    time = Clock("time", "s", "the file's own clock") if own else _clock(clock, ratio, doubt)
+    assumed = next((item.fact.sentence() for item in source.findings if isinstance(item.fact, ClockUnitAssumed)), "")
+    time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
     return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence)
 

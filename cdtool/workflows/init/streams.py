@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from cdtool.clock.lower_rate import sampled_rows
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
@@ -65,7 +65,7 @@ class Channels:
 
     joints: int
     free: list[Stream]
-    found: dict[str, Found] = dataclasses.field(default_factory=dict)
+    found: dict[str, Found] = field(default_factory=dict)
 
     def take(self, channel: str, stream: Stream, why: str, check: str = "") -> None:
         """Record a guess; streams that share a column with it are no longer free."""
@@ -98,6 +98,9 @@ def streams_of(source: Source, table_time: FloatArray | None, clock: str | None,
         time = column.time if column.time is not None else table_time
         if time is None or len(time) != len(column.values):
             time = np.arange(len(column.values), dtype=np.float64)
+        rows = sampled_rows(column.values) if column.time is None else None
+        if rows is not None:
+            time, column = time[rows], replace(column, values=column.values[rows])
         singles[name] = Stream(name, (name,), column.unit, time, column.values[:, np.newaxis])
     return [*_families(singles), *singles.values()]
 
@@ -121,7 +124,8 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
     found = []
     for (before, after), parts in members.items():
         numbers = sorted(parts)
-        alike = len({len(stream.time) for stream in parts.values()}) == 1
+        first = next(iter(parts.values())).time
+        alike = all(stream.time is first or np.array_equal(stream.time, first) for stream in parts.values())
         if (
             2 <= len(numbers) <= _MOST_JOINTS
             and numbers[0] in (0, 1)
