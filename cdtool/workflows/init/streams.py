@@ -12,6 +12,7 @@ import numpy as np
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
+from cdtool.workflows.init.joint_names import families_by_name
 
 _NUMBER = re.compile(r"\d+")
 # `position[:]` with more elements than this is not a list of joints.
@@ -20,7 +21,10 @@ _MOST_JOINTS = 64
 
 @dataclass(frozen=True)
 class Stream:
-    """Values over time that may be a channel: `values` (n, k) at `time` (n,) s, from k columns or one field."""
+    """Values over time that may be a channel: `values` (n, k) at `time` (n,) s, from k columns or one field.
+
+    `joints` are the names of the k joints if the names of the columns contain them.
+    """
 
     name: str
     columns: tuple[str, ...]
@@ -29,6 +33,7 @@ class Stream:
     values: FloatArray
     topic: str = ""
     field: str = ""
+    joints: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
@@ -99,7 +104,7 @@ def streams_of(source: Source, table_time: FloatArray | None, clock: str | None,
         if time is None or len(time) != len(column.values):
             time = np.arange(len(column.values), dtype=np.float64)
         singles[name] = Stream(name, (name,), column.unit, time, column.values[:, np.newaxis])
-    return [*_families(singles), *singles.values()]
+    return [*_families(singles), *_named_families(singles), *singles.values()]
 
 
 def _of_topic(name: str, source: Source) -> Stream:
@@ -132,7 +137,18 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
     return found
 
 
-def joined(streams: list[Stream], name: str) -> Stream:
+def _named_families(singles: Mapping[str, Stream]) -> list[Stream]:
+    """Find families whose names differ by the name of a joint: `elbow_joint/position, wrist_1_joint/position`."""
+    found = families_by_name(list(singles))
+    return [
+        joined([singles[name] for name in names], template, joints)
+        for template, (joints, names) in found.items()
+        if len({len(singles[name].time) for name in names}) == 1
+    ]
+
+
+def joined(streams: list[Stream], name: str, joints: tuple[str, ...] = ()) -> Stream:
     """Join streams of one column each, on one clock, to one of several columns."""
     values = np.hstack([stream.values for stream in streams])
-    return Stream(name, tuple(stream.columns[0] for stream in streams), streams[0].unit, streams[0].time, values)
+    columns = tuple(stream.columns[0] for stream in streams)
+    return Stream(name, columns, streams[0].unit, streams[0].time, values, joints=joints)

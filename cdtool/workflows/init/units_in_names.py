@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from cdtool.formats.column_names import split_unit
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
-from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
+from cdtool.workflows.init.quantity_words import FORCES, is_clock, motion_of, word_for, words
 from cdtool.workflows.init.streams import Stream
 
 _QUANTITIES = (*MEASURED, "force")
@@ -31,9 +31,18 @@ _TAILS = {
     "m_s2": "m/s2", "rad_s2": "rad/s2", "mps2": "m/s2", "g": "g", "mg": "mg",
     "n": "N", "kn": "kN", "mn": "mN", "nm": "N m", "mnm": "mN m", "knm": "kN m", "n_m": "N m", "kg": "kgf",
     "kgf": "kgf", "a": "A", "ma": "mA", "v": "V", "mv": "mV", "percent": "%", "prozent": "%", "pct": "%",
-    "counts": "count", "count": "count", "cnt": "count", "cnts": "count", "inc": "count", "ticks": "count",
+    "counts": "count", "tr_min": "rpm", "giri_min": "rpm", "rev_min": "rpm", "r_min": "rpm", "rev_s": "rev/s",
+    "rad_sec": "rad/s", "deg_sec": "deg/s", "mm_min": "mm/min", "count": "count", "cnt": "count", "cnts": "count", "inc": "count", "ticks": "count",
 }  # fmt: skip
 _SEPARATOR = re.compile(r"[\W_]+")
+# Units of what is no channel: temperature, power, frequency, pressure, resistance, energy.
+_FOREIGN = frozenset("°c degc celsius ℃ k °f w kw va hz khz bar mbar pa kpa mpa ohm kohm j kj wh vdc vac".split())
+# The letters of an index: `position.A#`.
+_INDEX_LETTERS = re.compile(r"(?<=.)[\W_]+[A-Za-z]{1,2}#")
+_OF_UNIT: Mapping[str, str] = {
+    "rad": "position", "m": "position", "rad/s": "speed", "m/s": "speed", "rad/s2": "acceleration",
+    "m/s2": "acceleration", "N m": "torque", "A": "torque", "N": "force",
+}  # fmt: skip
 
 
 def own_name(stream: Stream) -> str:
@@ -47,6 +56,9 @@ def own_name(stream: Stream) -> str:
 def label(stream: Stream) -> str:
     """Return a stream's name without the unit at its end."""
     name = own_name(stream)
+    shorter = _INDEX_LETTERS.sub("#", name)
+    if shorter != name and any(word_for(quantity, shorter)[0] >= 2.0 for quantity in _QUANTITIES):
+        name = shorter
     rest, tail, unit = _split(name)
     if not rest or not unit:
         return name
@@ -67,7 +79,7 @@ def unit_in_name(quantity: str, name: str) -> str:
     whole = "".join(words(rest))
     if unit == "m" and (motion_of(rest) == "angle" or words(rest)[-1:] == ["q"]):
         return ""
-    if unit == "N" and quantity == "torque" and not ("force" in whole or "kraft" in whole):
+    if unit == "N" and quantity == "torque" and not any(word in whole for word in FORCES):
         return ""
     if unit == "kgf" and quantity != "force":
         return ""
@@ -78,8 +90,19 @@ def may_be(quantity: str, stream: Stream) -> bool:
     """Return False if the unit in the header, or an unambiguous one in the name, does not measure that quantity."""
     if stream.unit and find_unit(stream.unit):
         return _measures(quantity, stream.unit)
+    if stream.unit and stream.unit.strip().lower() in _FOREIGN:
+        return False
     rest, tail, unit = _split(own_name(stream))
     return not unit or _measures(quantity, unit) or not _stands_for_itself(rest, tail)
+
+
+def quantity_of_unit(stream: Stream) -> str:
+    """Return the quantity that the unit in the header, or an unambiguous one in the name, measures; empty if none."""
+    known = find_unit(stream.unit) if stream.unit else None
+    if known is None and not stream.unit:
+        rest, tail, unit = _split(own_name(stream))
+        known = find_unit(unit) if unit and _stands_for_itself(rest, tail) else None
+    return _OF_UNIT.get(known.si, "") if known is not None else ""
 
 
 def _measures(quantity: str, unit: str) -> bool:
@@ -89,6 +112,11 @@ def _measures(quantity: str, unit: str) -> bool:
 
 def _split(name: str) -> tuple[str, str, str]:
     """Return (the name before the ending, the ending, its unit); empty texts without such an ending."""
+    if not name.startswith("/"):
+        for slash in re.finditer("/", name):
+            rest, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
+            if rest and unit in _FOREIGN or find_unit(unit) is not None and unit and not rest[-1:].isdigit():
+                return rest, f"/{unit}", unit
     parts = [part for part in _SEPARATOR.split(name) if part]
     for count in (2, 1):
         tail = "_".join(parts[-count:])
@@ -100,4 +128,6 @@ def _split(name: str) -> tuple[str, str, str]:
 
 def _stands_for_itself(rest: str, tail: str) -> bool:
     """Whether an ending is a unit after any name: `_mm`, `pulses_N`; not `MOTOR_N`, `tau_m`."""
+    if tail.startswith("/"):
+        return True
     return len(tail) > 1 if tail not in _CAPITALS else rest != rest.upper()
