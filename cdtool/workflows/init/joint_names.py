@@ -9,6 +9,7 @@ from cdtool.formats.column_names import split_unit
 from cdtool.workflows.init.quantity_words import is_actual, is_reference, is_something_else, word_for, words
 
 _TOKENS = re.compile(r"[^\W_]+|[\W_]+")
+_NUMBER = re.compile(r"\d+")
 # The name of a joint consists of at most this many words, with what is between them.
 _LONGEST = 5
 _MOST_JOINTS = 64
@@ -76,8 +77,8 @@ def _slots(name: str) -> list[tuple[str, str, str]]:
 
 
 def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
-    if any(_is_taken(slot) for slot in slots):
-        return False
+    if len({_NUMBER.sub("", slot) for slot in slots}) == 1 or any(_is_taken(slot) for slot in slots):
+        return False  # names that differ only by a number are families of their own
     quantities = {
         quantity
         for before, after in keys

@@ -77,6 +77,8 @@ def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, m
         return Side("linear_axis", "motor", "one joint, an angle and a force", _MOTOR_OF_SLIDE)
     if "angle" in _kinds(channels):
         return Side("rotary_axis", "load", "one joint, in angles", _MOTOR_OF_LOAD)
+    if told.get("torque") == "N m":
+        return Side("rotary_axis", "load", "one joint, a torque without a travel", _MOTOR_OF_LOAD)
     if messages_si:
         return Side("rotary_axis", "load", "one joint in SI units", "linear_axis for a sliding joint")
     return Side("linear_axis", "load", "one joint", "rotary_axis for a rotating joint")

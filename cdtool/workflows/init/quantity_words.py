@@ -13,7 +13,7 @@ from functools import lru_cache
 # Words that are sufficient alone, also inside a longer one (`motordrehzahl`), and short ones that must be separate.
 _LONG: Mapping[str, tuple[str, ...]] = {
     "position": (
-        "position", "angle", "winkel", "stellung", "encoder", "travel", "displacement", "posizione", "posicion",
+        "position", "angle", "winkel", "stellung", "travel", "displacement", "posizione", "posicion",
         "angolo", "angulo", "corsa", "deplacement", "desplazamiento", "spostamento", "位置", "角度", "位移", "変位", "行程",
     ),
     "speed": (
@@ -35,13 +35,13 @@ _LONG: Mapping[str, tuple[str, ...]] = {
     "trigger": ("trigger",),
 }  # fmt: skip
 _SHORT: Mapping[str, tuple[str, ...]] = {
-    "position": ("pos", "posn", "phi", "theta", "q", "enc", "weg", "lage", "hub", "qm", "x", "s", "ang", "qmsr", "pose"),
+    "position": ("pos", "posn", "phi", "theta", "q", "enc", "encoder", "geber", "drehgeber", "weg", "lage", "hub", "qm", "x", "s", "ang", "qmsr", "pose"),
     "speed": (
         "qd", "dq", "dphi", "dtheta", "w", "n", "v", "vx", "vel", "velo", "spd", "rpm", "qp", "qdot", "thetad", "thetadot",
     ),
     "acceleration": ("acc", "acel", "qdd", "ddq", "qddot", "ddtheta", "ax", "ay", "az", "a"),
     "torque": (
-        "tau", "trq", "tor", "tq", "iq", "isq", "i", "m", "pwm", "duty", "u", "amps", "amp", "curr", "cur", "macur", "vir",
+        "tau", "trq", "tor", "tq", "iq", "isq", "i", "m", "pwm", "duty", "u", "amps", "amp", "curr", "cur",
     ),
     "force": ("cell", "f", "fx", "fy", "fz", "dms"),
     "label": (),
@@ -83,15 +83,17 @@ _OTHER: tuple[tuple[str, re.Pattern[str]], ...] = (
         r"|ecart|erreur|errore|inseguimento|seguimiento|误差|誤差|偏差")),
     ("a voltage", re.compile(r"volt|spannung|tension|voltaj|电压|電圧|(?:^|_)u_?dc|(?:^|_)v?bus(?:_|$)|(?:^|_)u_q|(?:^|_)u_d|(?:^|_)uq|(?:^|_)ud(?:_|$)")),
     ("a power", re.compile(r"power|leistung|puissance|potenza|potencia|功率|電力")),
-    ("an external or modelled effort", re.compile(
-        r"(?:^|_)(?:computed|model|gravity|hysteresis|crosstalk|external|ext|hat|ffw?|feedforward|disturbance|friction"
-        r"|residual|inertia|coriolis|storung|perturba)(?:_|$)|tau_?ext|extmsr")),
-    ("the current of the cabinet", re.compile(r"(?:robot|io|system|bus|supply|battery|main|input)_current|brake")),
+    ("a modelled or external effort", re.compile(
+        r"(?:^|_)(?:computed|gravity|hysteresis|crosstalk|ffw?|feedforward|disturbance|friction|residual|inertia|coriolis"
+        r"|storung|perturba)(?:_|$)"
+        r"|^(?=.*(?:torque|tau|effort|force|moment|wrench|couple|coppia|(?:^|_)f(?:_|$))).*(?:ext(?:_|$|msr)|external"
+        r"|(?:^|_)hat(?:_|$)|(?:^|_)model(?:_|$))")),
+    ("the current of the cabinet", re.compile(r"(?:robot|io|system|bus|supply|battery|main|input)_current")),
     ("a flux-forming current", re.compile(r"(?:^|_)(?:i_?s?d|motor_id)(?:_|$)")),
     ("a rate of an effort", re.compile(r"(?:^|_)(?:dtau|taud|tau_dot|torque_rate|jerk)(?:_|$)")),
     ("a state of the controller", re.compile(
-        r"covariance|layout|register|bits|mode(?:_|$)|payload|momentum|status|state(?:_|$)|state_?d?word|valid|program|sequence"
-        r"|feed_?rate|success|performance|scaling|delay|control_output|limit|lower|upper")),
+        r"covariance|layout|register|bits|mode(?:_|$)|payload|momentum|(?:status|state)(?:_?d?_?word)?$|valid|program"
+        r"|sequence|feed_?rate|success|performance|scaling|delay|control_output|limit")),
 )  # fmt: skip
 # Nouns after `current` that make it an adjective: the present one.
 _PRESENT = (
@@ -187,7 +189,7 @@ def is_current(name: str) -> bool:
     """Whether the name is that of a motor's current; not `current_pos`, the present position."""
     parts = words(name)
     whole = "".join(parts)
-    if any(part in ("i", "iq", "isq", "amps", "amp", "curr", "cur", "macur") for part in parts):
+    if any(part in ("i", "iq", "isq", "amps", "amp", "curr", "cur") for part in parts):
         return True
     if any(long in whole for long in ("strom", "courant", "corrente", "corriente", "电流", "電流")):
         return True
