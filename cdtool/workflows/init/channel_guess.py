@@ -32,6 +32,8 @@ _MOST_PAIRS = 32
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
 # A set value is ahead of its measured value by at least this share of a sample.
 _AHEAD = 0.2
+# A set value that resembles another channel by this much more is not that of this one.
+_CLOSER = 0.2
 _BY_COURSE = "guessed from its values only"
 # A one-letter name is weaker evidence for a quantity than the first; a unit alone is the second, `J1` alone the third.
 _SPEAKS, _BY_UNIT, _BY_JOINT = 2.0, 0.8, 0.5
@@ -379,7 +381,7 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
     if correlation < (_FOLLOWS_BY_NAME if is_reference(other.name) else _FOLLOWS):
         return
     rest = [channels.found[q].stream for q in ("position", "speed", "torque") if q in channels.found and q != quantity]
-    if any(motion.likeness(rival, other) > correlation for rival in rest):
+    if any(motion.likeness(rival, other) > correlation + _CLOSER for rival in rest):
         return
     own, others = word_for(quantity, label(stream)), word_for(quantity, label(other))
     ahead = motion.lead(stream, other)

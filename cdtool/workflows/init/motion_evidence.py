@@ -16,6 +16,8 @@ _WINDOWS = 400
 _SURE = 0.9
 # A delay is clear if the derivative leaves less than this share of the difference.
 _CLEAR = 0.67
+# No controller follows its set value so late [s].
+_LONGEST_LEAD = 0.5
 # Inertia and friction of opposite signs, each above this share of the effort's spread, are not those of a drive.
 _CONTRADICTS = 0.2
 # Share of the windows that may contain impacts.
@@ -70,6 +72,7 @@ def lead(one: Stream, other: Stream) -> float:
     half = max(1, len(x) // (2 * _WINDOWS))
     rate = (x[2 * half :] - x[: -2 * half]) / (2.0 * half)
     x, y = x[half:-half], y[half:-half]
+    period = float(np.median(np.diff(one.time)))
     leads = []
     for j in range(one.width):
         if not np.ptp(x[:, j]) or not np.ptp(y[:, j]):
@@ -82,7 +85,8 @@ def lead(one: Stream, other: Stream) -> float:
         values = np.linalg.lstsq(full, y[:, j], rcond=None)[0]
         rest = y[:, j] - full @ values
         clear = float(np.var(rest)) < _CLEAR * float(np.var(without)) and values[1]
-        leads.append(float(values[2] / values[1]) if clear else 0.0)
+        ahead = float(values[2] / values[1]) if clear else 0.0
+        leads.append(ahead if abs(ahead) * period < _LONGEST_LEAD else 0.0)
     return float(np.median(leads)) if leads else 0.0
 
 

@@ -39,6 +39,7 @@ _SEPARATOR = re.compile(r"[\W_]+")
 _FOREIGN = frozenset("°c degc celsius ℃ k °f w kw va hz khz bar mbar pa kpa mpa ohm kohm j kj wh vdc vac".split())
 # The letters of an index: `position.A#`.
 _INDEX_LETTERS = re.compile(r"(?<=.)[\W_]+[A-Za-z]{1,2}#")
+_SURE = 2.0  # a word of more than one letter
 _OF_UNIT: Mapping[str, str] = {
     "rad": "position", "m": "position", "rad/s": "speed", "m/s": "speed", "rad/s2": "acceleration",
     "m/s2": "acceleration", "N m": "torque", "A": "torque", "N": "force",
@@ -46,9 +47,14 @@ _OF_UNIT: Mapping[str, str] = {
 
 
 def own_name(stream: Stream) -> str:
-    """Return the name of a column or field; a topic's name only if the field's is generic (`data`)."""
+    """Return the name of a column or field; a topic's name only if the field's is generic (`data`).
+
+    The letters of an index are left out if the rest indicates a quantity: `position.A#` is no current.
+    """
     if not stream.topic:
-        return split_unit(stream.name)[0] if stream.unit else stream.name
+        name = split_unit(stream.name)[0] if stream.unit else stream.name
+        shorter = _INDEX_LETTERS.sub("#", name)
+        return shorter if any(word_for(quantity, shorter)[0] >= _SURE for quantity in _QUANTITIES) else name
     plain = stream.field.split("[")[0] == "data"
     return f"{stream.topic} {stream.field}" if plain else stream.field
 
@@ -56,9 +62,6 @@ def own_name(stream: Stream) -> str:
 def label(stream: Stream) -> str:
     """Return a stream's name without the unit at its end."""
     name = own_name(stream)
-    shorter = _INDEX_LETTERS.sub("#", name)
-    if shorter != name and any(word_for(quantity, shorter)[0] >= 2.0 for quantity in _QUANTITIES):
-        name = shorter
     rest, tail, unit = _split(name)
     if not rest or not unit:
         return name
