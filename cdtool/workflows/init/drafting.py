@@ -113,7 +113,8 @@ def _drafted(log: Path) -> Draft:
     types = {name: topic.schema for name, topic in source.topics.items()}
     motion = [channels.found[name].stream.topic for name in ("position", "speed") if name in channels.found]
     messages_si = bool(motion) and all(is_si(types.get(topic, "")) for topic in motion)
-    ratio = ratio_of(channels, clock, messages_si)
+    # Without a clock the times are sample numbers, which say nothing about units.
+    ratio = ratio_of(channels, clock, messages_si) if topics or own or clock is not None else None
     unit = ratio.fitting[0].clock if ratio is not None and ratio.fitting else clock.unit if clock is not None else ""
     side = side_of(channels, ratio, clock, messages_si)
     joints, why = _joints(path, channels, topics)
