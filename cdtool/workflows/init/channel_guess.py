@@ -322,7 +322,7 @@ def _references(channels: Channels) -> None:
 def _ground_truth(channels: Channels) -> None:
     """Guess the load cell, labels and triggers; the name of a load cell counts more than that of any other force."""
     singles = [stream for stream in channels.free if stream.width == 1 and stream.moves and may_be("force", stream)]
-    named = [(*_force_strength(stream), stream) for stream in singles]
+    named = [(*force_strength(stream), stream) for stream in singles]
     named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
     if named:
         chosen = max(
@@ -344,11 +344,13 @@ def _ground_truth(channels: Channels) -> None:
                 break
 
 
-def _force_strength(stream: Stream) -> tuple[float, str]:
+def force_strength(stream: Stream) -> tuple[float, str]:
     """Return how strongly a stream's name, topic or unit indicates a measured force, and the word."""
     if is_something_else(stream.name):
         return 0.0, ""
     strength, word = word_for("force", _full(stream))
+    if word == "wrench" and word_for("torque", label(stream))[0]:
+        return 0.0, ""  # the torque of a wrench
     if strength:
         return strength, word
     taken = any(word_for(quantity, label(stream))[0] >= _SPEAKS for quantity in MEASURED)

@@ -21,17 +21,19 @@ from cdtool.workflows.init.streams import Channels, streams_of
 from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
+from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
 
 
 @dataclass(frozen=True)
 class Drafted:
-    """The draft's text, the channels it maps, those written as comments, and warnings."""
+    """The draft's text, the channels it maps, those written as comments, warnings, and the columns that it does not map."""
 
     path: str
     text: str
     channels: tuple[str, ...]
     left_out: tuple[str, ...]
     findings: tuple[Finding, ...]
+    unmapped: tuple[Unmapped, ...] = ()
 
 
 def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = False) -> Drafted:
@@ -50,7 +52,8 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
     -------
     Drafted
         The text, in which CHECK marks what is uncertain; the channels mapped; those in it only as comments, because the
-        log contradicts the guess; and the findings of `cdtool info` with the draft.
+        log contradicts the guess; the findings of `cdtool info` with the draft; and the columns that it does not map,
+        each with the next best guess.
 
     Raises
     ------
@@ -79,7 +82,7 @@ def _settled(log: Path, draft: Draft) -> Drafted:
     left_out: list[str] = []
     turned = False
     if not draft.channels.found:
-        return Drafted("", draft_text(draft), (), (), ())
+        return Drafted("", draft_text(draft), (), (), (), draft.unmapped)
     with TemporaryDirectory() as folder:
         trial = Path(folder) / "draft.toml"
         while True:
@@ -94,7 +97,7 @@ def _settled(log: Path, draft: Draft) -> Drafted:
                 left_out.append(fault.channel)
                 continue
             if turned or not any(isinstance(found.fact, AccelerometerTurned) for found in findings):
-                return Drafted("", text, mapped, tuple(left_out), findings)
+                return Drafted("", text, mapped, tuple(left_out), findings, draft.unmapped)
             turned = True
 
 
@@ -121,7 +124,8 @@ def _drafted(log: Path) -> Draft:
     doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
     time = Clock("time", "s", "the file's own clock") if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
-    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence)
+    left = unmapped_columns(channels)
+    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left)
 
 
 def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ...], str]:
@@ -132,6 +136,9 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
             names = element_names(path, found.stream.topic) if found.stream.field.endswith("[:]") else ()
             if len(names) == channels.joints and len(set(names)) == len(names):
                 return names, f"names from the messages of {found.stream.topic}"
+    named = next((found.stream.joints for found in channels.found.values() if found.stream.joints), ())
+    if len(named) == channels.joints:
+        return named, "names from the columns"
     return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
 
 

@@ -57,8 +57,9 @@ def families_by_name(names: Sequence[str]) -> Families:
         return {}
     slots, keys = max(usable, key=lambda item: (len(item[0]) * len(item[1]), sum(map(len, item[0]))))
     order = tuple(slot for slot in members[keys[0]] if slot in slots)
+    joints = _joint_names(order, *keys[0])
     return {
-        f"{before}#{after}": (order, tuple(parts[slot] for slot in order))
+        f"{before}#{after}": (joints, tuple(parts[slot] for slot in order))
         for (before, after), parts in members.items()
         if slots <= parts.keys()
     }
@@ -74,6 +75,27 @@ def _slots(name: str) -> list[tuple[str, str, str]]:
             if slot[0].isalpha() and slot[-1].isalnum() and last - first < len(tokens):
                 found.append(("".join(tokens[:first]), slot, "".join(tokens[last:])))
     return found
+
+
+def _joint_names(slots: Sequence[str], before: str, after: str) -> tuple[str, ...]:
+    """Return the names of the joints: without what all have in common, then up to the next separator of a path.
+
+    `joint_states/elbow` in `/joint_states/elbow_joint/effort` is `elbow_joint`.
+    """
+    tokens = [_TOKENS.findall(slot) for slot in slots]
+    while min(map(len, tokens)) > 1 and len({part[0] for part in tokens}) == 1:
+        before += tokens[0][0]
+        tokens = [part[1:] for part in tokens]
+    while min(map(len, tokens)) > 1 and len({part[-1] for part in tokens}) == 1:
+        after = tokens[0][-1] + after
+        tokens = [part[:-1] for part in tokens]
+    cores = ["".join(part).strip("_ ./:-") for part in tokens]
+    left, right = re.findall(r"\w*$", before)[0], re.findall(r"^\w*", after)[0]
+    for prefix, suffix in ((left, right), (left, "")):
+        names = tuple(f"{prefix}{core}{suffix}".strip("_") for core in cores)
+        if not any(_is_taken(name) for name in names):
+            return names
+    return tuple(cores)
 
 
 def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:

@@ -93,10 +93,15 @@ def may_be(quantity: str, stream: Stream) -> bool:
     """Return False if the unit in the header, or an unambiguous one in the name, does not measure that quantity."""
     if stream.unit and find_unit(stream.unit):
         return _measures(quantity, stream.unit)
-    if stream.unit and stream.unit.strip().lower() in _FOREIGN:
+    if stream.unit and is_foreign(stream.unit):
         return False
     rest, tail, unit = _split(own_name(stream))
     return not unit or _measures(quantity, unit) or not _stands_for_itself(rest, tail)
+
+
+def is_foreign(unit: str) -> bool:
+    """Whether a unit measures nothing that a channel may be: a temperature, a power, a frequency, a pressure."""
+    return unit.strip().lower() in _FOREIGN
 
 
 def quantity_of_unit(stream: Stream) -> str:
