@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from cdtool.recording import MEASURED
+from cdtool.workflows.init import lexicon
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.certainty import add_doubts
 from cdtool.workflows.init.quantity_words import (
@@ -39,7 +39,6 @@ _BY_COURSE = "guessed from its values only"
 _SPEAKS, _BY_UNIT, _BY_JOINT = 2.0, 0.8, 0.5
 # Physics that agrees counts more than any name.
 _PHYSICS = 4.0
-_JOINT_WORDS = ("j", "joint", "joints", "axis", "achse", "a", "axe", "asse", "eje", "轴", "軸")
 _TOLD_UNIT = "its unit"
 
 Named = tuple[float, str, Stream]
@@ -83,19 +82,20 @@ def name_strength(quantity: str, stream: Stream) -> tuple[float, str]:
     if quantity_of_unit(stream) == quantity:
         return _BY_UNIT, _TOLD_UNIT
     parts = words(name)
-    if quantity == "position" and stream.width > 2 and parts and all(part in _JOINT_WORDS for part in parts):
+    if quantity == "position" and stream.width > 2 and parts and all(part in lexicon.JOINTS for part in parts):
         return _BY_JOINT, "joints"
     return 0.0, ""
 
 
 def _joint_count(streams: Iterable[Stream]) -> int:
-    votes: Counter[int] = Counter()
+    """Return the width of the families with the most quantities; of several such widths the largest."""
+    quantities: dict[int, set[str]] = {}
     for stream in streams:
         for quantity in ("position", "speed", "torque"):
-            strength, word = name_strength(quantity, stream) if stream.moves else (0.0, "")
+            strength, word = name_strength(quantity, stream) if stream.moves and stream.width > 1 else (0.0, "")
             if strength and (word != _TOLD_UNIT or stream.width > 2):
-                votes[stream.width] += 1
-    several = [(count, width) for width, count in votes.items() if width > 1]
+                quantities.setdefault(stream.width, set()).add(quantity)
+    several = [(len(found), width) for width, found in quantities.items()]
     return max(several)[1] if several else 1
 
 
@@ -160,7 +160,7 @@ def _motion_by_name(channels: Channels) -> None:
 
 
 def _pair_score(position: Named, speed: Named, correlation: float) -> float:
-    """Return how well two streams are one joint's position and speed: by physics, then by both names and their likeness.
+    """Return how well two streams are one joint's position and speed: by physics, then by their names.
 
     A speed that is ahead of the position's derivative may be a set value.
     """
@@ -182,7 +182,8 @@ def _alike(one: Named, other: Named) -> float:
 def _take_named(channels: Channels, quantity: str, chosen: Named, named: list[Named], told: str = "") -> None:
     """Take a stream by its name; others that have such a name as well are mentioned."""
     strength, word, stream = chosen
-    equal = [item[2] for item in named if item[2] is not stream and item[0] >= strength and not _overlap(item[2], stream)]
+    others = [item for item in named if item[2] is not stream and not _overlap(item[2], stream)]
+    equal = [item[2] for item in others if item[0] >= strength]
     check = f"or '{equal[0].name}'" if equal else ""
     if len(equal) > 1:
         check += f", '{equal[1].name}'" + (" ..." if len(equal) > 2 else "")
@@ -212,9 +213,9 @@ def _motion_by_values(channels: Channels) -> None:
     if not tops:
         return
     correlation, position, speed = max(tops, key=lambda pair: pair[0])
-    fit = f"r = {correlation:.3f}"
-    channels.take("position", position, f"its derivative fits '{speed.name}', {fit}", _BY_COURSE)
-    channels.take("speed", speed, f"its integral fits '{position.name}', {fit}", _BY_COURSE)
+    told = f"r = {correlation:.3f}"
+    channels.take("position", position, f"its derivative fits '{speed.name}', {told}", _BY_COURSE)
+    channels.take("speed", speed, f"its integral fits '{position.name}', {told}", _BY_COURSE)
 
 
 def _partner(channels: Channels, stream: Stream, other: str) -> None:
@@ -257,10 +258,10 @@ def _drive(channels: Channels) -> None:
         and not _says_more("torque", stream)
         and abs(motion.likeness(moving, stream)) < _FOLLOWS
     ]
-    found = _best(others, lambda stream: motion.drive_fit(stream, moving))
-    if found is not None and found[0] > _DRIVES:
-        text = f"moves like the force of a drive: inertia and friction explain {100 * found[0]:.0f} % of it"
-        channels.take("torque", found[1], text, _BY_COURSE)
+    unnamed = _best(others, lambda stream: motion.drive_fit(stream, moving))
+    if unnamed is not None and unnamed[0] > _DRIVES:
+        text = f"moves like the force of a drive: inertia and friction explain {100 * unnamed[0]:.0f} % of it"
+        channels.take("torque", unnamed[1], text, _BY_COURSE)
 
 
 def _drive_score(channels: Channels, item: Named, share: float) -> float:

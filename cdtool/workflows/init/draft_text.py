@@ -10,6 +10,7 @@ from textwrap import wrap
 import numpy as np
 
 from cdtool.recording import UNITLESS
+from cdtool.workflows.init.derived_speed import LowPass
 from cdtool.workflows.init.machine_side import Side
 from cdtool.workflows.init.streams import Channels, Stream
 from cdtool.workflows.init.units import Evidence, Logged
@@ -44,6 +45,7 @@ class Draft:
     topics: bool
     evidence: Evidence
     unmapped: tuple[Unmapped, ...] = ()
+    low_pass: LowPass | None = None
 
     @property
     def units(self) -> dict[str, Logged]:
@@ -68,6 +70,9 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
         "[channels.mcap]" if draft.topics else "[channels]",
         *([] if draft.topics else _time(draft.clock)),
     ]
+    if draft.low_pass is not None:
+        why = _marked(f"guessed: {draft.low_pass.why}", "a lower one delays the speed")
+        lines += _commented(f"speed_low_pass_hz = {draft.low_pass.corner!r}", why)
     units = draft.units
     for name in draft.channels.found:
         made = _mapped(draft, name, units.get(name), -1.0 if turned and name == "acceleration" else 1.0)

@@ -14,6 +14,7 @@ from cdtool.ingest.reading import choose_format, element_names, has_topics, log_
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.information import info
 from cdtool.workflows.init.channel_guess import guess_channels
+from cdtool.workflows.init.derived_speed import propose_low_pass
 from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
 from cdtool.workflows.init.machine_side import side_of
 from cdtool.workflows.init.speed_ratio import Ratio, ratio_of
@@ -26,7 +27,7 @@ from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
 
 @dataclass(frozen=True)
 class Drafted:
-    """The draft's text, the channels it maps, those written as comments, warnings, and the columns that it does not map."""
+    """The draft's text, the channels it maps, those written as comments, warnings, and the columns not mapped."""
 
     path: str
     text: str
@@ -124,8 +125,19 @@ def _drafted(log: Path) -> Draft:
     doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
     time = Clock("time", "s", "the file's own clock") if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
-    left = unmapped_columns(channels)
-    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left)
+    left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
+    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass)
+
+
+def _in_seconds(time: Clock, clock: TableClock | None, own: bool) -> float:
+    """Return the unit [s] of the streams' times as the draft has it; 0 if its clock is only a placeholder."""
+    if own:
+        return 1.0
+    if clock is None or time.column is None:
+        return 0.0
+    if time.rate is not None:
+        return 0.0 if clock.counts and "placeholder" in time.check else 1.0 / (time.rate * clock.assumed)
+    return seconds(time.unit) / clock.assumed
 
 
 def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ...], str]:

@@ -1,4 +1,4 @@
-"""Find the joints of a table by the part in which the names of its columns differ: `elbow_joint/position`, `X1_Force`."""
+"""Find the joints of a table by the part in which the names of its columns differ: `elbow_joint/position`, `X1_Pos`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,13 @@ _MOST_JOINTS = 64
 _QUANTITIES = ("position", "speed", "torque")
 # Sides and versions of one joint, which are not joints.
 _SIDES = frozenset(
-    "motor load link joint drive gear shaft raw filtered filt smooth smoothed mean min max in out input output left_hand "
-    "real sim simulated model".split()
+    re.findall(
+        r"\w+",
+        "motor load link joint drive gear shaft raw filtered filt smooth smoothed mean min max in out input output "
+        "real sim simulated model",
+    )
 )
-_AXES = frozenset("x y z a b c u v w rx ry rz roll pitch yaw".split())
+_AXES = frozenset(("x", "y", "z", "a", "b", "c", "u", "v", "w", "rx", "ry", "rz", "roll", "pitch", "yaw"))
 
 Families = dict[str, tuple[tuple[str, ...], tuple[str, ...]]]
 

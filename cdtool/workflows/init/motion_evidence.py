@@ -78,8 +78,7 @@ def lead(one: Stream, other: Stream) -> float:
         if not np.ptp(x[:, j]) or not np.ptp(y[:, j]):
             continue
         plain, full = (
-            np.column_stack(columns)
-            for columns in ((np.ones(len(x)), x[:, j]), (np.ones(len(x)), x[:, j], rate[:, j]))
+            np.column_stack(columns) for columns in ((np.ones(len(x)), x[:, j]), (np.ones(len(x)), x[:, j], rate[:, j]))
         )
         without = y[:, j] - plain @ np.linalg.lstsq(plain, y[:, j], rcond=None)[0]
         values = np.linalg.lstsq(full, y[:, j], rcond=None)[0]
@@ -151,7 +150,8 @@ def _explained(tau: FloatArray, v: FloatArray, acceleration: FloatArray, place: 
     spread = np.std(known[kept], axis=0)
     inertia, friction = values[0] * spread[0], values[1] * spread[1] + values[2] * spread[2]
     whole = float(np.var(tau[kept]))
-    if not whole or inertia * friction < 0.0 and min(abs(inertia), abs(friction)) > _CONTRADICTS * whole**0.5:
+    contradict = inertia * friction < 0.0 and min(abs(inertia), abs(friction)) > _CONTRADICTS * whole**0.5
+    if not whole or contradict:
         return 0.0
     return 1.0 - float(np.var((tau - known @ values)[kept])) / whole
 

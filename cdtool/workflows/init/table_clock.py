@@ -135,7 +135,8 @@ def _wraps(column: Column) -> bool:
     if len(back) < _WRAPS:
         return False
     turns = np.log10(float(np.median(steps[steps > 0.0])) - back) if (steps > 0.0).any() else np.zeros(1)
-    return bool(np.all(np.abs(turns - np.rint(turns)) < _NEAR_POWER) and np.ptp(np.rint(turns)) == 0.0 and turns[0] > 2.0)
+    powers = np.rint(turns)
+    return bool(np.all(np.abs(turns - powers) < _NEAR_POWER) and np.ptp(powers) == 0.0 and powers[0] > 2.0)
 
 
 def _assumed(column: Column, found: GuessedClock) -> tuple[float, bool]:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.units import find_unit
+from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.machine_side import Side
-from cdtool.workflows.init.quantity_words import FORCES, is_current, word_for, words
+from cdtool.workflows.init.quantity_words import is_current, word_for, words
 from cdtool.workflows.init.speed_ratio import Ratio, implausible, motion_kind, rotation_unit, stated, whole_numbers
 from cdtool.workflows.init.streams import Channels, Stream
 from cdtool.workflows.init.units_in_names import label
@@ -205,7 +206,11 @@ def _of_torque(stream: Stream, accepted: tuple[str, ...], joints: int) -> Logged
     strength, word = word_for("torque", name)
     if strength > 1.0 and word not in ("pwm", "duty"):
         whole = "".join(words(name))
-        unit = accepted[-1] if word == "drive force" or any(force in whole for force in FORCES[:-1]) else accepted[0]
+        unit = (
+            accepted[-1]
+            if word == "drive force" or any(force in whole for force in lexicon.FORCES[:-1])
+            else accepted[0]
+        )
         return Logged(unit, "its name", check=f"{_reach(stream)}: {others(unit)}?")
     return _raw("1", accepted[0], joints, "")
 

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from cdtool.formats.column_names import split_unit
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
-from cdtool.workflows.init.quantity_words import FORCES, is_clock, motion_of, word_for, words
+from cdtool.workflows.init import lexicon
+from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
 from cdtool.workflows.init.streams import Stream
 
 _QUANTITIES = (*MEASURED, "force")
@@ -32,11 +33,15 @@ _TAILS = {
     "n": "N", "kn": "kN", "mn": "mN", "nm": "N m", "mnm": "mN m", "knm": "kN m", "n_m": "N m", "kg": "kgf",
     "kgf": "kgf", "a": "A", "ma": "mA", "v": "V", "mv": "mV", "percent": "%", "prozent": "%", "pct": "%",
     "counts": "count", "tr_min": "rpm", "giri_min": "rpm", "rev_min": "rpm", "r_min": "rpm", "rev_s": "rev/s",
-    "rad_sec": "rad/s", "deg_sec": "deg/s", "mm_min": "mm/min", "count": "count", "cnt": "count", "cnts": "count", "inc": "count", "ticks": "count",
+    "rad_sec": "rad/s", "deg_sec": "deg/s", "mm_min": "mm/min", "count": "count", "cnt": "count",
+    "cnts": "count", "inc": "count", "ticks": "count",
 }  # fmt: skip
 _SEPARATOR = re.compile(r"[\W_]+")
 # Units of what is no channel: temperature, power, frequency, pressure, resistance, energy.
-_FOREIGN = frozenset("°c degc celsius ℃ k °f w kw va hz khz bar mbar pa kpa mpa ohm kohm j kj wh vdc vac".split())
+_FOREIGN = frozenset(
+    ("°c", "degc", "celsius", "℃", "k", "°f", "w", "kw", "va", "hz", "khz", "bar", "mbar", "pa", "kpa", "mpa", "ohm",
+     "kohm", "j", "kj", "wh", "vdc", "vac")
+)  # fmt: skip
 # The letters of an index: `position.A#`.
 _INDEX_LETTERS = re.compile(r"(?<=.)[\W_]+[A-Za-z]{1,2}#")
 _SURE = 2.0  # a word of more than one letter
@@ -82,7 +87,7 @@ def unit_in_name(quantity: str, name: str) -> str:
     whole = "".join(words(rest))
     if unit == "m" and (motion_of(rest) == "angle" or words(rest)[-1:] == ["q"]):
         return ""
-    if unit == "N" and quantity == "torque" and not any(word in whole for word in FORCES):
+    if unit == "N" and quantity == "torque" and not any(word in whole for word in lexicon.FORCES):
         return ""
     if unit == "kgf" and quantity != "force":
         return ""
@@ -123,7 +128,8 @@ def _split(name: str) -> tuple[str, str, str]:
     if not name.startswith("/"):
         for slash in re.finditer("/", name):
             rest, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
-            if rest and unit in _FOREIGN or find_unit(unit) is not None and unit and not rest[-1:].isdigit():
+            is_unit = unit.lower() in _FOREIGN or (find_unit(unit) is not None and not rest[-1:].isdigit())
+            if rest and unit and is_unit:
                 return rest, f"/{unit}", unit
     parts = [part for part in _SEPARATOR.split(name) if part]
     for count in (2, 1):

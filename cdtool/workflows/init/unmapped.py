@@ -59,7 +59,8 @@ def unmapped_columns(channels: Channels) -> tuple[Unmapped, ...]:
         if stream.topic:
             left += [] if (stream.topic, stream.field) in fields else [stream]
         elif len(stream.columns) == 1 and stream.columns[0] not in listed:
-            whole = next((f for f in families if stream.columns[0] in f.columns and not listed & set(f.columns)), stream)
+            unlisted = [family for family in families if not listed & set(family.columns)]
+            whole = next((family for family in unlisted if stream.columns[0] in family.columns), stream)
             left.append(whole)
             listed |= set(whole.columns)
     return tuple(_described(stream, channels) for stream in left)

@@ -86,7 +86,8 @@ def _joint_order(channels: dict, truth: dict[str, Truth]) -> list[str]:
     """Return the joints in the order of the first channel of several columns that are of different joints."""
     for name in ("position", "speed", "torque", *channels):
         part = channels.get(name)
-        joints = [truth[column].joint for column in _columns_of(part) if column in truth] if isinstance(part, dict) else []
+        columns = _columns_of(part) if isinstance(part, dict) else []
+        joints = [truth[column].joint for column in columns if column in truth]
         if len(joints) > 1 and len(set(joints)) == len(joints) and all(joints):
             return joints
     return []
@@ -104,8 +105,9 @@ def _fault(channel: str, part: dict, truth: Mapping[str, Truth], order: Sequence
             return f"column {column!r} is {item.channel or 'no channel'}"
         if item.joint and len(columns) > 1 and order and item.joint != order[k]:
             return f"column {column!r} is joint {item.joint} in place of {order[k]}"
-        if item.joint and len(columns) == 1 and len({t.joint for t in truth.values() if t.channel == channel}) > 1:
-            return f"column {column!r} is one joint of several"
+    joints = {item.joint for item in truth.values() if item.channel == channel and item.joint}
+    if len(columns) < len(joints):
+        return f"{len(columns)} of {len(joints)} joints"
     return ""
 
 
