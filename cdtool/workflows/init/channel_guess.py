@@ -35,6 +35,8 @@ _AHEAD = 0.2
 # A set value that resembles another channel by this much more is not that of this one.
 _CLOSER = 0.2
 _BY_COURSE = "guessed from its values only"
+# Below this correlation a letter alone (`a`, `s`, `n`) is no name of what the physics denies.
+_DENIES = 0.5
 # A one-letter name is weaker evidence for a quantity than the first; a unit alone is the second, `J1` alone the third.
 _SPEAKS, _BY_UNIT, _BY_JOINT = 2.0, 0.8, 0.5
 # Physics that agrees counts more than any name.
@@ -147,16 +149,25 @@ def _motion_by_name(channels: Channels) -> None:
     ]
     if pairs:
         _, _, position, speed, fit = max(pairs, key=lambda pair: pair[:2])
+        weaker = min(position, speed, key=lambda item: item[0])
+        if fit.correlation < _DENIES and weaker[0] < _SPEAKS and position[0] != speed[0]:
+            _take_one(channels, "speed" if weaker is position else "position", named)
+            return
         told = f"; its derivative fits the speed, r = {fit.correlation:.3f}" if fit.correlation > _FITS else ""
         _take_named(channels, "position", position, named["position"], told)
         _take_named(channels, "speed", speed, named["speed"])
         return
-    for quantity, other in (("position", "speed"), ("speed", "position")):
+    for quantity in ("position", "speed"):
         if named[quantity]:
-            chosen = max(named[quantity], key=lambda item: item[0] + is_actual(item[2].name))
-            _take_named(channels, quantity, chosen, named[quantity])
-            _partner(channels, chosen[2], other)
+            _take_one(channels, quantity, named)
             return
+
+
+def _take_one(channels: Channels, quantity: str, named: dict[str, list[Named]]) -> None:
+    """Take a position or a speed by its name alone, and look for the other one by values."""
+    chosen = max(named[quantity], key=lambda item: item[0] + is_actual(item[2].name))
+    _take_named(channels, quantity, chosen, named[quantity])
+    _partner(channels, chosen[2], "speed" if quantity == "position" else "position")
 
 
 def _pair_score(position: Named, speed: Named, correlation: float) -> float:
@@ -290,6 +301,8 @@ def _acceleration(channels: Channels) -> None:
     fits = {id(item[2]): motion.derivative_fit(item[2], speed.stream).correlation for item in top}
     chosen = max(top, key=lambda item: abs(fits[id(item[2])]))
     correlation = fits[id(chosen[2])]
+    if chosen[0] < _SPEAKS and abs(correlation) < _DENIES:
+        return
     told = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
     rivals = [item for item in top if abs(fits[id(item[2])]) > _FITS] if told else top
     _take_named(channels, "acceleration", chosen, rivals, told)

@@ -93,9 +93,11 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             try:
                 findings = info(log, machine=read_machine_file(trial)).findings
             except CdtoolError as fault:
-                if fault.channel not in mapped or len(mapped) == 1:  # the draft cannot do without it
+                if fault.channel not in mapped:
                     raise
                 left_out.append(fault.channel)
+                if len(mapped) == 1:
+                    return Drafted("", draft_text(draft, left_out, turned), (), tuple(left_out), (), draft.unmapped)
                 continue
             if turned or not any(isinstance(found.fact, AccelerometerTurned) for found in findings):
                 return Drafted("", text, mapped, tuple(left_out), findings, draft.unmapped)

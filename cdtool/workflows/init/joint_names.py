@@ -108,11 +108,17 @@ def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
         quantity
         for before, after in keys
         for quantity in _QUANTITIES
-        if not is_something_else(f"{before} {after}") and word_for(quantity, f"{before} {after}")[0] >= 2.0
+        if _indicates(quantity, f"{before} {after}")
     }
     if {slot.lower() for slot in slots} <= _AXES and "torque" not in quantities:
         return False
     return len(quantities) >= 2
+
+
+def _indicates(quantity: str, name: str) -> bool:
+    """Whether the name of a column without its joint indicates a quantity; a letter must stand alone: `hip.q`."""
+    strength = 0.0 if is_something_else(name) else word_for(quantity, name)[0]
+    return strength >= 2.0 or (strength > 0.0 and len(words(name)) == 1)
 
 
 def _is_taken(slot: str) -> bool:
