@@ -45,6 +45,11 @@ def _doubt(name: str, stream: Stream, channels: Channels) -> str:
 def _motion_doubt(name: str, channels: Channels) -> str:
     position, speed = _stream(channels, "position"), _stream(channels, "speed")
     if position is None or speed is None:
+        acceleration = _stream(channels, "acceleration")
+        if speed is not None and acceleration is not None:
+            correlation = abs(motion.derivative_fit(acceleration, speed).correlation)
+            if correlation > _FITS:
+                return ""
         other = "speed" if name == "position" else "position"
         return f"no {other} confirms it"
     correlation = motion.integral_fit(position, speed).correlation

@@ -154,8 +154,8 @@ def _motion_by_name(channels: Channels) -> None:
             _take_one(channels, "speed" if weaker is position else "position", named)
             return
         told = f"; its derivative fits the speed, r = {fit.correlation:.3f}" if fit.correlation > _FITS else ""
-        _take_named(channels, "position", position, named["position"], told)
-        _take_named(channels, "speed", speed, named["speed"])
+        _take_named(channels, "position", position, _without(speed[2], named["position"]), told)
+        _take_named(channels, "speed", speed, _without(position[2], named["speed"]))
         return
     for quantity in ("position", "speed"):
         if named[quantity]:
@@ -202,6 +202,10 @@ def _take_named(channels: Channels, quantity: str, chosen: Named, named: list[Na
     if strength <= _BY_UNIT and not check:
         check = "its name does not say so"
     channels.take(quantity, stream, why + told, f"{check}?" if check.startswith("or") else check)
+
+
+def _without(stream: Stream, named: list[Named]) -> list[Named]:
+    return [item for item in named if item[2] is not stream]
 
 
 def _overlap(one: Stream, other: Stream) -> bool:
@@ -350,7 +354,11 @@ def _ground_truth(channels: Channels) -> None:
                 continue
             channels.take("force", stream, "constant level with short, high peaks", _BY_COURSE)
             break
-    for quantity, what in (("label", "is it that of the test, not the alarm of the controller?"), ("trigger", "")):
+    questions = {
+        "label": "is it that of the test, not the alarm of the controller?",
+        "trigger": "is it high during each operation?",
+    }
+    for quantity, what in questions.items():
         for stream in channels.free:
             seen = np.unique(stream.values[np.isfinite(stream.values)])
             if stream.width == 1 and word_for(quantity, stream.name)[0] and np.array_equal(seen, (0.0, 1.0)):

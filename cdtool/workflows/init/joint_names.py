@@ -105,10 +105,7 @@ def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
     if len({_NUMBER.sub("", slot) for slot in slots}) == 1 or any(_is_taken(slot) for slot in slots):
         return False  # names that differ only by a number are families of their own
     quantities = {
-        quantity
-        for before, after in keys
-        for quantity in _QUANTITIES
-        if _indicates(quantity, f"{before} {after}")
+        quantity for before, after in keys for quantity in _QUANTITIES if _indicates(quantity, f"{before} {after}")
     }
     if {slot.lower() for slot in slots} <= _AXES and "torque" not in quantities:
         return False

@@ -73,6 +73,11 @@ def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, m
         return Side("linear_axis", "load", "one joint, position or speed in a unit of length")
     if motor:
         return Side("linear_axis", "motor", f"one joint; {why}", _MOTOR_OF_SLIDE)
+    return _load_side(channels, ratio, told, messages_si)
+
+
+def _load_side(channels: Channels, ratio: Ratio | None, told: dict[str, str], messages_si: bool) -> Side:
+    """Guess the kind of a single joint of which nothing indicates a motor or a length."""
     if told.get("torque") == "N" and "angle" in _kinds(channels):
         return Side("linear_axis", "motor", "one joint, an angle and a force", _MOTOR_OF_SLIDE)
     if "angle" in _kinds(channels):

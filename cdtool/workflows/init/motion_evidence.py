@@ -166,7 +166,7 @@ def roughness(stream: Stream) -> float:
 def is_regular(stream: Stream) -> bool:
     """Whether a stream only rises by equal steps, as a clock or a counter does."""
     steps = np.diff(stream.values[np.isfinite(stream.values)])
-    return len(steps) > 2 and float(np.min(steps)) > 0.0 and float(np.ptp(steps)) < float(np.median(steps))
+    return len(steps) > 2 and float(np.min(steps)) > 0.0 and float(np.ptp(steps)) < 0.5 * float(np.median(steps))
 
 
 def rests_and_peaks(stream: Stream) -> bool:

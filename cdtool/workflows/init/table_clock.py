@@ -113,13 +113,21 @@ def _named(source: Source) -> GuessedClock | None:
 
 
 def _unnamed(source: Source) -> GuessedClock | None:
-    """Return the first column that rises like a clock, whatever its name."""
-    columns = {name: column for name, column in source.columns.items() if not _wraps(column)}
+    """Return the first column that rises like a clock and whose name and unit are not those of a measured value."""
+    columns = {
+        name: column
+        for name, column in source.columns.items()
+        if not _wraps(column) and not _is_measured(name) and (not column.unit or _has_time_unit(column))
+    }
     return guess_clock(replace(source, columns=columns)) if columns else None
 
 
+def _is_measured(name: str) -> bool:
+    return any(word_for(quantity, name)[0] >= _STRONG for quantity in (*MEASURED, "force"))
+
+
 def _has_clock_name(name: str) -> bool:
-    return is_clock(name) and not any(word_for(quantity, name)[0] >= _STRONG for quantity in MEASURED)
+    return is_clock(name) and not _is_measured(name)
 
 
 def _has_time_unit(column: Column) -> bool:

@@ -66,7 +66,14 @@ def german_door(generator: Generator) -> Columns:
 
 def french_bench(generator: Generator) -> Columns:
     m = stroke_motion(generator)
-    names = ("Temps (s)", "Position (mm)", "Vitesse (mm/s)", "Effort moteur (N)", "Force capteur (N)", "Consigne position (mm)")
+    names = (
+        "Temps (s)",
+        "Position (mm)",
+        "Vitesse (mm/s)",
+        "Effort moteur (N)",
+        "Force capteur (N)",
+        "Consigne position (mm)",
+    )
     return named(generator, m, names, ("s", "mm", "mm/s", "N", "N", "mm"))
 
 
@@ -84,7 +91,14 @@ def french_motor(generator: Generator) -> Columns:
 
 def italian_gate(generator: Generator) -> Columns:
     m = stroke_motion(generator, rate=250.0)
-    names = ("Tempo [ms]", "Posizione [mm]", "Velocità [mm/s]", "Forza motore [N]", "Cella di carico [N]", "Posizione target [mm]")
+    names = (
+        "Tempo [ms]",
+        "Posizione [mm]",
+        "Velocità [mm/s]",
+        "Forza motore [N]",
+        "Cella di carico [N]",
+        "Posizione target [mm]",
+    )
     return named(generator, m, names, ("ms", "mm", "mm/s", "N", "N", "mm"))
 
 
@@ -152,8 +166,14 @@ def sinamics(generator: Generator) -> Columns:
     m = stroke_motion(generator, rate=250.0)
     return {
         "Zeit [ms]": (Truth("time", unit="ms"), m.time * 1e3),
-        "r0062: Drehzahlsollwert nach Filter [1/min]": (Truth("reference_speed", unit="rpm"), single(m.reference_speed) / LEAD * RPM),
-        "r0063: Drehzahlistwert geglättet [1/min]": (Truth("speed", unit="rpm"), single(m.noisy(m.speed, generator)) / LEAD * RPM),
+        "r0062: Drehzahlsollwert nach Filter [1/min]": (
+            Truth("reference_speed", unit="rpm"),
+            single(m.reference_speed) / LEAD * RPM,
+        ),
+        "r0063: Drehzahlistwert geglättet [1/min]": (
+            Truth("speed", unit="rpm"),
+            single(m.noisy(m.speed, generator)) / LEAD * RPM,
+        ),
         "r0079: Drehmomentsollwert gesamt [Nm]": (Truth("reference_torque", unit="N m"), single(m.model_effort) * LEAD),
         "r0080: Drehmomentistwert [Nm]": (Truth("torque", unit="N m"), single(m.effort) * LEAD),
         "r0078: Stromistwert momentenbildend [A]": (Truth("current", unit="A"), single(m.effort) * LEAD * 2.0),
@@ -182,8 +202,14 @@ def ctrlx(generator: Generator) -> Columns:
     return {
         "Time/us": (Truth("time", unit="us"), m.time * 1e6),
         "Axis1/S-0-0051 Position feedback value 1/mm": (Truth("position", unit="mm"), single(m.position) * 1e3),
-        "Axis1/S-0-0047 Position command value/mm": (Truth("reference_position", unit="mm"), single(m.reference_position) * 1e3),
-        "Axis1/S-0-0040 Velocity feedback value/mm/min": (Truth("speed", unit="mm/min"), single(m.noisy(m.speed, generator)) * 6e4),
+        "Axis1/S-0-0047 Position command value/mm": (
+            Truth("reference_position", unit="mm"),
+            single(m.reference_position) * 1e3,
+        ),
+        "Axis1/S-0-0040 Velocity feedback value/mm/min": (
+            Truth("speed", unit="mm/min"),
+            single(m.noisy(m.speed, generator)) * 6e4,
+        ),
         "Axis1/S-0-0084 Torque feedback value/%": (Truth("torque", unit="%"), single(m.effort) * 0.2),
         "Axis1/S-0-0189 Following distance/mm": (NOTHING, single(m.reference_position - m.position) * 1e3),
     }
@@ -196,7 +222,10 @@ def br_trace(generator: Generator) -> Columns:
         "gAxis01:PCTRL_S_ACT [Units]": (Truth("position", unit="mm"), np.round(single(m.position) * 1e3, 2)),
         "gAxis01:PCTRL_S_SET [Units]": (Truth("reference_position", unit="mm"), single(m.reference_position) * 1e3),
         "gAxis01:PCTRL_LAG_ERROR [Units]": (NOTHING, single(m.reference_position - m.position) * 1e3),
-        "gAxis01:SCTRL_SPEED_ACT [1/s]": (Truth("speed", unit="rev/s"), single(m.noisy(m.speed, generator)) / LEAD / (2 * np.pi)),
+        "gAxis01:SCTRL_SPEED_ACT [1/s]": (
+            Truth("speed", unit="rev/s"),
+            single(m.noisy(m.speed, generator)) / LEAD / (2 * np.pi),
+        ),
         "gAxis01:ICTRL_ISQ_ACT [A]": (Truth("current", unit="A"), single(m.effort) * LEAD * 2.0),
         "gAxis01:ICTRL_ISD_ACT [A]": (NOTHING, generator.normal(0.0, 0.02, len(m.time))),
         "gAxis01:TORQUE_ACT [Nm]": (Truth("torque", unit="N m"), single(m.effort) * LEAD),
@@ -320,7 +349,12 @@ def emps(path: Path, generator: Generator) -> None:
     import scipy.io
 
     m = stroke_motion(generator, rate=1000.0, duration=6.0, travel=0.24, inertia=95.0, friction=20.0, push=0.0)
-    content = {"qg": m.reference_position, "qm": quantised(m.position, 1e-5), "vir": m.effort, "t": m.time[:, np.newaxis]}
+    content = {
+        "qg": m.reference_position,
+        "qm": quantised(m.position, 1e-5),
+        "vir": m.effort,
+        "t": m.time[:, np.newaxis],
+    }
     scipy.io.savemat(path, {**content, "gtau": 35.15})
 
 
@@ -336,27 +370,51 @@ def position_only(generator: Generator) -> Columns:
 
 
 LAYOUTS: tuple[Layout, ...] = (
-    table_layout("german gate", "bench of a gate: Zeit, Drehmoment, Drehzahl, Beschl., Kraft", "linear axis", german_gate, Table(";", ",")),
-    table_layout("german door", "door drive with units after a slash and a temperature", "rotary axis", german_door, Table(";", ",", encoding="cp1252")),
-    table_layout("french bench", "French bench: Temps, Vitesse, Effort moteur, Consigne", "linear axis", french_bench, Table(";", ",")),
+    table_layout(
+        "german gate", "bench of a gate: Zeit, Drehmoment, Drehzahl, Beschl., Kraft",
+        "linear axis", german_gate, Table(";", ","),
+    ),
+    table_layout(
+        "german door", "door drive with units after a slash and a temperature",
+        "rotary axis", german_door, Table(";", ",", encoding="cp1252"),
+    ),
+    table_layout(
+        "french bench", "French bench: Temps, Vitesse, Effort moteur, Consigne",
+        "linear axis", french_bench, Table(";", ","),
+    ),
     table_layout("french motor", "French motor log with units at the ends of names", "linear axis", french_motor),
-    table_layout("italian gate", "Italian gate: Tempo, Posizione, Velocità, Cella di carico", "linear axis", italian_gate, Table(";", ",")),
+    table_layout(
+        "italian gate", "Italian gate: Tempo, Posizione, Velocità, Cella di carico",
+        "linear axis", italian_gate, Table(";", ","),
+    ),
     table_layout("italian axis", "Italian rotary axis without units", "rotary axis", italian_axis),
     table_layout("spanish door", "Spanish sliding door with units at the ends of names", "linear axis", spanish_door),
     table_layout("chinese servo", "export of a Chinese servo tool", "linear axis", chinese_servo),
     table_layout("japanese servo", "export of a Japanese servo tool", "linear axis", japanese_servo),
-    table_layout("twincat scope", "TwinCAT Scope: NcToPlc names, one time column", "linear axis", twincat, Table("\t")),
-    table_layout("sinamics trace", "SINAMICS trace with parameter numbers, German", "linear axis", sinamics, Table(";", ",")),
+    table_layout(
+        "twincat scope", "TwinCAT Scope: NcToPlc names, one time column",
+        "linear axis", twincat, Table("\t"),
+    ),
+    table_layout(
+        "sinamics trace", "SINAMICS trace with parameter numbers, German",
+        "linear axis", sinamics, Table(";", ","),
+    ),
     table_layout("sinumerik trace", "SINUMERIK trace: ENC1_POS, DES_POS, CURRENT, TORQUE", "linear axis", sinumerik),
     table_layout("ctrlx", "Bosch Rexroth oscilloscope with S parameters", "linear axis", ctrlx, Table(";")),
     table_layout("b&r trace", "B&R trace of ACOPOS parameters", "linear axis", br_trace, Table(";")),
     table_layout("labview", "LabVIEW bench: X_Value and DAQ channels", "linear axis", labview, Table("\t")),
     table_layout("matlab table", "writetable of a rotary bench: theta, omega, i_q", "rotary axis", matlab_table),
-    table_layout("cnc mill", "CNC mill tool wear of the University of Michigan: four axes, no clock, 10 Hz", "robot", cnc_mill),
+    table_layout(
+        "cnc mill", "CNC mill tool wear of the University of Michigan: four axes, no clock, 10 Hz",
+        "robot", cnc_mill,
+    ),
     table_layout("servo press", "servo press: ram position, speed, force in kN", "linear axis", servo_press),
     table_layout("px4", "vehicle_local_position of PX4 as CSV", "linear axis", px4_actuator),
     table_layout("odrive", "ODrive telemetry in turns", "rotary axis", odrive),
-    table_layout("axis at rest", "two-axis bench, one axis at rest, a sample counter", "linear axis", sampled_at_rest, Table(";")),
+    table_layout(
+        "axis at rest", "two-axis bench, one axis at rest, a sample counter",
+        "linear axis", sampled_at_rest, Table(";"),
+    ),
     table_layout("counts only", "encoder counts and current on a jittered clock", "linear axis", position_only),
     Layout(
         "emps", "EMPS identification data of a servo slide, MAT", ".mat", "linear axis", emps,

@@ -9,7 +9,7 @@ from numpy.random import Generator
 
 from cdtool.formats.mcap.write import Stream, write_mcap
 from tests.workflows.init.layouts.axes import LEAD, NOTHING, cell, single
-from tests.workflows.init.layouts.layout import Columns, FloatArray, Layout, Table, Truth, table_layout
+from tests.workflows.init.layouts.layout import Columns, Layout, Table, Truth, table_layout
 from tests.workflows.init.layouts.motion import RPM, arm_motion, quantised, stroke_motion
 from tests.workflows.init.layouts.robots import DEG, each, jittered, pose, wrench
 
@@ -44,7 +44,8 @@ def epos(generator: Generator) -> Columns:
     m = stroke_motion(generator, rate=1000.0, duration=4.0)
     return {
         "Time [ms]": (Truth("time", unit="ms"), m.time * 1e3),
-        "Position Actual Value [inc]": (Truth("position", unit="count"), np.round(single(m.position) / LEAD * 2000 / 6.2832)),
+        "Position Actual Value [inc]": (
+            Truth("position", unit="count"), np.round(single(m.position) / LEAD * 2000 / 6.2832)),
         "Position Demand Value [inc]": (
             Truth("reference_position", unit="count"), np.round(single(m.reference_position) / LEAD * 2000 / 6.2832)),
         "Velocity Actual Value [rpm]": (Truth("speed", unit="rpm"), np.round(single(m.speed) / LEAD * RPM)),
@@ -208,16 +209,25 @@ LAYOUTS: tuple[Layout, ...] = (
     table_layout("kollmorgen", "Kollmorgen Workbench scope: PL.FB, VL.FB, IL.FB", "linear axis", kollmorgen),
     table_layout("sigmawin", "Yaskawa SigmaWin trace: no measured torque", "linear axis", sigmawin),
     table_layout("epos", "maxon EPOS Studio recorder in increments", "linear axis", epos, Table(";")),
-    table_layout("testing machine", "Zwick testXpert: Standardweg, Standardkraft", "linear axis", testing_machine, Table(";", ",")),
+    table_layout(
+        "testing machine", "Zwick testXpert: Standardweg, Standardkraft",
+        "linear axis", testing_machine, Table(";", ","),
+    ),
     table_layout("legged motor", "Unitree motor states of one leg", "robot", legged_motor),
     table_layout("desktop arm", "xArm with a force sensor at the wrist", "robot", desktop_arm, Table(digits=10)),
     table_layout("axes only", "a motion logger of an ABB arm: timestamp, cmd_num, J1 to J6", "robot", axes_only),
     table_layout("lift door", "trace of a lift's door drive", "linear axis", lift_door, Table(";")),
-    table_layout("amplifier", "catman export of a measuring amplifier: units only", "linear axis", amplifier, Table("\t")),
+    table_layout(
+        "amplifier", "catman export of a measuring amplifier: units only",
+        "linear axis", amplifier, Table("\t"),
+    ),
     table_layout("no words", "columns A to D", "linear axis", no_words),
     table_layout("spanish robot", "Spanish names of joints", "robot", spanish_robot),
     table_layout("chinese robot", "Chinese names of joints", "robot", chinese_robot),
-    table_layout("gear bench", "motor side with an accelerometer in g, contact and trigger", "linear axis", gear_bench),
+    table_layout(
+        "gear bench", "motor side with an accelerometer in g, contact and trigger",
+        "linear axis", gear_bench,
+    ),
     table_layout("camera", "positions of a camera at 30 Hz with frame numbers", "linear axis", coarse_camera),
     Layout(
         "mat robot", "MATLAB matrices with a column for each joint", ".mat", "robot", mat_robot,

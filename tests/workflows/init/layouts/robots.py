@@ -131,7 +131,9 @@ def ur_no_header(generator: Generator) -> Columns:
 
 def libfranka(generator: Generator) -> Columns:
     m = arm_motion(generator, 7, rate=1000.0, duration=3.0)
-    external = 0.3 * m.push[:, np.newaxis] * np.array([1, 1, 1, 0, 0, 0, 0]) + generator.normal(0.0, 0.3, m.effort.shape)
+    external = 0.3 * m.push[:, np.newaxis] * np.array([1, 1, 1, 0, 0, 0, 0]) + generator.normal(
+        0.0, 0.3, m.effort.shape
+    )
     transform = np.column_stack([pose(m)[:, k % 6] for k in range(16)])
     return {
         "duration": (Truth("time", unit="ms"), m.time * 1e3 + 4000.0),
@@ -356,7 +358,12 @@ def dynamixel(generator: Generator) -> Columns:
         **each("present_position_{n}", "position", "count", np.round(m.position * 4096 / (2 * np.pi)) + 2048.0),
         **each("present_velocity_{n}", "speed", "", np.round(m.speed * RPM / 0.229)),
         **each("present_current_{n}", "current", "", np.round(m.effort * 20.0)),
-        **each("goal_position_{n}", "reference_position", "count", np.round(m.reference_position * 4096 / (2 * np.pi)) + 2048.0),
+        **each(
+            "goal_position_{n}",
+            "reference_position",
+            "count",
+            np.round(m.reference_position * 4096 / (2 * np.pi)) + 2048.0,
+        ),
         **each("present_input_voltage_{n}", "", "", np.full(m.effort.shape, 118.0)),
     }
 
@@ -376,13 +383,42 @@ def joints_only(generator: Generator) -> Columns:
 
 
 LAYOUTS: tuple[Layout, ...] = (
-    table_layout("ur rtde", "record.py of Universal Robots' RTDE client: names of the RTDE outputs, 125 Hz", "robot", ur_rtde, Table(" ")),
-    table_layout("ros plotjuggler", "joint_states of ur_robot_driver as exported by PlotJuggler, 500 Hz", "robot", ros_plotjuggler, Table(digits=9)),
-    table_layout("ur10e identification", "identification data of a UR10e: q, qd, motor currents, 500 Hz", "robot", ur10e_identification),
-    table_layout("ur without names", "collisions of a UR arm: 40 columns without names, about 50 Hz", "robot", ur_no_header, Table(header=False)),
+    table_layout(
+        "ur rtde",
+        "record.py of Universal Robots' RTDE client: names of the RTDE outputs, 125 Hz",
+        "robot",
+        ur_rtde,
+        Table(" "),
+    ),
+    table_layout(
+        "ros plotjuggler",
+        "joint_states of ur_robot_driver as exported by PlotJuggler, 500 Hz",
+        "robot",
+        ros_plotjuggler,
+        Table(digits=9),
+    ),
+    table_layout(
+        "ur10e identification",
+        "identification data of a UR10e: q, qd, motor currents, 500 Hz",
+        "robot",
+        ur10e_identification,
+    ),
+    table_layout(
+        "ur without names",
+        "collisions of a UR arm: 40 columns without names, about 50 Hz",
+        "robot",
+        ur_no_header,
+        Table(header=False),
+    ),
     table_layout("libfranka log", "logToCSV of libfranka: names of the robot state, 1 kHz", "robot", libfranka),
     table_layout("franka states", "franka_ros states with underscores, one joint at rest", "robot", franka_states),
-    table_layout("kuka data recorder", "DataRecorder of KUKA Sunrise: two columns of time", "robot", kuka_data_recorder, Table(" ")),
+    table_layout(
+        "kuka data recorder",
+        "DataRecorder of KUKA Sunrise: two columns of time",
+        "robot",
+        kuka_data_recorder,
+        Table(" "),
+    ),
     table_layout("kuka fri", "lbr_fri_ros2 states of a KUKA iiwa", "robot", kuka_fri),
     table_layout("kuka rsi", "KUKA RSI: AIPos, ASPos, MACur, IPOC in ms, 4 ms", "robot", kuka_rsi, Table(digits=10)),
     table_layout("abb egm", "ABB EGM: feedback and planned joints in degrees, 250 Hz", "robot", abb_egm),
@@ -390,8 +426,14 @@ LAYOUTS: tuple[Layout, ...] = (
     table_layout("doosan", "real-time data of Doosan: degrees, motor and joint torques", "robot", doosan),
     table_layout("kinova", "BaseCyclic feedback of a Kinova Gen3", "robot", kinova),
     table_layout("baxter", "SEAJointState of a Baxter with collisions: seven joints by name, 100 Hz", "robot", baxter),
-    table_layout("voraus", "voraus-AD: motor and joint side, computed torques, currents of the cell, 100 Hz", "robot", voraus),
-    table_layout("flexiv", "RobotStates of Flexiv: q, theta, tau, tau_des, tau_dot, tau_ext", "robot", flexiv, Table(digits=9)),
+    table_layout(
+        "voraus", "voraus-AD: motor and joint side, computed torques, currents of the cell, 100 Hz", "robot", voraus
+    ),
+    table_layout(
+        "flexiv", "RobotStates of Flexiv: q, theta, tau, tau_des, tau_dot, tau_ext", "robot", flexiv, Table(digits=9)
+    ),
     table_layout("dynamixel", "control table of Dynamixel servos, raw counts, 50 Hz", "robot", dynamixel),
-    table_layout("present values", "a recorder that calls the present position current_pos, about 60 Hz", "robot", joints_only),
+    table_layout(
+        "present values", "a recorder that calls the present position current_pos, about 60 Hz", "robot", joints_only
+    ),
 )
