@@ -46,8 +46,14 @@ def integral_fit(position: Stream, speed: Stream) -> Fit:
 
 
 def derivative_fit(acceleration: Stream, speed: Stream) -> Fit:
-    """Compare the integrated acceleration with increments of the speed; negative correlation: opposite sign."""
-    return integral_fit(speed, acceleration)
+    """Compare the integrated acceleration with increments of the speed; negative correlation: opposite sign.
+
+    A constant offset of the acceleration, as from the weight, does not matter.
+    """
+    if speed.width != acceleration.width or len(acceleration.time) < 3:
+        return _NONE
+    ways = _at(acceleration.time, integrated(acceleration), speed.time)
+    return _fit(ways, speed.values, centred=True)
 
 
 def likeness(one: Stream, other: Stream) -> float:
@@ -197,13 +203,15 @@ def _stirs(position: Stream, speed: Stream) -> bool:
     return way > 0.01 and bool(np.ptp(np.nan_to_num(speed.values)))
 
 
-def _fit(ways: FloatArray, places: FloatArray) -> Fit:
+def _fit(ways: FloatArray, places: FloatArray, *, centred: bool = False) -> Fit:
     window = max(1, len(places) // _WINDOWS)
     there, here = np.diff(ways[::window], axis=0), np.diff(places[::window], axis=0)
     correlations, slopes = [], []
     for j in range(places.shape[1]):
         known = np.isfinite(there[:, j]) & np.isfinite(here[:, j])
         x, y = there[known, j], here[known, j]
+        if centred and len(x):
+            x, y = x - np.mean(x), y - np.mean(y)
         power = float(x @ x), float(y @ y)
         if min(power) <= 0.0 or len(x) < 3:
             continue

@@ -37,7 +37,7 @@ _TAILS = {
     "cnts": "count", "inc": "count", "ticks": "count",
 }  # fmt: skip
 _SEPARATOR = re.compile(r"[\W_]+")
-# Units of what is no channel: temperature, power, frequency, pressure, resistance, energy.
+# Units of other quantities: temperature, power, frequency, pressure, resistance, energy.
 _FOREIGN = frozenset(
     ("°c", "degc", "celsius", "℃", "k", "°f", "w", "kw", "va", "hz", "khz", "bar", "mbar", "pa", "kpa", "mpa", "ohm",
      "kohm", "j", "kj", "wh", "vdc", "vac")

@@ -74,7 +74,7 @@ def _described(stream: Stream, channels: Channels) -> Unmapped:
 
 
 def _next_best(stream: Stream, channels: Channels) -> tuple[str, str]:
-    """Return the channel that a stream may be, with the reason; an empty text if it is none."""
+    """Return the channel that a stream may be, with the reason; an empty text for neither."""
     if reason := what_else(stream.name):
         return "", f"{reason}, by its name"
     if stream.unit and is_foreign(stream.unit):

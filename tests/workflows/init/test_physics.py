@@ -49,7 +49,7 @@ def test_a_weight_on_a_link_is_explained_by_the_position():
     assert motion.drive_fit(stream(time, drive), stream(time, speed), stream(time, angle)) > 0.9
 
 
-def test_the_smallest_unit_tells_what_a_name_does_not(tmp_path):
+def test_a_unit_is_used_where_the_name_says_nothing(tmp_path):
     run = stroke()
     draft = drafted_columns(
         tmp_path,

@@ -1,4 +1,4 @@
-"""Names of columns in several languages: their quantity, set values, measured values, and what is no channel."""
+"""Names of columns in several languages: their quantity, set values, measured values, and other quantities."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_other_values_are_no_set_values(name):
     ["computed_torque_1", "gravity_model_effort", "tau_ext_hat_filtered", "跟随误差", "温度", "Spannung",
      "errore_inseguimento", "robot_current", "actual_TCP_force_0", "tau_dot", "i_d", "M1_CURRENT_FEEDRATE"],
 )  # fmt: skip
-def test_what_is_no_channel_of_a_joint_is_recognised(name):
+def test_other_quantities_than_those_of_a_joint_are_recognised(name):
     assert is_something_else(name)
 
 

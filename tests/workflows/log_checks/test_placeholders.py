@@ -69,7 +69,9 @@ def test_marks_are_counted_by_key_after_the_line_and_before_it(log, tmp_path):
     path = machine_file(tmp_path, ratio=0.01, mass=20.0, scale=0.05)
     text = path.read_text()
     text = text.replace("transmission_ratio = 0.01", "# CHECK: measured?\n# on two lines\ntransmission_ratio = 0.01")
-    path.write_text(text.replace("load_mass = 20.0", 'load_mass = 20.0  # from the data sheet. CHECK: "with the leaf"?'))
+    path.write_text(
+        text.replace("load_mass = 20.0", 'load_mass = 20.0  # from the data sheet. CHECK: "with the leaf"?')
+    )
     assert placeholders(log, path) == {UncheckedLines: UncheckedLines(2, ("transmission_ratio", "load_mass"))}
 
 
