@@ -15,6 +15,7 @@ from cdtool.recording import FloatArray
 from cdtool.workflows.init.joint_names import families_by_name
 
 _NUMBER = re.compile(r"\d+")
+_MOST = 1e100
 # `position[:]` with more elements than this is not a list of joints.
 _MOST_JOINTS = 64
 
@@ -116,7 +117,7 @@ def streams_of(source: Source, table_time: FloatArray | None, clock: str | None,
         time = column.time if column.time is not None else table_time
         if time is None or len(time) != len(column.values):
             time = np.arange(len(column.values), dtype=np.float64)
-        singles[name] = Stream(name, (name,), column.unit, time, column.values[:, np.newaxis])
+        singles[name] = Stream(name, (name,), column.unit, time, _possible(column.values)[:, np.newaxis])
     return [*_families(singles), *_named_families(singles), *singles.values()]
 
 
@@ -124,7 +125,14 @@ def _of_topic(name: str, source: Source) -> Stream:
     column = source.columns[name]
     topic, _, field = name.partition(" ")
     time = column.time if column.time is not None else np.arange(len(column.values), dtype=np.float64)
-    return Stream(name, (), column.unit, time, column.values.reshape(len(column.values), -1), topic, field)
+    values = _possible(column.values).reshape(len(column.values), -1)
+    return Stream(name, (), column.unit, time, values, topic, field)
+
+
+def _possible(values: FloatArray) -> FloatArray:
+    """Return values with NaN in place of those that no sensor delivers and whose squares would overflow."""
+    wrong = ~(np.abs(values) < _MOST) & ~np.isnan(values)
+    return np.where(wrong, np.nan, values) if wrong.any() else values
 
 
 def _families(singles: Mapping[str, Stream]) -> list[Stream]:
