@@ -10,6 +10,7 @@ from cdtool.recording import MEASURED
 from cdtool.workflows.init import lexicon
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.certainty import add_doubts
+from cdtool.workflows.init.column_blocks import find_blocks
 from cdtool.workflows.init.quantity_words import (
     is_actual,
     is_current,
@@ -19,7 +20,7 @@ from cdtool.workflows.init.quantity_words import (
     word_for,
     words,
 )
-from cdtool.workflows.init.streams import Channels, Found, Stream, joined
+from cdtool.workflows.init.streams import Channels, Found, Stream
 from cdtool.workflows.init.units_in_names import label, may_be, quantity_of_unit
 
 # Above this correlation one column is treated as another's derivative; above the second one without any name.
@@ -110,33 +111,22 @@ def _unnamed(streams: list[Stream]) -> bool:
 
 
 def _by_place(channels: Channels) -> None:
-    """Guess from columns without names: blocks of J positions, J speeds and, if they move like a drive, J torques."""
-    streams = channels.free
-    block = motion.blocks(streams[:_MOST_UNNAMED])
-    if block is None:
+    """Guess from columns without names: blocks of J columns that are related as positions, speeds and efforts."""
+    found = find_blocks(channels.free[:_MOST_UNNAMED])
+    if found is None:
         return
-    first, joints, correlation = block
-    channels.joints = joints
-    parts = [streams[first + i * joints : first + (i + 1) * joints] for i in range(3)]
-    fit = f"r = {correlation:.3f}"
-    many = "column" if joints == 1 else f"{joints} columns"
-    text = f"its derivative fits the {many} after it, {fit}"
-    channels.take("position", joined(parts[0], _places(parts[0])), text)
-    text = f"its integral fits the {many} before it, {fit}"
-    channels.take("speed", joined(parts[1], _places(parts[1])), text)
-    if len(parts[2]) == joints:
-        drive = joined(parts[2], _places(parts[2]))
-        share = motion.drive_fit(drive, channels.found["speed"].stream)
-        text = f"its position after the speeds; inertia and friction explain {100 * max(share, 0.0):.0f} % of it"
-        if motion.rests_and_peaks(drive):
-            channels.take("force", drive, "constant level with short, high peaks", _BY_COURSE)
-        else:
-            channels.take("torque", drive, text, _BY_COURSE)
+    channels.joints = found.joints
+    fit = f"r = {found.correlation:.3f}"
+    reasons = {
+        "position": f"its derivative fits the {found.streams['speed'].name}, {fit}",
+        "speed": f"its integral fits the {found.streams['position'].name}, {fit}",
+        "torque": f"inertia, friction and weight explain {100 * found.explained:.0f} % of it",
+    }
+    for channel, stream in found.streams.items():
+        why = reasons.get(channel, f"the same course as the {channel.removeprefix('reference_')}, and not behind it")
+        channels.take(channel, stream, why, _BY_COURSE)
+    if found.joints > 1:
         channels.free = []  # other columns without names are not guessed
-
-
-def _places(streams: list[Stream]) -> str:
-    return f"columns {streams[0].name} to {streams[-1].name}"
 
 
 def _motion_by_name(channels: Channels) -> None:

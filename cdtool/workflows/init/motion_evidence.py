@@ -184,20 +184,7 @@ def rests_and_peaks(stream: Stream) -> bool:
     return float(np.mean(away < 0.03 * np.max(away))) > 0.8 and float(np.max(away)) > 20.0 * float(np.median(away))
 
 
-def blocks(streams: list[Stream]) -> tuple[int, int, float] | None:
-    """Find (first, J, correlation) of J positions followed by their J speeds in columns without names."""
-    best: tuple[int, int, float] | None = None
-    for joints in range(1, len(streams) // 2 + 1):
-        for first in range(len(streams) - 2 * joints + 1):
-            pairs = [(streams[first + j], streams[first + joints + j]) for j in range(joints)]
-            fits = [integral_fit(*pair).correlation for pair in pairs if _stirs(*pair)]
-            good = len(fits) >= max(1, (joints + 1) // 2) and min(fits) > 0.9
-            if good and (best is None or joints > best[1]):
-                best = first, joints, float(np.median(fits))
-    return best
-
-
-def _stirs(position: Stream, speed: Stream) -> bool:
+def stirs(position: Stream, speed: Stream) -> bool:
     """Whether a joint moves; values of a joint at rest are noise."""
     way = float(np.ptp(np.nan_to_num(position.values)))
     return way > 0.01 and bool(np.ptp(np.nan_to_num(speed.values)))

@@ -129,6 +129,19 @@ def ur_no_header(generator: Generator) -> Columns:
     }
 
 
+def ur_set_values_first(generator: Generator) -> Columns:
+    """31 columns without names: time, set positions and speeds, then the measured ones and the currents."""
+    m = arm_motion(generator, rate=125.0, duration=8.0)
+    return {
+        "t": (Truth("time", unit="s"), m.time),
+        **each("q_des{n}", "reference_position", "rad", m.reference_position),
+        **each("qd_des{n}", "reference_speed", "rad/s", m.reference_speed),
+        **each("q{n}", "position", "rad", m.position),
+        **each("qd{n}", "speed", "rad/s", m.noisy(m.speed, generator)),
+        **each("i{n}", "current", "A", m.effort * 0.1),
+    }
+
+
 def libfranka(generator: Generator) -> Columns:
     m = arm_motion(generator, 7, rate=1000.0, duration=3.0)
     external = 0.3 * m.push[:, np.newaxis] * np.array([1, 1, 1, 0, 0, 0, 0]) + generator.normal(
@@ -408,6 +421,13 @@ LAYOUTS: tuple[Layout, ...] = (
         "collisions of a UR arm: 40 columns without names, about 50 Hz",
         "robot",
         ur_no_header,
+        Table(header=False),
+    ),
+    table_layout(
+        "set values without names",
+        "a UR log by URScript: set values first, no names",
+        "robot",
+        ur_set_values_first,
         Table(header=False),
     ),
     table_layout("libfranka log", "logToCSV of libfranka: names of the robot state, 1 kHz", "robot", libfranka),
