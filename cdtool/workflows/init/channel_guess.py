@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from cdtool.recording import MEASURED
-from cdtool.workflows.init import lexicon
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.certainty import add_doubts
 from cdtool.workflows.init.column_blocks import find_blocks
@@ -15,6 +14,7 @@ from cdtool.workflows.init.quantity_words import (
     is_actual,
     is_current,
     is_load_cell,
+    is_only_a_joint,
     is_reference,
     is_something_else,
     word_for,
@@ -84,8 +84,7 @@ def name_strength(quantity: str, stream: Stream) -> tuple[float, str]:
         return 0.0, ""
     if quantity_of_unit(stream) == quantity:
         return _BY_UNIT, _TOLD_UNIT
-    parts = words(name)
-    if quantity == "position" and stream.width > 2 and parts and all(part in lexicon.JOINTS for part in parts):
+    if quantity == "position" and stream.width > 2 and is_only_a_joint(name):
         return _BY_JOINT, "joints"
     return 0.0, ""
 
@@ -365,7 +364,8 @@ def force_strength(stream: Stream) -> tuple[float, str]:
         return 0.0, ""  # the torque of a wrench
     if strength:
         return strength, word
-    taken = any(word_for(quantity, label(stream))[0] >= _SPEAKS for quantity in MEASURED)
+    # An effort in N that is not the drive's is a force: `Effort fermeture (N)`.
+    taken = any(word_for(quantity, label(stream))[0] >= _SPEAKS for quantity in MEASURED if quantity != "torque")
     return (_BY_UNIT, _TOLD_UNIT) if quantity_of_unit(stream) == "force" and not taken else (0.0, "")
 
 

@@ -91,7 +91,7 @@ REFERENCE_LONG = _listed(
     "指令 目标 给定 设定 参考",
     "目標 設定",
 )
-REFERENCE_SHORT = _listed("ref des cmd sp goal qg set demand dem ipo cons traj trajectory")
+REFERENCE_SHORT = _listed("ref des dest cmd sp goal qg set demand dem ipo cons traj trajectory")
 REFERENCE_STARTS = _listed("set cmd ref des tgt goal dem")
 ACTUAL_LONG = _listed(
     "actual measured feedback estimate",
@@ -129,7 +129,7 @@ COUNTERS = _listed("tick count zahler zaehler sample index cycle zyklus seqno �
 PRESENT = _listed("feed feedrate program line block state mode step tool time cycle pose value location target")
 PRESENT_EFFORTS = _listed("torque effort force q angle")
 # Names of joints without a quantity: `J1`, `Achse 3`.
-JOINTS = _listed("j joint joints axis achse a axe asse eje 轴 軸")
+JOINTS = _listed("j jnt joint joints axis achse a axe asse eje 轴 軸")
 # What is in logs of machines without being a channel of a joint, and patterns of it in words joined by `_`.
 OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
     (

@@ -13,6 +13,8 @@ from cdtool.workflows.init import lexicon
 
 _STRONG, _WEAK = 3.0, 2.0
 _LETTERS = 2  # a one-letter word is weak evidence
+# `current` and its short forms, which may mean the present one: before a noun for the joints, for example.
+_PRESENTS, _JOINT_NOUNS = ("current", "cur", "curr"), ("jnt", "joints")
 _BEFORE_D = ("q", "dq", "ddq", "j", "tau", "theta", "x", "pos", "vel")
 _SPLIT = re.compile(r"[\W\d_]+")
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
@@ -47,7 +49,9 @@ def is_reference(name: str) -> bool:
 def is_actual(name: str) -> bool:
     """Whether the name is that of a measured value: `actual_q_0`, `Istposition`, `n_act`, `实际位置`."""
     parts = words(name)
-    if any(long in "".join(parts) for long in lexicon.ACTUAL_LONG) or ("current" in parts and _is_adjective(parts)):
+    if any(long in "".join(parts) for long in lexicon.ACTUAL_LONG) or (
+        any(part in _PRESENTS for part in parts) and _is_adjective(parts)
+    ):
         return True
     if any(_is_joined(part, lexicon.ACTUAL_STARTS) for part in parts):
         return True
@@ -81,9 +85,16 @@ def is_clock(name: str) -> bool:
 
 
 def is_counter(name: str) -> bool:
-    """Whether the name is that of a counter: `ticks`, `sample_index`."""
+    """Whether the name is that of a counter: `ticks`, `sample_index`; not `sample time`."""
     whole = "".join(words(name))
-    return any(word in whole for word in lexicon.COUNTERS)
+    return any(word in whole for word in lexicon.COUNTERS) and not lexicon.CLOCKS.search(whole)
+
+
+def is_only_a_joint(name: str) -> bool:
+    """Whether a name is only that of a joint, perhaps with a word for a set or measured value: `J#`, `DestJnt J#`."""
+    others = (*lexicon.REFERENCE_SHORT, *lexicon.REFERENCE_LONG, *lexicon.ACTUAL_SHORT, *lexicon.ACTUAL_LONG)
+    parts = [part for part in words(name) if part not in others and part not in _PRESENTS]
+    return bool(parts) and all(part in lexicon.JOINTS for part in parts)
 
 
 def motion_of(name: str) -> str:
@@ -100,7 +111,7 @@ def is_current(name: str) -> bool:
     """Whether the name is that of a motor's current; not `current_pos`, the present position."""
     parts = words(name)
     whole = "".join(parts)
-    if any(part in lexicon.CURRENTS_SHORT for part in parts):
+    if any(part in lexicon.CURRENTS_SHORT and not (part in _PRESENTS and _is_adjective(parts)) for part in parts):
         return True
     if any(long in whole for long in lexicon.CURRENTS):
         return True
@@ -125,7 +136,7 @@ def word_for(quantity: str, name: str) -> tuple[float, str]:
                 continue
             return _STRONG, long
     for part in parts:
-        if part in lexicon.SHORT[quantity]:
+        if part in lexicon.SHORT[quantity] and not (part in _PRESENTS and _is_adjective(parts)):
             return (_WEAK if len(part) >= _LETTERS else _WEAK - 1.0), part
     for ending in lexicon.ENDINGS.get(quantity, ()):
         if any(part.endswith(ending) and len(part) > len(ending) for part in parts):
@@ -156,5 +167,5 @@ def _is_adjective(parts: list[str]) -> bool:
     ]
     if others:
         return True
-    later = parts[parts.index("current") + 1 :] if "current" in parts else []
-    return bool(later) and later[0] in (*lexicon.PRESENT, *lexicon.PRESENT_EFFORTS)
+    at = next((i for i, part in enumerate(parts) if part in _PRESENTS), len(parts))
+    return at + 1 < len(parts) and parts[at + 1] in (*lexicon.PRESENT, *lexicon.PRESENT_EFFORTS, *_JOINT_NOUNS)

@@ -125,19 +125,27 @@ def _measures(quantity: str, unit: str) -> bool:
 
 def _split(name: str) -> tuple[str, str, str]:
     """Return (the name before the ending, the ending, its unit); empty texts without such an ending."""
-    if not name.startswith("/"):
-        for slash in re.finditer("/", name):
-            rest, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
-            is_unit = unit.lower() in _FOREIGN or (find_unit(unit) is not None and not rest[-1:].isdigit())
-            if rest and unit and is_unit:
-                return rest, f"/{unit}", unit
     parts = [part for part in _SEPARATOR.split(name) if part]
-    for count in (2, 1):
-        tail = "_".join(parts[-count:])
-        unit = _CAPITALS.get(tail) or _TAILS.get(tail.lower(), "")
-        if unit and (len(parts) > count or tail.lower() == "rpm"):
-            return "_".join(parts[:-count]), tail, unit
-    return name, "", ""
+    return _tail(parts, 2) or _after_slash(name) or _tail(parts, 1) or (name, "", "")
+
+
+def _tail(parts: list[str], count: int) -> tuple[str, str, str] | None:
+    """Return the split of a name whose last parts are a unit: `_mm_s`, `_ms`."""
+    tail = "_".join(parts[-count:])
+    unit = _CAPITALS.get(tail) or _TAILS.get(tail.lower(), "")
+    if unit and (len(parts) > count or tail.lower() == "rpm"):
+        return "_".join(parts[:-count]), tail, unit
+    return None
+
+
+def _after_slash(name: str) -> tuple[str, str, str] | None:
+    """Return the split of a name whose unit is after a slash: `Kraft F / N`; not of the path of a topic."""
+    for slash in [] if name.startswith("/") else re.finditer("/", name):
+        rest, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
+        is_unit = unit.lower() in _FOREIGN or (find_unit(unit) is not None and not rest[-1:].isdigit())
+        if rest and unit and is_unit:
+            return rest, f"/{unit}", unit
+    return None
 
 
 def _stands_for_itself(rest: str, tail: str) -> bool:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tests.workflows.init.layouts import axes, benches, robots
+from tests.workflows.init.layouts import axes, benches, robots, strangers
 from tests.workflows.init.layouts.layout import Layout, Truth
 
-LAYOUTS: tuple[Layout, ...] = (*robots.LAYOUTS, *axes.LAYOUTS, *benches.LAYOUTS)
+LAYOUTS: tuple[Layout, ...] = (*robots.LAYOUTS, *axes.LAYOUTS, *benches.LAYOUTS, *strangers.LAYOUTS)
 
 __all__ = ["LAYOUTS", "Layout", "Truth"]
