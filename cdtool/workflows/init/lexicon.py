@@ -25,10 +25,9 @@ LONG: Mapping[str, tuple[str, ...]] = {
         "変位 エンコーダ",
     ),
     "speed": _listed(
-        "speed velocity omega",
+        "speed velocit omega",
         "geschw drehzahl",
         "vitesse regime",
-        "velocita",
         "velocidad",
         "速度 转速 轉速 角速",
         "回転数",

@@ -26,7 +26,8 @@ def quantity_of(name):
     ("quantity", "names"),
     [
         ("position", ["Türwinkel", "déplacement", "Posizione", "posición", "实际位置", "現在位置"]),
-        ("position", ["ActPos", "standardhub"]),
+        ("position", ["ActPos", "standardhub", "actual.positions"]),
+        ("speed", ["joint_velocities", "actual.velocities"]),
         ("speed", ["Drehzahl", "vitesse", "Velocità", "velocidad", "电机转速", "回転数", "ActVelo", "dq_3"]),
         ("acceleration", ["Beschl.", "accélération", "accelerazione", "aceleración", "加速度", "qdd1"]),
         ("torque", ["Motorstrom", "couple moteur", "coppia", "par_motor", "力矩", "电流", "トルク", "tau_J"]),
