@@ -22,8 +22,9 @@ def add_doubts(channels: Channels) -> None:
     """Add to each channel what its values do not confirm, as a text to check; nothing for one that is confirmed."""
     for name, found in list(channels.found.items()):
         doubt = _doubt(name, found.stream, channels)
-        if doubt and not found.check:
-            channels.found[name] = dataclasses.replace(found, check=doubt)
+        if doubt:
+            check = f"{found.check}; {doubt}" if found.check else doubt
+            channels.found[name] = dataclasses.replace(found, check=check)
 
 
 def _doubt(name: str, stream: Stream, channels: Channels) -> str:
@@ -53,6 +54,8 @@ def _motion_doubt(name: str, channels: Channels) -> str:
         other = "speed" if name == "position" else "position"
         return f"no {other} confirms it"
     correlation = motion.integral_fit(position, speed).correlation
+    if correlation < -_FITS:
+        return "opposite in sign to the position's derivative: reverse one of them by scale = -1"
     if correlation <= _FITS:
         return f"the position's derivative does not fit the speed, r = {correlation:.2f}"
     ahead = motion.integral_lead(position, speed)

@@ -139,7 +139,7 @@ def _motion_by_name(channels: Channels) -> None:
     if pairs:
         _, _, position, speed, fit = max(pairs, key=lambda pair: pair[:2])
         weaker = min(position, speed, key=lambda item: item[0])
-        if fit.correlation < _DENIES and weaker[0] < _SPEAKS and position[0] != speed[0]:
+        if abs(fit.correlation) < _DENIES and weaker[0] < _SPEAKS and position[0] != speed[0]:
             _take_one(channels, "speed" if weaker is position else "position", named)
             return
         told = f"; its derivative fits the speed, r = {fit.correlation:.3f}" if fit.correlation > _FITS else ""
@@ -166,7 +166,7 @@ def _pair_score(position: Named, speed: Named, correlation: float) -> float:
     """
     measured = is_actual(position[2].name) + is_actual(speed[2].name)
     score = position[0] + speed[0] + measured + _alike(position, speed)
-    if correlation > _FITS:
+    if abs(correlation) > _FITS:  # of opposite sign if one of them is reversed
         score += _PHYSICS - 0.5 * (motion.integral_lead(position[2], speed[2]) > _AHEAD)
     return score
 

@@ -82,7 +82,7 @@ LONGER: Mapping[str, tuple[str, ...]] = {
     "couple": _listed("coupled coupler coupling"),
 }
 REFERENCE_LONG = _listed(
-    "target desired command setpoint reference nominal planned",
+    "target desired command setpoint reference nominal planned ideal theoretic profile interpolat",
     "soll",
     "consigne",
     "riferimento obiettivo impostat",
@@ -154,9 +154,9 @@ OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
     ),
     ("a power", re.compile(r"power|leistung|puissance|potenza|potencia|功率|電力")),
     (
-        "a modelled or external effort",
+        "a modelled or external value",
         re.compile(
-            r"(?:^|_)(?:computed|gravity|hysteresis|crosstalk|ffw?|feedforward|disturbance|friction|residual|inertia"
+            r"(?:^|_)(?:computed|predicted|expected|simulated|sim|gravity|hysteresis|crosstalk|ffw?|feedforward|disturbance|friction|residual|inertia"
             r"|coriolis|storung|perturba)(?:_|$)"
             r"|^(?=.*(?:torque|tau|effort|force|moment|wrench|couple|coppia|(?:^|_)f(?:_|$)))"
             r".*(?:ext(?:_|$|msr)|external|(?:^|_)hat(?:_|$)|(?:^|_)model(?:_|$))"

@@ -106,6 +106,19 @@ def test_a_speed_that_the_position_does_not_follow_is_marked(tmp_path):
     assert draft.checked("position") and "does not fit the speed" in draft.said("speed")
 
 
+def test_a_reversed_speed_is_recognised_and_marked(tmp_path):
+    run = stroke()
+    columns = {
+        "t [s]": run.time,
+        "pos a [m]": run.travel,
+        "vel b [m/s]": np.sin(3.0 * run.time),
+        "vel c [m/s]": -run.speed,
+    }
+    draft = drafted_columns(tmp_path, columns)
+    assert draft.channels["speed"]["column"] == "vel c [m/s]"
+    assert "opposite in sign" in draft.said("speed") and draft.checked("position")
+
+
 def test_units_are_not_derived_from_a_placeholder_clock(tmp_path):
     """Without a clock, position and speed per sample say nothing about counts or units."""
     run = stroke()

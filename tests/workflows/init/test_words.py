@@ -50,7 +50,19 @@ def test_a_motor_current_is_one(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["q_d[3]", "tau_J_d", "Sollhub", "setpos", "指令位置", "目標速度", "consigne", "posición_deseada", "planned_q1"],
+    [
+        "q_d[3]",
+        "tau_J_d",
+        "Sollhub",
+        "setpos",
+        "指令位置",
+        "目標速度",
+        "consigne",
+        "posición_deseada",
+        "planned_q1",
+        "ideal_pos",
+        "profile_velocity",
+    ],
 )
 def test_set_values_are_recognised(name):
     assert is_reference(name)
