@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from cdtool.formats.column_names import split_unit
+from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.quantity_words import is_actual, is_reference, is_something_else, word_for, words
 
 _TOKENS = re.compile(r"[^\W_]+|[\W_]+")
@@ -14,16 +15,6 @@ _NUMBER = re.compile(r"\d+")
 _LONGEST = 5
 _MOST_JOINTS = 64
 _QUANTITIES = ("position", "speed", "torque")
-# Sides and versions of one joint, which are not joints.
-_SIDES = frozenset(
-    re.findall(
-        r"\w+",
-        "motor load link joint drive gear shaft raw filtered filt smooth smoothed mean min max in out input output "
-        "real sim simulated model",
-    )
-)
-_AXES = frozenset(("x", "y", "z", "a", "b", "c", "u", "v", "w", "rx", "ry", "rz", "roll", "pitch", "yaw"))
-
 Families = dict[str, tuple[tuple[str, ...], tuple[str, ...]]]
 
 
@@ -107,7 +98,7 @@ def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
     quantities = {
         quantity for before, after in keys for quantity in _QUANTITIES if _indicates(quantity, f"{before} {after}")
     }
-    if {slot.lower() for slot in slots} <= _AXES and "torque" not in quantities:
+    if {slot.lower() for slot in slots} <= set(lexicon.AXES) and "torque" not in quantities:
         return False
     return len(quantities) >= 2
 
@@ -121,7 +112,7 @@ def _indicates(quantity: str, name: str) -> bool:
 def _is_taken(slot: str) -> bool:
     """Whether a part of a name is a quantity, a set value, or a side of the gear rather than a joint."""
     parts = words(slot)
-    if parts and all(part in _SIDES for part in parts):
+    if parts and all(part in lexicon.SIDES for part in parts):
         return True
     if is_reference(slot) or is_actual(slot) or is_something_else(slot):
         return True

@@ -129,6 +129,12 @@ PRESENT = _listed("feed feedrate program line block state mode step tool time cy
 PRESENT_EFFORTS = _listed("torque effort force q angle")
 # Names of joints without a quantity: `J1`, `Achse 3`.
 JOINTS = _listed("j jnt joint joints axis achse a axe asse eje 轴 軸")
+# Sides and versions of one joint, which are not joints, and the axes of space.
+SIDES = _listed(
+    "motor load link joint drive gear shaft raw filtered filt smooth smoothed mean min max in out input output",
+    "real sim simulated model",
+)
+AXES = _listed("x y z a b c u v w rx ry rz roll pitch yaw")
 # What is in logs of machines without being a channel of a joint, and patterns of it in words joined by `_`.
 OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
     (
