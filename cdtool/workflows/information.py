@@ -28,6 +28,7 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.log_checks.log_findings import log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
+from cdtool.workflows.log_checks.placeholders import placeholder_findings
 
 if TYPE_CHECKING:
     from cdtool.ingest.log_statistics import LogStatistics
@@ -155,6 +156,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     contacts = any_contacts(recording, rules)
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
+    findings += placeholder_findings(recording, machine_file)
     found = worst_first(findings)
     return Info(str(log), logged.format, logged.details, tuple(channels), found, logged.dialect)
 

@@ -23,6 +23,7 @@ from cdtool.findings import (
     messages,
     motion,
     parts,
+    placeholders,
     runs,
     scoring,
     tables,
@@ -746,6 +747,31 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         scoring.RecordingsWithoutRow("plc", 2, 9, False, "stiff/01.csv"),
         "plc: 2 of 9 recordings without a row: counted as monitored without an alarm; first stiff/01.csv",
+    ),
+    (
+        placeholders.PlaceholderRatio(157.08),
+        "transmission_ratio = 1 m/rad is a placeholder of cdtool init: with it the load moves at 157 m/s; give the "
+        "travel per motor angle",
+    ),
+    (
+        placeholders.PlaceholderRatio(float("nan")),
+        "transmission_ratio = 1 m/rad is a placeholder of cdtool init; give the travel per motor angle",
+    ),
+    (
+        placeholders.PlaceholderScale("A", "N m"),
+        "scale = 1 for 'A' is a placeholder of cdtool init; give the N m per A",
+    ),
+    (
+        placeholders.PlaceholderInertia("load_mass"),
+        "load_mass is 0, a placeholder of cdtool init: detectors with a model refuse it",
+    ),
+    (
+        placeholders.UncheckedLines(2, ("type", "time")),
+        "2 keys of the machine file with the mark CHECK (type, time): delete a mark after checking",
+    ),
+    (
+        placeholders.UncheckedLines(1, ()),
+        "1 key of the machine file with the mark CHECK: delete a mark after checking",
     ),
 ]
 

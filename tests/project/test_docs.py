@@ -57,7 +57,8 @@ COMMANDS = {
     "docs/own-detector.md": 1,
     "docs/comparing.md": 7,
     "docs/study.md": 2,
-    "docs/containers.md": 4,
+    "docs/containers.md": 2,
+    "docs/init.md": 2,
 }
 EXAMPLES = {
     "docs/python.md": 13,

@@ -1,32 +1,54 @@
-"""Guess which stream of a log is which channel: by name, then by values; each guess states its reason."""
+"""Guess which stream of a log is which channel: by physics and names; each guess states its reason and its doubts."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from cdtool.recording import MEASURED
 from cdtool.workflows.init import motion_evidence as motion
-from cdtool.workflows.init.quantity_words import is_actual, is_load_cell, is_reference, is_something_else, word_for
-from cdtool.workflows.init.streams import Channels, Found, Stream, joined
-from cdtool.workflows.init.units_in_names import label, may_be
+from cdtool.workflows.init.certainty import add_doubts
+from cdtool.workflows.init.column_blocks import find_blocks
+from cdtool.workflows.init.quantity_words import (
+    is_actual,
+    is_current,
+    is_load_cell,
+    is_only_a_joint,
+    is_reference,
+    is_something_else,
+    word_for,
+    words,
+)
+from cdtool.workflows.init.streams import Channels, Found, Stream
+from cdtool.workflows.init.units_in_names import label, may_be, quantity_of_unit
 
-# Above this correlation one column is treated as another's derivative.
-_FITS = 0.9
-# Minimum share of a drive column's variance that inertia and friction explain.
-_DRIVES = 0.6
+# Above this correlation one column is treated as another's derivative; above the second one without any name.
+_FITS, _FITS_UNNAMED = 0.9, 0.98
+# Minimum share of a drive column's variance that inertia and friction explain; and of one whose name is a letter.
+_DRIVES, _DRIVES_BY_LETTER = 0.6, 0.3
 _MOST_UNNAMED = 48
+_MOST_PAIRS = 32
 # Above these correlations one stream is treated as another's set value; the second if its name agrees.
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
+# A set value is ahead of its measured value by at least this share of a sample.
+_AHEAD = 0.2
+# A set value that resembles another channel by this much more is not that of this one.
+_CLOSER = 0.2
 _BY_COURSE = "guessed from its values only"
-# A one-letter name is weaker evidence for a quantity than this.
-_SPEAKS = 2.0
+# Below this correlation a letter alone (`a`, `s`, `n`) is no name of what the physics denies.
+_DENIES = 0.5
+# A one-letter name is weaker evidence for a quantity than the first; a unit alone is the second, `J1` alone the third.
+_SPEAKS, _BY_UNIT, _BY_JOINT = 2.0, 0.8, 0.5
+# Physics that agrees counts more than any name.
+_PHYSICS = 4.0
+_TOLD_UNIT = "its unit"
+
+Named = tuple[float, str, Stream]
 
 
 def guess_channels(streams: list[Stream], topics: bool) -> Channels:
-    """Guess the channels of a log by names and values; offline, not used for detection."""
+    """Guess the channels of a log by values and names; offline, not used for detection."""
     joints = _joint_count(streams)
     if joints == 1 and topics:
         streams = [part for stream in streams for part in _elements(stream)]
@@ -35,22 +57,47 @@ def guess_channels(streams: list[Stream], topics: bool) -> Channels:
         _by_place(channels)
     else:
         _motion_by_name(channels)
+        if not channels.found:
+            _motion_by_values(channels)
     _drive(channels)
     _acceleration(channels)
     _references(channels)
     _ground_truth(channels)
+    add_doubts(channels)
     return channels
 
 
+def name_strength(quantity: str, stream: Stream) -> tuple[float, str]:
+    """Return how strongly name and unit of a stream indicate a quantity, with the word; 0 if they indicate another.
+
+    A unit counts only if no word does: `Beschl. [m/s²]`; a name that is only that of a joint may be a position.
+    """
+    if is_something_else(stream.name) or _is_sensor_of_force(stream) or not may_be(quantity, stream):
+        return 0.0, ""
+    name = label(stream)
+    strength, word = word_for(quantity, name)
+    others = [word_for(other, name)[0] for other in (*MEASURED, "force") if other != quantity and may_be(other, stream)]
+    if strength:
+        force = quantity == "torque" and word == "drive force"
+        return (strength, word) if force or strength >= max(others, default=0.0) else (0.0, "")
+    if any(others):
+        return 0.0, ""
+    if quantity_of_unit(stream) == quantity:
+        return _BY_UNIT, _TOLD_UNIT
+    if quantity == "position" and stream.width > 2 and is_only_a_joint(name):
+        return _BY_JOINT, "joints"
+    return 0.0, ""
+
+
 def _joint_count(streams: Iterable[Stream]) -> int:
-    votes = Counter(
-        stream.width
-        for stream in streams
-        if stream.moves and not is_something_else(stream.name)
-        for quantity in ("position", "speed", "torque")
-        if word_for(quantity, label(stream))[0]
-    )
-    several = [(count, width) for width, count in votes.items() if width > 1]
+    """Return the width of the families with the most quantities; of several such widths the largest."""
+    quantities: dict[int, set[str]] = {}
+    for stream in streams:
+        for quantity in ("position", "speed", "torque"):
+            strength, word = name_strength(quantity, stream) if stream.moves and stream.width > 1 else (0.0, "")
+            if strength and (word != _TOLD_UNIT or stream.width > 2):
+                quantities.setdefault(stream.width, set()).add(quantity)
+    several = [(len(found), width) for width, found in quantities.items()]
     return max(several)[1] if several else 1
 
 
@@ -63,54 +110,116 @@ def _unnamed(streams: list[Stream]) -> bool:
 
 
 def _by_place(channels: Channels) -> None:
-    """Guess from columns without names: blocks of J positions, J speeds and, if they move like a drive, J torques."""
-    streams = channels.free
-    block = motion.blocks(streams[:_MOST_UNNAMED])
-    if block is None:
+    """Guess from columns without names: blocks of J columns that are related as positions, speeds and efforts."""
+    found = find_blocks(channels.free[:_MOST_UNNAMED])
+    if found is None:
         return
-    first, joints, correlation = block
-    channels.joints = joints
-    parts = [streams[first + i * joints : first + (i + 1) * joints] for i in range(3)]
-    fit = f"r = {correlation:.3f}"
-    many = "column" if joints == 1 else f"{joints} columns"
-    text = f"its derivative fits the {many} after it, {fit}"
-    channels.take("position", joined(parts[0], _places(parts[0])), text)
-    text = f"its integral fits the {many} before it, {fit}"
-    channels.take("speed", joined(parts[1], _places(parts[1])), text)
-    if len(parts[2]) == joints:
-        drive = joined(parts[2], _places(parts[2]))
-        share = motion.drive_fit(drive, channels.found["speed"].stream)
-        text = f"its position after the speeds; inertia and friction explain {100 * max(share, 0.0):.0f} % of it"
-        if motion.rests_and_peaks(drive):
-            channels.take("force", drive, "constant level with short, high peaks", _BY_COURSE)
-        else:
-            channels.take("torque", drive, text, _BY_COURSE)
+    channels.joints = found.joints
+    fit = f"r = {found.correlation:.3f}"
+    reasons = {
+        "position": f"its derivative fits the {found.streams['speed'].name}, {fit}",
+        "speed": f"its integral fits the {found.streams['position'].name}, {fit}",
+        "torque": f"inertia, friction and weight explain {100 * found.explained:.0f} % of it",
+    }
+    for channel, stream in found.streams.items():
+        why = reasons.get(channel, f"the same course as the {channel.removeprefix('reference_')}, and not behind it")
+        channels.take(channel, stream, why, _BY_COURSE)
+    if found.joints > 1:
         channels.free = []  # other columns without names are not guessed
-
-
-def _places(streams: list[Stream]) -> str:
-    return f"columns {streams[0].name} to {streams[-1].name}"
 
 
 def _motion_by_name(channels: Channels) -> None:
     named = {q: _named_for(channels, q) for q in ("position", "speed")}
     pairs = [
-        (p[0] + s[0] + ((fit := motion.integral_fit(p[2], s[2])).correlation > _FITS) * 3.0, -i - k, p, s, fit)
-        for i, p in enumerate(named["position"])
-        for k, s in enumerate(named["speed"])
+        (_pair_score(p, s, fit.correlation), -i - k, p, s, fit)
+        for i, p in enumerate(named["position"][:_MOST_PAIRS])
+        for k, s in enumerate(named["speed"][:_MOST_PAIRS])
+        if p[2] is not s[2] and (fit := motion.integral_fit(p[2], s[2]))
     ]
     if pairs:
         _, _, position, speed, fit = max(pairs, key=lambda pair: pair[:2])
-        told = f"; its derivative fits the speed, r = {fit.correlation:.3f}" if fit.correlation > _FITS else ""
-        channels.take("position", position[2], f"name ({position[1]}){told}")
-        channels.take("speed", speed[2], f"name ({speed[1]})")
-        return
-    for quantity, other in (("position", "speed"), ("speed", "position")):
-        if named[quantity]:
-            _, word, stream = named[quantity][0]
-            channels.take(quantity, stream, f"name ({word})")
-            _partner(channels, stream, other)
+        weaker = min(position, speed, key=lambda item: item[0])
+        if abs(fit.correlation) < _DENIES and weaker[0] < _SPEAKS and position[0] != speed[0]:
+            _take_one(channels, "speed" if weaker is position else "position", named)
             return
+        told = f"; its derivative fits the speed, r = {fit.correlation:.3f}" if fit.correlation > _FITS else ""
+        _take_named(channels, "position", position, _without(speed[2], named["position"]), told)
+        _take_named(channels, "speed", speed, _without(position[2], named["speed"]))
+        return
+    for quantity in ("position", "speed"):
+        if named[quantity]:
+            _take_one(channels, quantity, named)
+            return
+
+
+def _take_one(channels: Channels, quantity: str, named: dict[str, list[Named]]) -> None:
+    """Take a position or a speed by its name alone, and look for the other one by values."""
+    chosen = max(named[quantity], key=lambda item: item[0] + is_actual(item[2].name))
+    _take_named(channels, quantity, chosen, named[quantity])
+    _partner(channels, chosen[2], "speed" if quantity == "position" else "position")
+
+
+def _pair_score(position: Named, speed: Named, correlation: float) -> float:
+    """Return how well two streams are one joint's position and speed: by physics, then by their names.
+
+    A speed that is ahead of the position's derivative may be a set value.
+    """
+    measured = is_actual(position[2].name) + is_actual(speed[2].name)
+    score = position[0] + speed[0] + measured + _alike(position, speed)
+    if abs(correlation) > _FITS:  # of opposite sign if one of them is reversed
+        score += _PHYSICS - 0.5 * (motion.integral_lead(position[2], speed[2]) > _AHEAD)
+    return score
+
+
+def _alike(one: Named, other: Named) -> float:
+    """Return the share of words that two names have in common, apart from the words for their quantities."""
+    first, second = (
+        {word for word in words(item[2].name) if word not in item[1] and item[1] not in word} for item in (one, other)
+    )
+    return len(first & second) / len(first | second) if first | second else 1.0
+
+
+def _take_named(channels: Channels, quantity: str, chosen: Named, named: list[Named], told: str = "") -> None:
+    """Take a stream by its name; others that have such a name as well are mentioned."""
+    strength, word, stream = chosen
+    others = [item for item in named if item[2] is not stream and not _overlap(item[2], stream)]
+    equal = [item[2] for item in others if item[0] >= strength]
+    check = f"or '{equal[0].name}'" if equal else ""
+    if len(equal) > 1:
+        check += f", '{equal[1].name}'" + (" ..." if len(equal) > 2 else "")
+    why = _TOLD_UNIT if word == _TOLD_UNIT else f"name ({word})"
+    if strength <= _BY_UNIT and not check:
+        check = "its name does not say so"
+    channels.take(quantity, stream, why + told, f"{check}?" if check.startswith("or") else check)
+
+
+def _without(stream: Stream, named: list[Named]) -> list[Named]:
+    return [item for item in named if item[2] is not stream]
+
+
+def _overlap(one: Stream, other: Stream) -> bool:
+    return bool(set(one.columns) & set(other.columns))
+
+
+def _motion_by_values(channels: Channels) -> None:
+    """Guess position and speed in columns whose names say nothing: one is the integral of the other."""
+    streams = [s for s in channels.of_joints() if not any(_is_taken(q, s) for q in ("position", "speed"))]
+    streams = [s for s in streams if not motion.is_regular(s)][:_MOST_PAIRS]
+    pairs = [
+        (fit, p, s)
+        for p in streams
+        for s in streams
+        if p is not s and may_be("position", p) and may_be("speed", s)
+        and (fit := motion.integral_fit(p, s).correlation) > _FITS_UNNAMED
+    ]  # fmt: skip
+    # Of a position, a speed and an acceleration, the speed is the one that has an integral.
+    tops = [pair for pair in pairs if not any(other[2] is pair[1] for other in pairs)]
+    if not tops:
+        return
+    correlation, position, speed = max(tops, key=lambda pair: pair[0])
+    told = f"r = {correlation:.3f}"
+    channels.take("position", position, f"its derivative fits '{speed.name}', {told}", _BY_COURSE)
+    channels.take("speed", speed, f"its integral fits '{position.name}', {told}", _BY_COURSE)
 
 
 def _partner(channels: Channels, stream: Stream, other: str) -> None:
@@ -128,15 +237,49 @@ def _drive(channels: Channels) -> None:
     if "torque" in channels.found:
         return
     named = _named_for(channels, "torque")
-    speed = channels.found.get("speed")
+    rate, position = _rate_and_position(channels)
+    if rate is None:
+        if named:
+            _take_named(channels, "torque", named[0], named)
+        return
+    moving = rate
+
+    def explained(stream: Stream) -> float:
+        return motion.drive_fit(stream, moving, position)
+
+    shares = {id(item[2]): explained(item[2]) for item in named[:_MOST_PAIRS]}
+    named = [item for item in named[:_MOST_PAIRS] if item[0] >= _SPEAKS or shares[id(item[2])] > _DRIVES_BY_LETTER]
     if named:
-        channels.take("torque", named[0][2], f"name ({named[0][1]})")
-    elif moving := speed or channels.found.get("position"):
-        rate = moving.stream if speed else _derived(moving.stream)
-        found = _best(_unnamed_for(channels, "torque"), lambda stream: motion.drive_fit(stream, rate))
-        if found is not None and found[0] > _DRIVES:
-            text = f"moves like the force of a drive: inertia and friction explain {100 * found[0]:.0f} % of it"
-            channels.take("torque", found[1], text, _BY_COURSE)
+        best = max(named, key=lambda item: _drive_score(channels, item, shares[id(item[2])]))
+        share = shares[id(best[2])]
+        told = f"; inertia, friction and weight explain {100 * share:.0f} % of it" if share > _DRIVES else ""
+        _take_named(channels, "torque", best, named, told)
+        return
+    others = [
+        stream
+        for stream in _unnamed_for(channels, "torque")
+        if not is_reference(stream.name)
+        and not _says_more("torque", stream)
+        and abs(motion.likeness(moving, stream)) < _FOLLOWS
+    ]
+    unnamed = _best(others, lambda stream: motion.drive_fit(stream, moving))
+    if unnamed is not None and unnamed[0] > _DRIVES:
+        text = f"moves like the force of a drive: inertia and friction explain {100 * unnamed[0]:.0f} % of it"
+        channels.take("torque", unnamed[1], text, _BY_COURSE)
+
+
+def _drive_score(channels: Channels, item: Named, share: float) -> float:
+    """Rank efforts: those that inertia and friction explain, then by name; a torque before a current."""
+    alike = [_alike(item, (0.0, "", found.stream)) for found in channels.found.values()]
+    score = item[0] + _PHYSICS * (share > _DRIVES_BY_LETTER) + max(alike, default=0.0) + is_actual(item[2].name)
+    return score - 0.6 * is_current(label(item[2]))
+
+
+def _rate_and_position(channels: Channels) -> tuple[Stream | None, Stream | None]:
+    position = channels.found["position"].stream if "position" in channels.found else None
+    if "speed" in channels.found:
+        return channels.found["speed"].stream, position
+    return (_derived(position), position) if position is not None else (None, None)
 
 
 def _acceleration(channels: Channels) -> None:
@@ -146,12 +289,16 @@ def _acceleration(channels: Channels) -> None:
     speed = channels.found.get("speed")
     top = [item for item in named if item[0] == named[0][0]]
     if speed is None:
-        channels.take("acceleration", top[0][2], f"name ({top[0][1]})")
+        _take_named(channels, "acceleration", top[0], named)
         return
-    chosen = max(top, key=lambda item: abs(motion.derivative_fit(item[2], speed.stream).correlation))
-    correlation = motion.derivative_fit(chosen[2], speed.stream).correlation
-    fits = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
-    channels.take("acceleration", chosen[2], f"name ({chosen[1]}){fits}")
+    fits = {id(item[2]): motion.derivative_fit(item[2], speed.stream).correlation for item in top}
+    chosen = max(top, key=lambda item: abs(fits[id(item[2])]))
+    correlation = fits[id(chosen[2])]
+    if chosen[0] < _SPEAKS and abs(correlation) < _DENIES:
+        return
+    told = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
+    rivals = [item for item in top if abs(fits[id(item[2])]) > _FITS] if told else top
+    _take_named(channels, "acceleration", chosen, rivals, told)
 
 
 def _derived(position: Stream) -> Stream:
@@ -167,9 +314,14 @@ def _references(channels: Channels) -> None:
         measured = channels.found.get(quantity)
         if named:
             if measured is not None:
+                kind = is_current(label(measured.stream))
                 alike = {id(item[2]): motion.likeness(measured.stream, item[2]) for item in named}
-                named.sort(key=lambda item: -(item[0] + 3.0 * alike[id(item[2])]))
-            channels.take(name, named[0][2], f"name ({named[0][1]}, of a set value)")
+                same = {id(item[2]): is_current(label(item[2])) == kind for item in named}
+                named.sort(key=lambda item: -(item[0] + 3.0 * alike[id(item[2])] + same[id(item[2])]))
+            strength, word, stream = named[0]
+            why = f"name ({word}, of a set value)"
+            rivals = [item[2] for item in named[1:] if item[0] >= strength and not _overlap(item[2], stream)]
+            channels.take(name, stream, why, f"or '{rivals[0].name}'?" if rivals else "")
         elif measured is not None and measured.stream.moves:
             _follower(channels, name, quantity, measured)
 
@@ -177,25 +329,44 @@ def _references(channels: Channels) -> None:
 def _ground_truth(channels: Channels) -> None:
     """Guess the load cell, labels and triggers; the name of a load cell counts more than that of any other force."""
     singles = [stream for stream in channels.free if stream.width == 1 and stream.moves and may_be("force", stream)]
-    named = [(*word_for("force", _full(stream)), stream) for stream in singles if not is_something_else(stream.name)]
+    named = [(*force_strength(stream), stream) for stream in singles]
     named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
     if named:
         chosen = max(
             named,
             key=lambda item: (item[0] + is_load_cell(_full(item[2])), float(np.ptp(np.nan_to_num(item[2].values)))),
         )
-        channels.take("force", chosen[2], f"name ({chosen[1]})")
+        channels.take("force", chosen[2], _TOLD_UNIT if chosen[1] == _TOLD_UNIT else f"name ({chosen[1]})")
     elif "force" not in channels.found:
         for stream in singles:
-            if not _is_other("force", stream) and motion.rests_and_peaks(stream):
-                channels.take("force", stream, "constant level with short, high peaks", _BY_COURSE)
-                break
-    for quantity in ("label", "trigger"):
+            if _is_other("force", stream) or channels.is_of_family(stream) or not motion.rests_and_peaks(stream):
+                continue
+            channels.take("force", stream, "constant level with short, high peaks", _BY_COURSE)
+            break
+    questions = {
+        "label": "is it that of the test, not the alarm of the controller?",
+        "trigger": "is it high during each operation?",
+    }
+    for quantity, what in questions.items():
         for stream in channels.free:
-            seen = stream.values[np.isfinite(stream.values)]
-            if stream.width == 1 and word_for(quantity, stream.name)[0] and np.isin(seen, (0.0, 1.0)).all():
-                channels.take(quantity, stream, f"name ({word_for(quantity, stream.name)[1]}), 0 and 1 only")
+            seen = np.unique(stream.values[np.isfinite(stream.values)])
+            if stream.width == 1 and word_for(quantity, stream.name)[0] and np.array_equal(seen, (0.0, 1.0)):
+                channels.take(quantity, stream, f"name ({word_for(quantity, stream.name)[1]}), 0 and 1 only", what)
                 break
+
+
+def force_strength(stream: Stream) -> tuple[float, str]:
+    """Return how strongly a stream's name, topic or unit indicates a measured force, and the word."""
+    if is_something_else(stream.name):
+        return 0.0, ""
+    strength, word = word_for("force", _full(stream))
+    if word == "wrench" and word_for("torque", label(stream))[0]:
+        return 0.0, ""  # the torque of a wrench
+    if strength:
+        return strength, word
+    # An effort in N that is not the drive's is a force: `Effort fermeture (N)`.
+    taken = any(word_for(quantity, label(stream))[0] >= _SPEAKS for quantity in MEASURED if quantity != "torque")
+    return (_BY_UNIT, _TOLD_UNIT) if quantity_of_unit(stream) == "force" and not taken else (0.0, "")
 
 
 def _full(stream: Stream) -> str:
@@ -206,43 +377,68 @@ def _full(stream: Stream) -> str:
 def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> None:
     """Guess the stream that the measured one follows; a name for a measured value (`Drehzahl Ist`) excludes it.
 
-    If two streams bear the quantity's name, the smoother one is the set value; one without the name does not replace
-    it.
+    A set value is ahead in time. Of two streams with the same word for the quantity that do not differ in time, the
+    smoother one is the set value. A second measured value, of the other side of a gear, is neither.
     """
     stream = measured.stream
-    candidates = [other for other in _unnamed_for(channels, quantity) if not is_actual(other.name)]
+    candidates = [
+        other
+        for other in _unnamed_for(channels, quantity)
+        if not is_actual(other.name) and not _says_more(quantity, other)
+    ]
+    if quantity == "torque":
+        candidates = [other for other in candidates if is_reference(other.name)]
     found = _best(candidates, lambda other: motion.likeness(stream, other))
     if found is None:
         return
     correlation, other = found
     if correlation < (_FOLLOWS_BY_NAME if is_reference(other.name) else _FOLLOWS):
         return
-    if motion.roughness(other) < motion.roughness(stream):
+    rest = [channels.found[q].stream for q in ("position", "speed", "torque") if q in channels.found and q != quantity]
+    if any(motion.likeness(rival, other) > correlation + _CLOSER for rival in rest):
+        return
+    own, others = word_for(quantity, label(stream)), word_for(quantity, label(other))
+    ahead = motion.lead(stream, other)
+    if abs(ahead) < _AHEAD:
+        smoother = motion.roughness(other) < motion.roughness(stream)
+        alike = own[1] == others[1] or not others[1] or is_reference(other.name)
+        text = "is smoother" if smoother else ""
+        ahead = 1.0 if smoother and alike else -1.0 if not smoother and own[1] == others[1] and own[1] else 0.0
+    else:
+        text = f"is ahead of it by {abs(ahead):.1f} samples"
+    if ahead > 0.0:
         check = "" if is_reference(other.name) else _BY_COURSE
-        channels.take(name, other, f"follows '{stream.name}' with r = {correlation:.3f} and is smoother", check)
+        channels.take(name, other, f"follows '{stream.name}' with r = {correlation:.3f} and {text}", check)
     elif (
-        correlation > _FOLLOWS
+        ahead < 0.0
+        and correlation > _FOLLOWS
         and quantity != "torque"
         and not is_reference(stream.name)
         and not is_actual(stream.name)
-        and word_for(quantity, label(other))[0] >= word_for(quantity, label(stream))[0] > 0.0
+        and others[0] >= own[0] > 0.0
     ):
-        text = f"rougher than '{stream.name}', which it follows with r = {correlation:.3f}"
-        channels.take(quantity, other, text, _BY_COURSE)
-        channels.found[name] = Found(stream, f"{measured.why}; smoother than '{other.name}'", _BY_COURSE)
+        reason = "rougher than" if not text.startswith("is ahead") else "behind"
+        why = f"{reason} '{stream.name}', which it follows with r = {correlation:.3f}"
+        channels.take(quantity, other, why, _BY_COURSE)
+        opposite = "smoother than" if reason == "rougher than" else "ahead of"
+        channels.found[name] = Found(stream, f"{measured.why}; {opposite} '{other.name}'", _BY_COURSE)
 
 
-def _named_for(channels: Channels, quantity: str, reference: bool = False) -> list[tuple[float, str, Stream]]:
+def _says_more(quantity: str, stream: Stream) -> bool:
+    """Whether the name of a stream indicates another quantity more strongly than this one, if only by a letter."""
+    name = label(stream)
+    own = word_for(quantity, name)[0]
+    return any(word_for(other, name)[0] > own for other in (*MEASURED, "force") if other != quantity)
+
+
+def _named_for(channels: Channels, quantity: str, reference: bool = False) -> list[Named]:
     """Return (strength, word, stream) of the free streams whose name best matches a quantity, the strongest first."""
     found = []
     for stream in channels.of_joints():
-        name = label(stream)
-        if is_reference(stream.name) != reference or is_something_else(stream.name) or _is_sensor_of_force(stream):
+        if is_reference(stream.name) != reference:
             continue
-        if not may_be(quantity, stream):
-            continue
-        strength, word = word_for(quantity, name)
-        if strength and strength >= max(word_for(other, name)[0] for other in MEASURED if may_be(other, stream)):
+        strength, word = name_strength(quantity, stream)
+        if strength:
             found.append((strength, word, stream))
     return sorted(found, key=lambda item: -item[0])
 
@@ -269,6 +465,11 @@ def _is_other(quantity: str, stream: Stream) -> bool:
         return True
     own = word_for(quantity, name)[0]
     return any(word_for(other, name)[0] >= max(_SPEAKS, own) for other in MEASURED if other != quantity)
+
+
+def _is_taken(quantity: str, stream: Stream) -> bool:
+    """Whether the name of a stream indicates a quantity other than this one, a force, or no channel."""
+    return _is_other(quantity, stream) or is_reference(stream.name)
 
 
 def _is_sensor_of_force(stream: Stream) -> bool:

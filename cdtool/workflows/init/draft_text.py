@@ -10,12 +10,14 @@ from textwrap import wrap
 import numpy as np
 
 from cdtool.recording import UNITLESS
+from cdtool.workflows.init.derived_speed import LowPass
 from cdtool.workflows.init.machine_side import Side
 from cdtool.workflows.init.streams import Channels, Stream
 from cdtool.workflows.init.units import Evidence, Logged
+from cdtool.workflows.init.unmapped import Unmapped
 
 _WIDEST = 100
-_MOST_LISTED = 60
+_MOST_LISTED = 200
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class Draft:
     channels: Channels
     topics: bool
     evidence: Evidence
+    unmapped: tuple[Unmapped, ...] = ()
+    low_pass: LowPass | None = None
 
     @property
     def units(self) -> dict[str, Logged]:
@@ -66,14 +70,21 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
         "[channels.mcap]" if draft.topics else "[channels]",
         *([] if draft.topics else _time(draft.clock)),
     ]
+    if draft.low_pass is not None:
+        why = _marked(f"guessed: {draft.low_pass.why}", "a lower one delays the speed")
+        lines += _commented(f"speed_low_pass_hz = {draft.low_pass.corner!r}", why)
     units = draft.units
     for name in draft.channels.found:
         made = _mapped(draft, name, units.get(name), -1.0 if turned and name == "acceleration" else 1.0)
         lines += [f"# {text}" if text and name in left_out else text for text in made]
     if not draft.channels.found:
-        lines += _columns(draft)
+        lines += _wrapped(
+            "CHECK: no name or value indicates a torque, speed or position. Write the channels here, with the unit "
+            'of the log, e.g. torque = { column = "CH1", unit = "V", scale = 2.0 } with N m or N per V.'
+        )
     elif absent := [name for name in ("torque", "speed", "position") if name not in draft.channels.found]:
         lines.append(f"# CHECK: found no {', no '.join(absent)}: cdtool info lists the content of the log")
+    lines += _unmapped(draft)
     return "\n".join(lines) + "\n"
 
 
@@ -92,22 +103,27 @@ def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list
     return _commented(line, _marked(why, "; ".join(check for check in checks if check)))
 
 
-def _columns(draft: Draft) -> list[str]:
-    """Return the columns or fields of a log without a recognised channel, as comments."""
-    streams = [stream for stream in draft.channels.free if stream.width == 1 or stream.topic]
-    made = _wrapped(
-        "CHECK: no name or value indicates a torque, speed or position. Write the channels here, with the unit "
-        'of the log, e.g. torque = { column = "CH1", unit = "V", scale = 2.0 } with N m or N per V. '
-        "The log contains, with the smallest and the largest value:"
-    )
-    for stream in streams[:_MOST_LISTED]:
-        if not np.isfinite(stream.values).any():
-            continue
-        low, high = float(np.nanmin(stream.values)), float(np.nanmax(stream.values))
-        made.append(f"#   {_plain(_place(draft, stream))}: {low:.4g} to {high:.4g}")
-    if len(streams) > _MOST_LISTED:
-        made.append(f"#   and {len(streams) - _MOST_LISTED} more, see cdtool info")
+def _unmapped(draft: Draft) -> list[str]:
+    """Return the columns or fields that no channel uses as comments, with their ranges and the next best guess."""
+    if not draft.unmapped:
+        return []
+    made = ["", "# Not mapped, with the smallest and the largest value, and the next best guess:"]
+    for item in draft.unmapped[:_MOST_LISTED]:
+        values = "" if np.isnan(item.low) else f"{item.low:.4g} to {item.high:.4g}; "
+        guess = f"perhaps {item.guess}: {item.why}" if item.guess else item.why
+        text = _plain(f"{_places(draft, item)}: {values}{guess}")
+        made += wrap(text, _WIDEST, initial_indent="#   ", subsequent_indent="#     ", break_on_hyphens=False)
+    if len(draft.unmapped) > _MOST_LISTED:
+        rest = sum(max(1, len(item.columns)) for item in draft.unmapped[_MOST_LISTED:])
+        made.append(f"#   and {rest} more columns: cdtool info lists them")
     return made
+
+
+def _places(draft: Draft, item: Unmapped) -> str:
+    if draft.topics:
+        return f"topic = {_text(item.topic)}, field = {_text(item.field)}"
+    first = f"column = {_column(item.columns[0])}"
+    return first if len(item.columns) == 1 else f"{first} to {_column(item.columns[-1])} ({len(item.columns)} columns)"
 
 
 def _place(draft: Draft, stream: Stream) -> str:

@@ -15,6 +15,7 @@ from cdtool.ingest.reading import choose_format, element_names, has_topics, log_
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.information import info
 from cdtool.workflows.init.channel_guess import guess_channels
+from cdtool.workflows.init.derived_speed import propose_low_pass
 from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
 from cdtool.workflows.init.machine_side import side_of
 from cdtool.workflows.init.speed_ratio import Ratio, ratio_of
@@ -22,17 +23,19 @@ from cdtool.workflows.init.streams import Channels, streams_of
 from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
+from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
 
 
 @dataclass(frozen=True)
 class Drafted:
-    """The draft's text, the channels it maps, those written as comments, and warnings."""
+    """The draft's text, the channels it maps, those written as comments, warnings, and the columns not mapped."""
 
     path: str
     text: str
     channels: tuple[str, ...]
     left_out: tuple[str, ...]
     findings: tuple[Finding, ...]
+    unmapped: tuple[Unmapped, ...] = ()
 
 
 def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = False) -> Drafted:
@@ -51,7 +54,8 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
     -------
     Drafted
         The text, in which CHECK marks what is uncertain; the channels mapped; those in it only as comments, because the
-        log contradicts the guess; and the findings of `cdtool info` with the draft.
+        log contradicts the guess; the findings of `cdtool info` with the draft; and the columns that it does not map,
+        each with the next best guess.
 
     Raises
     ------
@@ -80,7 +84,7 @@ def _settled(log: Path, draft: Draft) -> Drafted:
     left_out: list[str] = []
     turned = False
     if not draft.channels.found:
-        return Drafted("", draft_text(draft), (), (), ())
+        return Drafted("", draft_text(draft), (), (), (), draft.unmapped)
     with TemporaryDirectory() as folder:
         trial = Path(folder) / "draft.toml"
         while True:
@@ -90,12 +94,14 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             try:
                 findings = info(log, machine=read_machine_file(trial)).findings
             except CdtoolError as fault:
-                if fault.channel not in mapped or len(mapped) == 1:  # the draft cannot do without it
+                if fault.channel not in mapped:
                     raise
                 left_out.append(fault.channel)
+                if len(mapped) == 1:
+                    return Drafted("", draft_text(draft, left_out, turned), (), tuple(left_out), (), draft.unmapped)
                 continue
             if turned or not any(isinstance(found.fact, AccelerometerTurned) for found in findings):
-                return Drafted("", text, mapped, tuple(left_out), findings)
+                return Drafted("", text, mapped, tuple(left_out), findings, draft.unmapped)
             turned = True
 
 
@@ -114,7 +120,8 @@ def _drafted(log: Path) -> Draft:
     types = {name: topic.schema for name, topic in source.topics.items()}
     motion = [channels.found[name].stream.topic for name in ("position", "speed") if name in channels.found]
     messages_si = bool(motion) and all(is_si(types.get(topic, "")) for topic in motion)
-    ratio = ratio_of(channels, clock, messages_si)
+    # Without a clock the times are sample numbers, which say nothing about units.
+    ratio = ratio_of(channels, clock, messages_si) if topics or own or clock is not None else None
     unit = ratio.fitting[0].clock if ratio is not None and ratio.fitting else clock.unit if clock is not None else ""
     side = side_of(channels, ratio, clock, messages_si)
     joints, why = _joints(path, channels, topics)
@@ -122,7 +129,19 @@ def _drafted(log: Path) -> Draft:
     assumed = next((item.fact.sentence() for item in source.findings if isinstance(item.fact, ClockUnitAssumed)), "")
     time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
-    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence)
+    left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
+    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass)
+
+
+def _in_seconds(time: Clock, clock: TableClock | None, own: bool) -> float:
+    """Return the unit [s] of the streams' times as the draft has it; 0 if its clock is only a placeholder."""
+    if own:
+        return 1.0
+    if clock is None or time.column is None:
+        return 0.0
+    if time.rate is not None:
+        return 0.0 if clock.counts and "placeholder" in time.check else 1.0 / (time.rate * clock.assumed)
+    return seconds(time.unit) / clock.assumed
 
 
 def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ...], str]:
@@ -133,6 +152,9 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
             names = element_names(path, found.stream.topic) if found.stream.field.endswith("[:]") else ()
             if len(names) == channels.joints and len(set(names)) == len(names):
                 return names, f"names from the messages of {found.stream.topic}"
+    named = next((found.stream.joints for found in channels.found.values() if found.stream.joints), ())
+    if len(named) == channels.joints:
+        return named, "names from the columns"
     return tuple(f"joint_{j}" for j in range(1, channels.joints + 1)), "guessed: numbered in the order of the columns"
 
 

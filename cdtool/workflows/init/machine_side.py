@@ -73,10 +73,19 @@ def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, m
         return Side("linear_axis", "load", "one joint, position or speed in a unit of length")
     if motor:
         return Side("linear_axis", "motor", f"one joint; {why}", _MOTOR_OF_SLIDE)
+    return _load_side(channels, ratio, told, messages_si)
+
+
+def _load_side(channels: Channels, ratio: Ratio | None, told: dict[str, str], messages_si: bool) -> Side:
+    """Guess the kind of a single joint of which nothing indicates a motor or a length."""
     if told.get("torque") == "N" and "angle" in _kinds(channels):
         return Side("linear_axis", "motor", "one joint, an angle and a force", _MOTOR_OF_SLIDE)
     if "angle" in _kinds(channels):
         return Side("rotary_axis", "load", "one joint, in angles", _MOTOR_OF_LOAD)
+    if told.get("torque") == "N m":
+        return Side("rotary_axis", "load", "one joint, a torque without a travel", _MOTOR_OF_LOAD)
+    if ratio is not None and ratio.fitting and _is_angle(ratio.fitting[0].position):
+        return Side("rotary_axis", "load", "one joint; angles fit its speed", _MOTOR_OF_LOAD)
     if messages_si:
         return Side("rotary_axis", "load", "one joint in SI units", "linear_axis for a sliding joint")
     return Side("linear_axis", "load", "one joint", "rotary_axis for a rotating joint")
@@ -131,6 +140,11 @@ def _is_motor(channels: Channels, ratio: Ratio | None, messages_si: bool) -> tup
 
 def _kinds(channels: Channels) -> set[str]:
     return {motion_kind(name, channels) for name in ("position", "speed")}
+
+
+def _is_angle(unit: str) -> bool:
+    known = find_unit(unit)
+    return known is not None and known.si == "rad"
 
 
 def _factor(unit: str) -> float:

@@ -14,6 +14,14 @@ from cdtool.workflows.init.streams import Stream
 
 _WINDOWS = 400
 _SURE = 0.9
+# A delay is clear if the derivative leaves less than this share of the difference.
+_CLEAR = 0.67
+# No controller follows its set value so late [s].
+_LONGEST_LEAD = 0.5
+# Inertia and friction of opposite signs, each above this share of the effort's spread, are not those of a drive.
+_CONTRADICTS = 0.2
+# Share of the windows that may contain impacts.
+_IMPACTS = 0.25
 
 
 @dataclass(frozen=True)
@@ -34,15 +42,18 @@ def integral_fit(position: Stream, speed: Stream) -> Fit:
     """Compare increments of the position with those of the integrated speed."""
     if position.width != speed.width or len(speed.time) < 3:
         return _NONE
-    steps = np.diff(speed.time)[:, np.newaxis]
-    filled = np.nan_to_num(speed.values)
-    path = np.vstack((np.zeros((1, speed.width)), np.cumsum(0.5 * steps * (filled[1:] + filled[:-1]), axis=0)))
-    return _fit(_at(speed.time, path, position.time), position.values)
+    return _fit(_at(speed.time, integrated(speed), position.time), position.values)
 
 
 def derivative_fit(acceleration: Stream, speed: Stream) -> Fit:
-    """Compare the integrated acceleration with increments of the speed; negative correlation: opposite sign."""
-    return integral_fit(speed, acceleration)
+    """Compare the integrated acceleration with increments of the speed; negative correlation: opposite sign.
+
+    A constant offset of the acceleration, as from the weight, does not matter.
+    """
+    if speed.width != acceleration.width or len(acceleration.time) < 3:
+        return _NONE
+    ways = _at(acceleration.time, integrated(acceleration), speed.time)
+    return _fit(ways, speed.values, centred=True)
 
 
 def likeness(one: Stream, other: Stream) -> float:
@@ -55,28 +66,100 @@ def likeness(one: Stream, other: Stream) -> float:
     return float(np.median(found)) if found else 0.0
 
 
-def drive_fit(drive: Stream, speed: Stream) -> float:
+def lead(one: Stream, other: Stream) -> float:
+    """Return by how much the other stream is ahead of the first, in sample periods of the first; 0 if not clear.
+
+    With x the first and y the other, y = a + b x + c dx/dt: the lead is c / b. It is clear if dx/dt explains at least
+    a third of what a + b x leaves of y, in most of the joints that move.
+    """
+    if one.width != other.width or len(one.time) < 20:
+        return 0.0
+    y, x = np.nan_to_num(_at(other.time, other.values, one.time)), np.nan_to_num(one.values)
+    half = max(1, len(x) // (2 * _WINDOWS))
+    rate = (x[2 * half :] - x[: -2 * half]) / (2.0 * half)
+    x, y = x[half:-half], y[half:-half]
+    period = float(np.median(np.diff(one.time)))
+    leads = []
+    for j in range(one.width):
+        if not np.ptp(x[:, j]) or not np.ptp(y[:, j]):
+            continue
+        plain, full = (
+            np.column_stack(columns) for columns in ((np.ones(len(x)), x[:, j]), (np.ones(len(x)), x[:, j], rate[:, j]))
+        )
+        without = y[:, j] - plain @ np.linalg.lstsq(plain, y[:, j], rcond=None)[0]
+        values = np.linalg.lstsq(full, y[:, j], rcond=None)[0]
+        rest = y[:, j] - full @ values
+        clear = float(np.var(rest)) < _CLEAR * float(np.var(without)) and values[1]
+        ahead = float(values[2] / values[1]) if clear else 0.0
+        leads.append(ahead if abs(ahead) * period < _LONGEST_LEAD else 0.0)
+    return float(np.median(leads)) if leads else 0.0
+
+
+def integral_lead(position: Stream, speed: Stream) -> float:
+    """Return by how much a speed is ahead of the derivative of a position, in sample periods; 0 if not clear."""
+    if position.width != speed.width or len(speed.time) < 20:
+        return 0.0
+    return lead(position, Stream(speed.name, speed.columns, None, speed.time, integrated(speed)))
+
+
+def integrated(speed: Stream) -> FloatArray:
+    """Return the integral of a speed over its times, by the trapezoidal rule, from 0."""
+    steps = np.diff(speed.time)[:, np.newaxis]
+    filled = np.nan_to_num(speed.values)
+    path: FloatArray = np.vstack(
+        (np.zeros((1, speed.width)), np.cumsum(0.5 * steps * (filled[1:] + filled[:-1]), axis=0))
+    )
+    return path
+
+
+def drive_fit(drive: Stream, speed: Stream, position: Stream | None = None) -> float:
     """Return the share of a stream's variance explained by inertia and friction: R2 of [dv/dt, v, sign v, 1], median.
 
-    High for a drive's torque or current; lower with gravity.
+    High for a drive's torque or current. With a position, its first three powers represent weight and springs. 0 for a
+    joint where inertia and friction have opposite signs: no drive accelerates against its own friction.
     """
     if drive.width != speed.width:
         return 0.0
     window = max(1, len(speed.time) // _WINDOWS)
     time, velocity = speed.time[::window], _averaged(np.nan_to_num(speed.values), window)
     effort = _averaged(np.nan_to_num(_at(drive.time, drive.values, speed.time)), window)
-    if len(time) < 8:
+    place = None
+    if position is not None and position.width == speed.width:
+        place = _averaged(np.nan_to_num(_at(position.time, position.values, speed.time)), window)
+    if len(time) < 12:
         return 0.0
     shares = []
     for j in range(drive.width):
         v, tau = velocity[:, j], effort[:, j]
         if not np.ptp(v) or not np.ptp(tau):
             continue
-        moving = np.sign(np.where(np.abs(v) > 0.02 * np.max(np.abs(v)), v, 0.0))
-        known = np.column_stack((np.gradient(v, time), v, moving, np.ones_like(v)))
-        rest = tau - known @ np.linalg.lstsq(known, tau, rcond=None)[0]
-        shares.append(1.0 - float(np.var(rest) / np.var(tau)))
+        acceleration = np.gradient(v, time)
+        share = _explained(tau, v, acceleration, None)
+        if place is not None:
+            share = max(share, _explained(tau, v, acceleration, place[:, j]))
+        shares.append(share)
     return float(np.median(shares)) if shares else 0.0
+
+
+def _explained(tau: FloatArray, v: FloatArray, acceleration: FloatArray, place: FloatArray | None) -> float:
+    moving = np.sign(np.where(np.abs(v) > 0.02 * np.max(np.abs(v)), v, 0.0))
+    columns = [acceleration, moving, v, np.ones_like(v)]
+    if place is not None and np.ptp(place):
+        middle = (place - np.mean(place)) / np.ptp(place)
+        columns += [middle, middle**2, middle**3]
+    known = np.column_stack(columns)
+    kept = np.ones(len(tau), dtype=bool)
+    for _ in range(3):  # impacts obey another law: the windows that fit worst are left out
+        values = np.linalg.lstsq(known[kept], tau[kept], rcond=None)[0]
+        rest = np.abs(tau - known @ values)
+        kept = rest <= np.quantile(rest, 1.0 - _IMPACTS)
+    spread = np.std(known[kept], axis=0)
+    inertia, friction = values[0] * spread[0], values[1] * spread[1] + values[2] * spread[2]
+    whole = float(np.var(tau[kept]))
+    contradict = inertia * friction < 0.0 and min(abs(inertia), abs(friction)) > _CONTRADICTS * whole**0.5
+    if not whole or contradict:
+        return 0.0
+    return 1.0 - float(np.var((tau - known @ values)[kept])) / whole
 
 
 def roughness(stream: Stream) -> float:
@@ -84,6 +167,12 @@ def roughness(stream: Stream) -> float:
     values = np.nan_to_num(stream.values)
     span = float(np.max(np.ptp(values, axis=0)))
     return float(np.sqrt(np.mean(np.diff(values, n=2, axis=0) ** 2))) / span if span and len(values) > 2 else np.inf
+
+
+def is_regular(stream: Stream) -> bool:
+    """Whether a stream only rises by equal steps, as a clock or a counter does."""
+    steps = np.diff(stream.values[np.isfinite(stream.values)])
+    return len(steps) > 2 and float(np.min(steps)) > 0.0 and float(np.ptp(steps)) < 0.5 * float(np.median(steps))
 
 
 def rests_and_peaks(stream: Stream) -> bool:
@@ -95,32 +184,21 @@ def rests_and_peaks(stream: Stream) -> bool:
     return float(np.mean(away < 0.03 * np.max(away))) > 0.8 and float(np.max(away)) > 20.0 * float(np.median(away))
 
 
-def blocks(streams: list[Stream]) -> tuple[int, int, float] | None:
-    """Find (first, J, correlation) of J positions followed by their J speeds in columns without names."""
-    best: tuple[int, int, float] | None = None
-    for joints in range(1, len(streams) // 2 + 1):
-        for first in range(len(streams) - 2 * joints + 1):
-            pairs = [(streams[first + j], streams[first + joints + j]) for j in range(joints)]
-            fits = [integral_fit(*pair).correlation for pair in pairs if _stirs(*pair)]
-            good = len(fits) >= max(1, (joints + 1) // 2) and min(fits) > 0.9
-            if good and (best is None or joints > best[1]):
-                best = first, joints, float(np.median(fits))
-    return best
-
-
-def _stirs(position: Stream, speed: Stream) -> bool:
+def stirs(position: Stream, speed: Stream) -> bool:
     """Whether a joint moves; values of a joint at rest are noise."""
     way = float(np.ptp(np.nan_to_num(position.values)))
     return way > 0.01 and bool(np.ptp(np.nan_to_num(speed.values)))
 
 
-def _fit(ways: FloatArray, places: FloatArray) -> Fit:
+def _fit(ways: FloatArray, places: FloatArray, *, centred: bool = False) -> Fit:
     window = max(1, len(places) // _WINDOWS)
     there, here = np.diff(ways[::window], axis=0), np.diff(places[::window], axis=0)
     correlations, slopes = [], []
     for j in range(places.shape[1]):
         known = np.isfinite(there[:, j]) & np.isfinite(here[:, j])
         x, y = there[known, j], here[known, j]
+        if centred and len(x):
+            x, y = x - np.mean(x), y - np.mean(y)
         power = float(x @ x), float(y @ y)
         if min(power) <= 0.0 or len(x) < 3:
             continue

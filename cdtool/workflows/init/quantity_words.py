@@ -1,105 +1,121 @@
-"""Guess the quantity of a column from its name, in English and German."""
+"""Guess the quantity of a column from its name, by the words of the lexicon.
+
+Names are compared in lower case and without accents (`Velocità` is `velocita`, `Türwinkel` is `turwinkel`).
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import unicodedata
+from functools import lru_cache
 
-# Words that are sufficient alone, also inside a longer one (`motordrehzahl`), and short ones that must be separate.
-_LONG: Mapping[str, tuple[str, ...]] = {
-    "position": ("position", "angle", "winkel", "stellung", "encoder", "travel", "displacement"),
-    "speed": ("speed", "velocity", "geschwindigkeit", "drehzahl", "omega"),
-    "acceleration": ("accel", "beschleunigung"),
-    "torque": ("torque", "drehmoment", "moment", "effort", "current", "strom", "antriebskraft", "driveforce"),
-    "force": ("loadcell", "kraftmess", "messdose", "wägezelle", "waegezelle", "kraft", "force", "wrench"),
-    "label": ("label", "contact", "kontakt", "collision", "kollision"),
-    "trigger": ("trigger",),
-}
-_SHORT: Mapping[str, tuple[str, ...]] = {
-    "position": ("pos", "posn", "phi", "theta", "q", "enc", "weg", "lage", "hub", "qm", "x", "s", "ang"),
-    "speed": ("qd", "dq", "dphi", "w", "n", "v", "vel", "spd", "rpm", "qp"),
-    "acceleration": ("acc", "qdd", "ddq", "ax", "ay", "az", "a"),
-    "torque": ("tau", "trq", "iq", "i", "m", "pwm", "duty", "u", "amps"),
-    "force": ("cell", "f", "fx", "fy", "fz", "dms"),
-    "label": (),
-    "trigger": ("trig",),
-}
-_REFERENCE_LONG = ("target", "soll", "desired", "command", "setpoint", "reference", "nominal")
-_REFERENCE_SHORT = ("ref", "des", "cmd", "sp", "goal", "qg", "set")
-_ACTUAL = ("actual", "measured", "feedback", "gemessen")
-_ACTUAL_SHORT = ("act", "meas", "fb", "fbk")
-_LOAD_CELL = ("loadcell", "kraftmess", "messdose", "wägezelle", "waegezelle", "kraftsensor", "forcesensor", "wrench")
-_DRIVES = ("drive", "antrieb", "motor", "actuator")
-_ANGLES = ("winkel", "angle", "angular", "drehzahl", "omega", "motor", "encoder")
-# A generalised coordinate (q, qd) may be either.
-_ANGLES_SHORT = ("phi", "theta", "rot", "ang", "enc", "n", "rpm", "w", "dphi", "deg", "rad")
-_LENGTHS = ("travel", "displacement", "stroke", "linear")
-_LENGTHS_SHORT = ("weg", "hub", "x", "s")
-_CLOCKS = re.compile(r"time|zeit|stamp|clock")
-_CLOCKS_SHORT = ("t", "ts", "ticks", "tick", "tempo", "temps")
-_COUNTERS = ("tick", "count", "zähler", "zaehler", "sample", "index", "cycle", "zyklus")
-_OTHER = re.compile(
-    r"tcp|tool|temp|covariance|orientation|layout|register|bits|mode|payload|momentum|status|error|voltage|robot_current"
-    r"|schlepp|following|deviation|abweichung|(?:^|_)lag(?:_|$)"
-)
+from cdtool.workflows.init import lexicon
+
 _STRONG, _WEAK = 3.0, 2.0
 _LETTERS = 2  # a one-letter word is weak evidence
-_SPLIT = re.compile(r"[^a-zäöüß]+")
-_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
+# `current` and its short forms, which may mean the present one: before a noun for the joints, for example.
+_PRESENTS, _JOINT_NOUNS = ("current", "cur", "curr"), ("jnt", "joints")
+_BEFORE_D = ("q", "dq", "ddq", "j", "tau", "theta", "x", "pos", "vel")
+_SPLIT = re.compile(r"[\W\d_]+")
+_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
 def words(name: str) -> list[str]:
-    """Return the words of a name, in lower case, without numbers."""
-    return [word for word in _SPLIT.split(_CAMEL.sub(" ", name).lower()) if word]
+    """Return the words of a name, in lower case, without accents and numbers."""
+    return list(_words(name))
+
+
+@lru_cache(maxsize=4096)
+def _words(name: str) -> tuple[str, ...]:
+    plain = "".join(
+        letter for letter in unicodedata.normalize("NFKD", name) if not 0x300 <= ord(letter) <= 0x36F
+    )  # accents only: Japanese voicing marks belong to their letters
+    plain = unicodedata.normalize("NFC", plain)
+    return tuple(word for word in _SPLIT.split(_CAMEL.sub(" ", plain).lower()) if word)
 
 
 def is_reference(name: str) -> bool:
-    """Whether the name is that of a set value: `n_ref`, `target_q_0`, `Solldrehzahl`."""
+    """Whether the name is that of a set value: `n_ref`, `target_q_0`, `Solldrehzahl`, `tau_J_d`, `指令位置`."""
     parts = words(name)
-    return any(long in name.lower() for long in _REFERENCE_LONG) or any(part in _REFERENCE_SHORT for part in parts)
+    whole = "".join(parts)
+    if any(long in whole for long in lexicon.REFERENCE_LONG) or any(part in lexicon.REFERENCE_SHORT for part in parts):
+        return True
+    if any(_is_joined(part, lexicon.REFERENCE_STARTS) for part in parts):
+        return True
+    # A d at the end stands for "desired", except after a current or voltage: the direct axis.
+    return len(parts) > 1 and parts[-1] == "d" and parts[-2] in _BEFORE_D
 
 
 def is_actual(name: str) -> bool:
-    """Whether the name is that of a measured value: `actual_q_0`, `Istposition`, `Drehzahl Ist`, `n_act`."""
+    """Whether the name is that of a measured value: `actual_q_0`, `Istposition`, `n_act`, `实际位置`."""
     parts = words(name)
-    return any(long in name.lower() for long in _ACTUAL) or any(
-        part.startswith("ist") or part in _ACTUAL_SHORT for part in parts
-    )
+    if any(long in "".join(parts) for long in lexicon.ACTUAL_LONG) or (
+        any(part in _PRESENTS for part in parts) and _is_adjective(parts)
+    ):
+        return True
+    if any(_is_joined(part, lexicon.ACTUAL_STARTS) for part in parts):
+        return True
+    return any(part.startswith("ist") or part.endswith("istwert") or part in lexicon.ACTUAL_SHORT for part in parts)
 
 
 def is_load_cell(name: str) -> bool:
     """Whether the name is that of a load cell or force sensor: ground truth, never an input of a detector."""
     parts = words(name)
-    if any(long in "".join(parts) for long in _LOAD_CELL) or "dms" in parts:
+    if any(long in "".join(parts) for long in lexicon.LOAD_CELL) or "dms" in parts:
         return True
-    return "cell" in parts and all(part in ("cell", *_LONG["force"], *_SHORT["force"]) for part in parts)
+    return "cell" in parts and all(part in ("cell", *lexicon.LONG["force"], *lexicon.SHORT["force"]) for part in parts)
 
 
 def is_something_else(name: str) -> bool:
     """Whether the name cannot be a joint's channel: a tool's pose, a temperature, a covariance, a following error."""
-    return _OTHER.search("_".join(words(name))) is not None
+    return what_else(name) != ""
+
+
+@lru_cache(maxsize=4096)
+def what_else(name: str) -> str:
+    """Return what a name indicates instead of a channel: "a temperature"; an empty text if nothing does."""
+    joined = "_".join(words(name))
+    return next((reason for reason, pattern in lexicon.OTHERS if pattern.search(joined)), "")
 
 
 def is_clock(name: str) -> bool:
-    """Whether the name is that of a time: `Zeit`, `LogTime`, `timestamp`, `t`."""
+    """Whether the name is that of a time: `Zeit`, `LogTime`, `timestamp`, `t`, `temps`, `时间`."""
     parts = words(name)
-    return _CLOCKS.search("".join(parts)) is not None or any(part in _CLOCKS_SHORT for part in parts)
+    return lexicon.CLOCKS.search("".join(parts)) is not None or any(part in lexicon.CLOCKS_SHORT for part in parts)
 
 
 def is_counter(name: str) -> bool:
-    """Whether the name is that of a counter: `ticks`, `sample_index`."""
+    """Whether the name is that of a counter: `ticks`, `sample_index`; not `sample time`."""
     whole = "".join(words(name))
-    return any(word in whole for word in _COUNTERS)
+    return any(word in whole for word in lexicon.COUNTERS) and not lexicon.CLOCKS.search(whole)
+
+
+def is_only_a_joint(name: str) -> bool:
+    """Whether a name is only that of a joint, perhaps with a word for a set or measured value: `J#`, `DestJnt J#`."""
+    others = (*lexicon.REFERENCE_SHORT, *lexicon.REFERENCE_LONG, *lexicon.ACTUAL_SHORT, *lexicon.ACTUAL_LONG)
+    parts = [part for part in words(name) if part not in others and part not in _PRESENTS]
+    return bool(parts) and all(part in lexicon.JOINTS for part in parts)
 
 
 def motion_of(name: str) -> str:
     """Return "angle" or "length" for a name of a rotation or a travel, else an empty text."""
     parts = words(name)
-    if any(long in "".join(parts) for long in _ANGLES) or any(part in _ANGLES_SHORT for part in parts):
+    if any(long in "".join(parts) for long in lexicon.ANGLES) or any(part in lexicon.ANGLES_SHORT for part in parts):
         return "angle"
-    if any(long in "".join(parts) for long in _LENGTHS) or any(part in _LENGTHS_SHORT for part in parts):
+    if any(long in "".join(parts) for long in lexicon.LENGTHS) or any(part in lexicon.LENGTHS_SHORT for part in parts):
         return "length"
     return ""
+
+
+def is_current(name: str) -> bool:
+    """Whether the name is that of a motor's current; not `current_pos`, the present position."""
+    parts = words(name)
+    whole = "".join(parts)
+    if any(part in lexicon.CURRENTS_SHORT and not (part in _PRESENTS and _is_adjective(parts)) for part in parts):
+        return True
+    if any(long in whole for long in lexicon.CURRENTS):
+        return True
+    return "current" in whole and not _is_adjective(parts)
 
 
 def word_for(quantity: str, name: str) -> tuple[float, str]:
@@ -108,12 +124,48 @@ def word_for(quantity: str, name: str) -> tuple[float, str]:
     whole = "".join(parts)
     if quantity == "torque" and is_load_cell(name):
         return 0.0, ""
-    if quantity == "torque" and any(word in whole for word in _DRIVES) and ("force" in whole or "kraft" in whole):
+    if (
+        quantity == "torque"
+        and any(word in whole for word in lexicon.DRIVES)
+        and any(word in whole for word in lexicon.FORCES)
+    ):
         return _STRONG, "drive force"
-    for long in _LONG[quantity]:
-        if long in whole:
+    for long in lexicon.LONG[quantity]:
+        if long in whole and not _is_part_of_another(long, whole):
+            if long == "current" and _is_adjective(parts):
+                continue
             return _STRONG, long
     for part in parts:
-        if part in _SHORT[quantity]:
+        if part in lexicon.SHORT[quantity] and not (part in _PRESENTS and _is_adjective(parts)):
             return (_WEAK if len(part) >= _LETTERS else _WEAK - 1.0), part
+    for ending in lexicon.ENDINGS.get(quantity, ()):
+        if any(part.endswith(ending) and len(part) > len(ending) for part in parts):
+            return _WEAK, ending
     return 0.0, ""
+
+
+def _is_joined(part: str, starts: tuple[str, ...]) -> bool:
+    """Whether a word is one of these and a quantity written together: `setpos`, `actvelo`."""
+    return any(
+        part == start + ending for start in starts for endings in lexicon.ENDINGS.values() for ending in endings
+    )  # only whole words: `actuator` is no measured value
+
+
+def _is_part_of_another(word: str, whole: str) -> bool:
+    """Whether a word is only part of another quantity's: 力 in 力矩, 速度 in 加速度."""
+    return any(other in whole for other in lexicon.LONGER.get(word, ()))
+
+
+def _is_adjective(parts: list[str]) -> bool:
+    """Whether `current` in a name means the present one: `current_pos`, `CURRENT_FEEDRATE`."""
+    others = [
+        part
+        for quantity in ("position", "speed", "acceleration")
+        for part in parts
+        if (part in lexicon.SHORT[quantity] and len(part) >= _LETTERS)
+        or any(long in part for long in lexicon.LONG[quantity])
+    ]
+    if others:
+        return True
+    at = next((i for i, part in enumerate(parts) if part in _PRESENTS), len(parts))
+    return at + 1 < len(parts) and parts[at + 1] in (*lexicon.PRESENT, *lexicon.PRESENT_EFFORTS, *_JOINT_NOUNS)

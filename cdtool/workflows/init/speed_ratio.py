@@ -27,6 +27,9 @@ _PAIRS = (
 _NEAR, _SURE = 0.02, 0.01
 # Combinations less likely than the best by this much are not listed: stamps in minutes at 17 Hz.
 _FAR = 2.5
+# Largest positions and speeds of axes, and of the joints of robots.
+_LIMITS = {"m": 30.0, "m/s": 20.0}
+_ROBOT_LIMITS = {"rad": 4.0 * math.pi, "rad/s": 25.0, "m": 30.0, "m/s": 20.0}
 _RPM = ("n", "rpm", "motor")
 _RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
 
@@ -195,11 +198,18 @@ def _combination(
     for channel, logged in zip(("position", "speed"), pair, strict=True):
         stream = channels.found[channel].stream
         told = stated(channel, stream)
+        unlikely += 1.0 * (not told.by and implausible(logged, stream, channels.joints))
         if told.by == "name":
             unlikely += 2.0 * (find_unit(told.unit) != find_unit(logged))
         elif not told.by and channel == "speed" and (usual := rotation_unit(stream)):
             unlikely += 1.0 * (usual != logged)
     return Combination(unit, *pair, unlikely, off, motion_kind("position", channels) == kind)
+
+
+def implausible(unit: str, stream: Stream, joints: int) -> bool:
+    """Whether values in this unit are beyond what machines reach: a travel of 50 m, a robot's joint at 90 rad."""
+    limit = _ROBOT_LIMITS.get(unit) if joints > 1 and unit in _ROBOT_LIMITS else _LIMITS.get(unit)
+    return limit is not None and float(np.nanmax(np.abs(stream.values))) > limit
 
 
 def _si(unit: str) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,15 +13,20 @@ from cdtool.clock.lower_rate import sampled_rows
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
+from cdtool.workflows.init.joint_names import families_by_name
 
 _NUMBER = re.compile(r"\d+")
+_MOST = 1e100
 # `position[:]` with more elements than this is not a list of joints.
 _MOST_JOINTS = 64
 
 
 @dataclass(frozen=True)
 class Stream:
-    """Values over time that may be a channel: `values` (n, k) at `time` (n,) s, from k columns or one field."""
+    """Values over time that may be a channel: `values` (n, k) at `time` (n,) s, from k columns or one field.
+
+    `joints` are the names of the k joints if the names of the columns contain them.
+    """
 
     name: str
     columns: tuple[str, ...]
@@ -29,6 +35,7 @@ class Stream:
     values: FloatArray
     topic: str = ""
     field: str = ""
+    joints: tuple[str, ...] = ()
 
     @property
     def width(self) -> int:
@@ -61,11 +68,20 @@ class Found:
 
 @dataclass
 class Channels:
-    """The channels found so far, of a machine with `joints` joints, and the streams that are still free."""
+    """The channels found so far, of a machine with `joints` joints, and the streams that are still free.
+
+    `streams` are all that the log contains; `families` are the columns that belong together.
+    """
 
     joints: int
     free: list[Stream]
-    found: dict[str, Found] = field(default_factory=dict)
+    found: dict[str, Found] = dataclasses.field(default_factory=dict)
+    families: tuple[frozenset[str], ...] = dataclasses.field(init=False)
+    streams: tuple[Stream, ...] = dataclasses.field(init=False)
+
+    def __post_init__(self) -> None:
+        self.streams = tuple(self.free)
+        self.families = tuple(frozenset(stream.columns) for stream in self.free if len(stream.columns) > 1)
 
     def take(self, channel: str, stream: Stream, why: str, check: str = "") -> None:
         """Record a guess; streams that share a column with it are no longer free."""
@@ -78,6 +94,10 @@ class Channels:
             and not used & set(other.columns)
             and not (stream.topic and (other.topic, other.field) == (stream.topic, stream.field))
         ]
+
+    def is_of_family(self, stream: Stream) -> bool:
+        """Whether a single column belongs to a family of columns, free or not."""
+        return any(stream.columns[0] in members for members in self.families) if stream.columns else False
 
     def of_joints(self) -> list[Stream]:
         """Return the free streams with one column per joint whose values change."""
@@ -100,16 +120,23 @@ def streams_of(source: Source, table_time: FloatArray | None, clock: str | None,
             time = np.arange(len(column.values), dtype=np.float64)
         rows = sampled_rows(column.values) if column.time is None else None
         if rows is not None:
-            time, column = time[rows], replace(column, values=column.values[rows])
-        singles[name] = Stream(name, (name,), column.unit, time, column.values[:, np.newaxis])
-    return [*_families(singles), *singles.values()]
+            time, column = time[rows], dataclasses.replace(column, values=column.values[rows])
+        singles[name] = Stream(name, (name,), column.unit, time, _possible(column.values)[:, np.newaxis])
+    return [*_families(singles), *_named_families(singles), *singles.values()]
 
 
 def _of_topic(name: str, source: Source) -> Stream:
     column = source.columns[name]
     topic, _, field = name.partition(" ")
     time = column.time if column.time is not None else np.arange(len(column.values), dtype=np.float64)
-    return Stream(name, (), column.unit, time, column.values.reshape(len(column.values), -1), topic, field)
+    values = _possible(column.values).reshape(len(column.values), -1)
+    return Stream(name, (), column.unit, time, values, topic, field)
+
+
+def _possible(values: FloatArray) -> FloatArray:
+    """Return values with NaN in place of those that no sensor delivers and whose squares would overflow."""
+    wrong = ~(np.abs(values) < _MOST) & ~np.isnan(values)
+    return np.where(wrong, np.nan, values) if wrong.any() else values
 
 
 def _families(singles: Mapping[str, Stream]) -> list[Stream]:
@@ -136,7 +163,18 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
     return found
 
 
-def joined(streams: list[Stream], name: str) -> Stream:
+def _named_families(singles: Mapping[str, Stream]) -> list[Stream]:
+    """Find families whose names differ by the name of a joint: `elbow_joint/position, wrist_1_joint/position`."""
+    found = families_by_name(list(singles))
+    return [
+        joined([singles[name] for name in names], template, joints)
+        for template, (joints, names) in found.items()
+        if len({len(singles[name].time) for name in names}) == 1
+    ]
+
+
+def joined(streams: list[Stream], name: str, joints: tuple[str, ...] = ()) -> Stream:
     """Join streams of one column each, on one clock, to one of several columns."""
     values = np.hstack([stream.values for stream in streams])
-    return Stream(name, tuple(stream.columns[0] for stream in streams), streams[0].unit, streams[0].time, values)
+    columns = tuple(stream.columns[0] for stream in streams)
+    return Stream(name, columns, streams[0].unit, streams[0].time, values, joints=joints)

@@ -18,6 +18,12 @@ from cdtool.workflows.init.units_in_names import unit_in_name
 _UNITS = ("s", "ms", "us", "ns", "min")
 # Sampling rates [Hz] that logs of a machine usually have, and those that are possible.
 _USUAL, _POSSIBLE = (20.0, 20e3), (0.5, 500e3)
+# A word for a quantity in the name of a clock makes it doubtful from this strength on: `t_pos`.
+_STRONG = 2.0
+# Fractions of a second wrap at a power of ten: the least number of turns, and the deviation of their logarithm.
+_WRAPS, _NEAR_POWER = 2, 0.02
+# Above this share of steps of exactly 1 a column counts samples, whatever its name.
+_BY_ONE = 0.9
 _RARE = 2.0  # minutes are this much less likely than an unusual rate
 
 
@@ -54,7 +60,7 @@ class TableClock:
 
 def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     """Return the clock of a table and its times; None if no column looks like a clock."""
-    found = _complete(source) or guess_clock(source)
+    found = _named(source) or _unnamed(source)
     if found is None:
         return None
     column = source.columns[found.column]
@@ -85,15 +91,60 @@ def seconds(unit: str) -> float:
     return known.factor if known is not None else 1.0
 
 
-def _complete(source: Source) -> GuessedClock | None:
-    """Return the clock among columns without empty cells; None if the name of none of these indicates a clock."""
-    whole = {name: column for name, column in source.columns.items() if np.isfinite(column.values).all()}
-    if len(whole) == len(source.columns) or not whole:
-        return None
-    found = guess_clock(replace(source, columns=whole))
-    if found is None or not is_clock(found.column) or any(word_for(name, found.column)[0] for name in MEASURED):
-        return None
-    return found
+def _named(source: Source) -> GuessedClock | None:
+    """Return the clock among columns with the name or unit of a time; a complete one, and no counter, if possible."""
+    names = [
+        name
+        for name, column in source.columns.items()
+        if column.time is None and column.values.ndim == 1 and (_has_time_unit(column) or _has_clock_name(name))
+    ]
+
+    def rank(name: str) -> tuple[bool, bool, bool]:
+        column = source.columns[name]
+        known = column.values[np.isfinite(column.values)]
+        counts = is_counter(name) or bool(np.mean(np.diff(known) == 1.0) > _BY_ONE) if len(known) > 1 else True
+        return len(known) < len(column.values), counts, not _has_time_unit(column)
+
+    for name in sorted(names, key=rank):
+        found = guess_clock(replace(source, columns={name: source.columns[name]}))
+        if found is not None and not _wraps(source.columns[name]):
+            return found
+    return None
+
+
+def _unnamed(source: Source) -> GuessedClock | None:
+    """Return the first column that rises like a clock and whose name and unit are not those of a measured value."""
+    columns = {
+        name: column
+        for name, column in source.columns.items()
+        if not _wraps(column) and not _is_measured(name) and (not column.unit or _has_time_unit(column))
+    }
+    return guess_clock(replace(source, columns=columns)) if columns else None
+
+
+def _is_measured(name: str) -> bool:
+    return any(word_for(quantity, name)[0] >= _STRONG for quantity in (*MEASURED, "force"))
+
+
+def _has_clock_name(name: str) -> bool:
+    return is_clock(name) and not _is_measured(name)
+
+
+def _has_time_unit(column: Column) -> bool:
+    known = find_unit(column.unit) if column.unit else None
+    return known is not None and known.si == "s"
+
+
+def _wraps(column: Column) -> bool:
+    """Whether a column restarts after each full unit: nanoseconds within a second are no clock."""
+    known = column.values[np.isfinite(column.values)] if column.values.ndim == 1 else np.empty(0)
+    steps = np.diff(known)
+    back = steps[steps < 0.0]
+    if len(back) < _WRAPS:
+        return False
+    turns = np.log10(float(np.median(steps[steps > 0.0])) - back) if (steps > 0.0).any() else np.zeros(1)
+    powers = np.rint(turns)
+    return bool(np.all(np.abs(turns - powers) < _NEAR_POWER) and np.ptp(powers) == 0.0 and powers[0] > 2.0)
 
 
 def _assumed(column: Column, found: GuessedClock) -> tuple[float, bool]:

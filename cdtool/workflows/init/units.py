@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.units import find_unit
+from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.machine_side import Side
-from cdtool.workflows.init.quantity_words import words
-from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
+from cdtool.workflows.init.quantity_words import is_current, word_for, words
+from cdtool.workflows.init.speed_ratio import Ratio, implausible, motion_kind, rotation_unit, stated, whole_numbers
 from cdtool.workflows.init.streams import Channels, Stream
 from cdtool.workflows.init.units_in_names import label
 
@@ -53,7 +54,7 @@ class Evidence:
         if is_si(self.message_types.get(stream.topic, "")):
             why = f"messages of type {self.message_types[stream.topic]} are in SI units"
             return Logged("", why, check=self._contradicted(channel))
-        if channel != quantity and quantity in self.channels.found and not told.unit:
+        if channel != quantity and quantity in self.channels.found and not told.unit and not self._differs(channel):
             same = self.logged(quantity)
             return Logged(
                 same.unit or accepted[0],
@@ -71,6 +72,12 @@ class Evidence:
         return Logged(
             accepted[0], "", check=f"the unit is not stated; values reach {largest:.3g}: {others(accepted[0])}?"
         )
+
+    def _differs(self, channel: str) -> bool:
+        """Whether one is a current and the other a torque: a set torque next to a measured current."""
+        quantity = channel.removeprefix("reference_")
+        names = [label(self.channels.found[name].stream) for name in (channel, quantity)]
+        return quantity == "torque" and is_current(names[0]) != is_current(names[1])
 
     def _told(self, channel: str, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
         if si in accepted:
@@ -132,7 +139,7 @@ class Evidence:
 
     def _counted(self, channel: str, unit: str) -> Logged:
         accepted, joints = self.side.accepted(channel)[0], self.channels.joints
-        if self.ratio is None:
+        if self.ratio is None or self.ratio.tick:  # a counter's rate is itself only a guess
             return _raw(unit, accepted, joints, "whole numbers" if unit == "count" else "")
         speed = self.logged("speed")
         known = find_unit(speed.unit)
@@ -147,9 +154,12 @@ class Evidence:
     def _usual(self, quantity: str, stream: Stream, accepted: tuple[str, ...]) -> str:
         if quantity == "speed" and "rad/s" in accepted and (usual := rotation_unit(stream)):
             return usual
+        unit = accepted[0]
         if quantity == "position" and len(accepted) > 1 and motion_kind("position", self.channels) == "length":
-            return accepted[1]
-        return accepted[0]
+            unit = accepted[1]
+        if implausible(unit, stream, self.channels.joints):
+            return {"rad": "deg", "rad/s": "deg/s", "m": "mm", "m/s": "mm/s"}[unit]
+        return unit
 
     def _contradicted(self, channel: str) -> str:
         """Return the contradiction between the stated units of position and speed, or an empty text."""
@@ -190,12 +200,17 @@ def others(unit: str) -> str:
 
 
 def _of_torque(stream: Stream, accepted: tuple[str, ...], joints: int) -> Logged:
-    parts = words(label(stream))
-    whole = "".join(parts)
-    if "current" in whole or "strom" in whole or any(part in ("i", "iq", "amps") for part in parts):
+    name = label(stream)
+    if is_current(name):
         return _raw("A", accepted[0], joints, "its name")
-    if any(long in whole for long in ("torque", "moment", "effort", "kraft", "force")) or "tau" in parts:
-        unit = accepted[-1] if "force" in whole or "kraft" in whole else accepted[0]
+    strength, word = word_for("torque", name)
+    if strength > 1.0 and word not in ("pwm", "duty"):
+        whole = "".join(words(name))
+        unit = (
+            accepted[-1]
+            if word == "drive force" or any(force in whole for force in lexicon.FORCES[:-1])
+            else accepted[0]
+        )
         return Logged(unit, "its name", check=f"{_reach(stream)}: {others(unit)}?")
     return _raw("1", accepted[0], joints, "")
 

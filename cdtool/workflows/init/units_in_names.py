@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from cdtool.formats.column_names import split_unit
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
+from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
 from cdtool.workflows.init.streams import Stream
 
@@ -31,15 +32,34 @@ _TAILS = {
     "m_s2": "m/s2", "rad_s2": "rad/s2", "mps2": "m/s2", "g": "g", "mg": "mg",
     "n": "N", "kn": "kN", "mn": "mN", "nm": "N m", "mnm": "mN m", "knm": "kN m", "n_m": "N m", "kg": "kgf",
     "kgf": "kgf", "a": "A", "ma": "mA", "v": "V", "mv": "mV", "percent": "%", "prozent": "%", "pct": "%",
-    "counts": "count", "count": "count", "cnt": "count", "cnts": "count", "inc": "count", "ticks": "count",
+    "counts": "count", "tr_min": "rpm", "giri_min": "rpm", "rev_min": "rpm", "r_min": "rpm", "rev_s": "rev/s",
+    "rad_sec": "rad/s", "deg_sec": "deg/s", "mm_min": "mm/min", "count": "count", "cnt": "count",
+    "cnts": "count", "inc": "count", "ticks": "count",
 }  # fmt: skip
 _SEPARATOR = re.compile(r"[\W_]+")
+# Units of other quantities: temperature, power, frequency, pressure, resistance, energy.
+_FOREIGN = frozenset(
+    ("°c", "degc", "celsius", "℃", "k", "°f", "w", "kw", "va", "hz", "khz", "bar", "mbar", "pa", "kpa", "mpa", "ohm",
+     "kohm", "j", "kj", "wh", "vdc", "vac")
+)  # fmt: skip
+# The letters of an index: `position.A#`.
+_INDEX_LETTERS = re.compile(r"(?<=.)[\W_]+[A-Za-z]{1,2}#")
+_SURE = 2.0  # a word of more than one letter
+_OF_UNIT: Mapping[str, str] = {
+    "rad": "position", "m": "position", "rad/s": "speed", "m/s": "speed", "rad/s2": "acceleration",
+    "m/s2": "acceleration", "N m": "torque", "A": "torque", "N": "force",
+}  # fmt: skip
 
 
 def own_name(stream: Stream) -> str:
-    """Return the name of a column or field; a topic's name only if the field's is generic (`data`)."""
+    """Return the name of a column or field; a topic's name only if the field's is generic (`data`).
+
+    The letters of an index are left out if the rest indicates a quantity: `position.A#` is no current.
+    """
     if not stream.topic:
-        return split_unit(stream.name)[0] if stream.unit else stream.name
+        name = split_unit(stream.name)[0] if stream.unit else stream.name
+        shorter = _INDEX_LETTERS.sub("#", name)
+        return shorter if any(word_for(quantity, shorter)[0] >= _SURE for quantity in _QUANTITIES) else name
     plain = stream.field.split("[")[0] == "data"
     return f"{stream.topic} {stream.field}" if plain else stream.field
 
@@ -67,7 +87,7 @@ def unit_in_name(quantity: str, name: str) -> str:
     whole = "".join(words(rest))
     if unit == "m" and (motion_of(rest) == "angle" or words(rest)[-1:] == ["q"]):
         return ""
-    if unit == "N" and quantity == "torque" and not ("force" in whole or "kraft" in whole):
+    if unit == "N" and quantity == "torque" and not any(word in whole for word in lexicon.FORCES):
         return ""
     if unit == "kgf" and quantity != "force":
         return ""
@@ -78,8 +98,24 @@ def may_be(quantity: str, stream: Stream) -> bool:
     """Return False if the unit in the header, or an unambiguous one in the name, does not measure that quantity."""
     if stream.unit and find_unit(stream.unit):
         return _measures(quantity, stream.unit)
+    if stream.unit and is_foreign(stream.unit):
+        return False
     rest, tail, unit = _split(own_name(stream))
     return not unit or _measures(quantity, unit) or not _stands_for_itself(rest, tail)
+
+
+def is_foreign(unit: str) -> bool:
+    """Whether a unit measures nothing that a channel may be: a temperature, a power, a frequency, a pressure."""
+    return unit.strip().lower() in _FOREIGN
+
+
+def quantity_of_unit(stream: Stream) -> str:
+    """Return the quantity that the unit in the header, or an unambiguous one in the name, measures; empty if none."""
+    known = find_unit(stream.unit) if stream.unit else None
+    if known is None and not stream.unit:
+        rest, tail, unit = _split(own_name(stream))
+        known = find_unit(unit) if unit and _stands_for_itself(rest, tail) else None
+    return _OF_UNIT.get(known.si, "") if known is not None else ""
 
 
 def _measures(quantity: str, unit: str) -> bool:
@@ -90,14 +126,30 @@ def _measures(quantity: str, unit: str) -> bool:
 def _split(name: str) -> tuple[str, str, str]:
     """Return (the name before the ending, the ending, its unit); empty texts without such an ending."""
     parts = [part for part in _SEPARATOR.split(name) if part]
-    for count in (2, 1):
-        tail = "_".join(parts[-count:])
-        unit = _CAPITALS.get(tail) or _TAILS.get(tail.lower(), "")
-        if unit and (len(parts) > count or tail.lower() == "rpm"):
-            return "_".join(parts[:-count]), tail, unit
-    return name, "", ""
+    return _tail(parts, 2) or _after_slash(name) or _tail(parts, 1) or (name, "", "")
+
+
+def _tail(parts: list[str], count: int) -> tuple[str, str, str] | None:
+    """Return the split of a name whose last parts are a unit: `_mm_s`, `_ms`."""
+    tail = "_".join(parts[-count:])
+    unit = _CAPITALS.get(tail) or _TAILS.get(tail.lower(), "")
+    if unit and (len(parts) > count or tail.lower() == "rpm"):
+        return "_".join(parts[:-count]), tail, unit
+    return None
+
+
+def _after_slash(name: str) -> tuple[str, str, str] | None:
+    """Return the split of a name whose unit is after a slash: `Kraft F / N`; not of the path of a topic."""
+    for slash in [] if name.startswith("/") else re.finditer("/", name):
+        rest, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
+        is_unit = unit.lower() in _FOREIGN or (find_unit(unit) is not None and not rest[-1:].isdigit())
+        if rest and unit and is_unit:
+            return rest, f"/{unit}", unit
+    return None
 
 
 def _stands_for_itself(rest: str, tail: str) -> bool:
     """Whether an ending is a unit after any name: `_mm`, `pulses_N`; not `MOTOR_N`, `tau_m`."""
+    if tail.startswith("/"):
+        return True
     return len(tail) > 1 if tail not in _CAPITALS else rest != rest.upper()

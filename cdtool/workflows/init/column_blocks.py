@@ -1,0 +1,129 @@
+"""Guess the channels of a table without names: blocks of J columns, one per joint, related by derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdtool.recording import FloatArray
+from cdtool.workflows.init import motion_evidence as motion
+from cdtool.workflows.init.streams import Stream, joined
+
+_FITS, _ALIKE = 0.9, 0.97
+# Share of an effort that inertia, friction and weight must explain.
+_DRIVES = 0.6
+# A block directly behind the speeds is preferred unless another one is explained better by this much.
+_BETTER = 0.1
+_BEHIND = 0.2
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The blocks found: J joints, streams of J columns by channel, and the correlation of position and speed."""
+
+    joints: int
+    streams: dict[str, Stream]
+    correlation: float
+    explained: float
+
+
+def find_blocks(streams: list[Stream]) -> Blocks | None:
+    """Return position, speed, effort and set values of a table without names; None if no column is the integral of one.
+
+    Parameters
+    ----------
+    streams : list of Stream
+        The columns in their order, without the clock.
+    """
+    fits = _fits(streams)
+    joints = _joints(streams, fits)
+    if not joints:
+        return None
+    pairs = _pairs(fits, joints)
+    speeds_of = {
+        first: max((pair for pair in pairs if pair[0] == first), key=lambda pair: pair[2]) for first, _, _ in pairs
+    }
+    # A speed that has a derivative of its own is not a position.
+    positions = [first for first in speeds_of if not any(pair[1] == first for pair in pairs)] or list(speeds_of)
+    chosen = positions[0]
+    for first in positions[1:]:  # of two like blocks, the one behind is measured
+        if motion.lead(_block(streams, chosen, joints), _block(streams, first, joints)) < -_BEHIND:
+            chosen = first
+    _, speed, correlation = speeds_of[chosen]
+    found = {"position": _block(streams, chosen, joints), "speed": _block(streams, speed, joints)}
+    taken = {chosen, speed}
+    for first in positions:
+        if first != chosen and motion.likeness(found["position"], _block(streams, first, joints)) > _ALIKE:
+            found["reference_position"] = _block(streams, first, joints)
+            taken.add(first)
+            if speeds_of[first][1] != speed:
+                found["reference_speed"] = _block(streams, speeds_of[first][1], joints)
+                taken.add(speeds_of[first][1])
+            break
+    taken |= {first for pair in pairs for first in pair[:2]}
+    effort, explained = _effort(streams, joints, taken, speed + joints, found)
+    if effort is not None:
+        found["torque"] = effort
+    return Blocks(joints, found, correlation, explained)
+
+
+def _fits(streams: list[Stream]) -> FloatArray:
+    """Return the correlation of each column with the integral of each other; NaN where one does not move."""
+    fits = np.full((len(streams), len(streams)), np.nan)
+    for i, position in enumerate(streams):
+        for k, speed in enumerate(streams):
+            if i != k and motion.stirs(position, speed):
+                fits[i, k] = motion.integral_fit(position, speed).correlation
+    return fits
+
+
+def _joints(streams: list[Stream], fits: FloatArray) -> int:
+    """Return the largest number of joints with a block of positions and one of speeds; 0 without any."""
+    for joints in range(len(streams) // 2, 0, -1):
+        if pairs := _pairs(fits, joints):
+            first, half = pairs[0][0], joints // 2
+            if joints % 2 == 0 and half:
+                parts = _block(streams, first, half), _block(streams, first + half, half)
+                if motion.likeness(*parts) > _ALIKE:
+                    return half  # measured and set values, one behind the other
+            return joints
+    return 0
+
+
+def _pairs(fits: FloatArray, joints: int) -> list[tuple[int, int, float]]:
+    """Return (first position, first speed, median correlation) of all blocks that do not overlap."""
+    found = []
+    for first in range(len(fits) - joints + 1):
+        for speed in range(len(fits) - joints + 1):
+            if abs(first - speed) < joints:
+                continue
+            known = np.array([fits[first + j, speed + j] for j in range(joints)])
+            known = known[np.isfinite(known)]
+            if len(known) >= max(1, (joints + 1) // 2) and known.min() > _FITS:
+                found.append((first, speed, float(np.median(known))))
+    return found
+
+
+def _effort(
+    streams: list[Stream], joints: int, taken: set[int], behind: int, found: dict[str, Stream]
+) -> tuple[Stream | None, float]:
+    used = {first + j for first in taken for j in range(joints)}
+    shares = {
+        first: motion.drive_fit(_block(streams, first, joints), found["speed"], found["position"])
+        for first in range(len(streams) - joints + 1)
+        if not used & set(range(first, first + joints))
+    }
+    if not shares:
+        return None, 0.0
+    best = max(shares, key=lambda first: shares[first] + _BETTER * (first == behind))
+    block = _block(streams, best, joints)
+    if shares[best] < _DRIVES or (joints == 1 and motion.rests_and_peaks(block)):
+        return None, shares[best]
+    return block, shares[best]
+
+
+def _block(streams: list[Stream], first: int, joints: int) -> Stream:
+    part = streams[first : first + joints]
+    name = f"columns {part[0].name} to {part[-1].name}" if joints > 1 else f"column {part[0].name}"
+    return joined(part, name)

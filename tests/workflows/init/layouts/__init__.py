@@ -1,0 +1,10 @@
+"""Public layouts of logs as small synthetic look-alikes, with the truth about each column."""
+
+from __future__ import annotations
+
+from tests.workflows.init.layouts import axes, benches, robots, strangers
+from tests.workflows.init.layouts.layout import Layout, Truth
+
+LAYOUTS: tuple[Layout, ...] = (*robots.LAYOUTS, *axes.LAYOUTS, *benches.LAYOUTS, *strangers.LAYOUTS)
+
+__all__ = ["LAYOUTS", "Layout", "Truth"]

@@ -1,0 +1,139 @@
+"""Score `cdtool init` on layouts: channels mapped right, and what is wrong without a CHECK mark."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.errors import CdtoolError
+from cdtool.units import find_unit
+from cdtool.workflows.init.drafting import init
+from tests.workflows.init.layouts.layout import Layout, Truth
+
+_TYPES = {"linear axis": ("linear_axis",), "rotary axis": ("rotary_axis",), "robot": ("rotary_axis", "linear_axis")}
+
+
+@dataclass(frozen=True)
+class Score:
+    """The draft of one layout: channels that it should map, those mapped right, and the errors.
+
+    A channel is right if every joint has its column, in one order for all channels. `wrong` are channels with another
+    column and a wrong kind of machine, `units` right channels with a wrong unit; `unmarked` are those of both without
+    a CHECK mark. `missing` are channels of the log that the draft does not map.
+    """
+
+    name: str
+    expected: tuple[str, ...]
+    right: tuple[str, ...]
+    missing: tuple[str, ...]
+    wrong: tuple[str, ...]
+    units: tuple[str, ...]
+    unmarked: tuple[str, ...]
+    fault: str = ""
+
+
+def score(layout: Layout, folder: Path) -> Score:
+    """Write a log of the layout, draft its machine file and compare the draft with the truth."""
+    log = folder / f"{layout.name.replace(' ', '_').replace('&', '')}{layout.suffix}"
+    layout.write(log, np.random.default_rng(7))
+    truth = {name: _as_channel(item) for name, item in layout.truth.items()}
+    expected = sorted({item.channel for item in truth.values() if item.channel})
+    try:
+        text = init(log, folder / "machine.toml", force=True).text
+    except CdtoolError as fault:
+        return Score(layout.name, tuple(expected), (), tuple(expected), (), (), (), str(fault))
+    values = tomllib.loads(text)
+    channels = values["channels"].get("mcap", values["channels"])
+    order = _joint_order(channels, truth)
+    parts = {name: part for name, part in channels.items() if isinstance(part, dict)}
+    faults = {name: _fault(name, part, truth, order) for name, part in parts.items()}
+    units = {name: "" if faults[name] else _unit_fault(name, part, truth) for name, part in parts.items()}
+    if values["machine"]["type"] not in _TYPES[layout.machine]:
+        faults["type"] = values["machine"]["type"]
+    errors = {**units, **{name: fault for name, fault in faults.items() if fault}}
+    return Score(
+        layout.name,
+        tuple(expected),
+        tuple(name for name in expected if name in parts and not faults[name]),
+        tuple(name for name in expected if name not in parts),
+        _listed(faults),
+        _listed(units),
+        _listed({name: fault for name, fault in errors.items() if fault and not _is_checked(text, name)}),
+    )
+
+
+def _listed(faults: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(f"{name}: {fault}" for name, fault in faults.items() if fault)
+
+
+def _as_channel(truth: Truth) -> Truth:
+    return Truth("torque", truth.joint, truth.unit) if truth.channel == "current" else truth
+
+
+def _columns_of(part: dict) -> list[str]:
+    if "topic" in part:
+        return [f"{part['topic']} {part['field']}"]
+    listed = part.get("columns", [part.get("column")])
+    return [str(column) for column in listed if column is not None]
+
+
+def _joint_order(channels: dict, truth: dict[str, Truth]) -> list[str]:
+    """Return the joints in the order of the first channel of several columns that are of different joints."""
+    for name in ("position", "speed", "torque", *channels):
+        part = channels.get(name)
+        columns = _columns_of(part) if isinstance(part, dict) else []
+        joints = [truth[column].joint for column in columns if column in truth]
+        if len(joints) > 1 and len(set(joints)) == len(joints) and all(joints):
+            return joints
+    return []
+
+
+def _fault(channel: str, part: dict, truth: Mapping[str, Truth], order: Sequence[str]) -> str:
+    """Return what is wrong with the columns of a mapped channel, or an empty text."""
+    columns = _columns_of(part)
+    if not columns:
+        known = next((name for name, item in truth.items() if item.channel == "time"), "")
+        return f"a placeholder instead of {known!r}" if known else ""
+    for k, column in enumerate(columns):
+        item = truth.get(column, Truth())
+        if item.channel != channel:
+            return f"column {column!r} is {item.channel or 'no channel'}"
+        if item.joint and len(columns) > 1 and order and item.joint != order[k]:
+            return f"column {column!r} is joint {item.joint} in place of {order[k]}"
+    joints = {item.joint for item in truth.values() if item.channel == channel and item.joint}
+    if len(columns) < len(joints):
+        return f"{len(columns)} of {len(joints)} joints"
+    return ""
+
+
+def _unit_fault(channel: str, part: dict, truth: Mapping[str, Truth]) -> str:
+    """Return what is wrong with the unit of a channel with the right columns, or an empty text."""
+    columns = _columns_of(part)
+    true_unit = truth[columns[0]].unit if columns else ""
+    if channel == "time" and "rate_hz" in part:
+        return f"counts instead of {true_unit!r}" if true_unit else ""
+    drafted = part.get("unit", "")
+    if not true_unit or not drafted:
+        return ""
+    first, second = find_unit(true_unit), find_unit(drafted)
+    alike = first is not None and second is not None and first.si == second.si
+    if alike and abs(first.factor / second.factor - 1.0) < 1e-6:
+        return ""
+    return f"unit {drafted!r} instead of {true_unit!r}"
+
+
+def _is_checked(text: str, key: str) -> bool:
+    """Return whether the comment of a key contains CHECK."""
+    lines = text.splitlines()
+    at = next(i for i, line in enumerate(lines) if re.match(rf"{key} = ", line))
+    if "  # " in lines[at]:
+        return "CHECK" in lines[at].split("  # ", 1)[1]
+    first = at
+    while first and lines[first - 1].startswith("# "):
+        first -= 1
+    return any("CHECK" in line for line in lines[first:at])

@@ -1,0 +1,96 @@
+"""`cdtool init` on look-alikes of public logs: the share of channels mapped right, and nothing wrong without a mark."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from cdtool.workflows.init.drafting import init
+from tests.workflows.init.layouts import LAYOUTS, Truth
+from tests.workflows.init.layouts.layout import Table, table_layout
+from tests.workflows.init.layouts.score import score
+from tests.workflows.init.layouts.variants import is_table, without_each_channel, without_names, written
+
+# Few small ones, for tests that run with every change.
+QUICK = [layout for layout in LAYOUTS if layout.name in ("german gate", "chinese servo", "odrive", "lift door")]
+
+
+def test_the_corpus_has_layouts_of_all_machines_with_names_of_their_own():
+    assert len(LAYOUTS) >= 40 and len({layout.name for layout in LAYOUTS}) == len(LAYOUTS)
+    assert {layout.machine for layout in LAYOUTS} == {"linear axis", "rotary axis", "robot"}
+    assert all(layout.source and layout.truth for layout in LAYOUTS)
+
+
+@pytest.mark.parametrize("layout", QUICK, ids=lambda layout: layout.name)
+def test_every_channel_of_a_small_layout_is_mapped(layout, tmp_path):
+    done = score(layout, tmp_path)
+    assert set(done.right) == set(done.expected) and not done.unmarked and not done.fault
+
+
+def test_nine_of_ten_channels_of_all_layouts_are_mapped_and_nothing_wrong_is_unmarked(tmp_path):
+    scores = [score(layout, tmp_path) for layout in LAYOUTS]
+    assert not [item.fault for item in scores if item.fault]
+    assert not [text for item in scores for text in item.unmarked]
+    right, expected = sum(len(item.right) for item in scores), sum(len(item.expected) for item in scores)
+    assert right >= 0.9 * expected
+
+
+def test_a_missing_channel_is_not_replaced_by_another_one_without_a_mark(tmp_path):
+    layouts = [layout for layout in LAYOUTS[::4] if is_table(layout)]
+    scores = [score(variant, tmp_path) for layout in layouts for variant in without_each_channel(layout)]
+    assert not [(item.name, item.fault or item.unmarked) for item in scores if item.fault or item.unmarked]
+
+
+def test_without_names_nothing_wrong_is_unmarked(tmp_path):
+    layouts = [layout for layout in LAYOUTS[::3] if is_table(layout)]
+    scores = [score(without_names(layout), tmp_path) for layout in layouts]
+    assert not [(item.name, item.fault or item.unmarked) for item in scores if item.fault or item.unmarked]
+
+
+@pytest.mark.parametrize("layout", QUICK, ids=lambda layout: layout.name)
+def test_every_column_is_mapped_or_listed_exactly_once(layout, tmp_path):
+    drafted = init(written(layout, tmp_path), tmp_path / "machine.toml")
+    listed = Counter(column for item in drafted.unmapped for column in item.columns)
+    assert set(listed.values()) <= {1}
+    for column in layout.truth:
+        assert (f'"{column}"' in drafted.text.split("# Not mapped")[0]) is (column not in listed)
+    assert all(item.why for item in drafted.unmapped)
+
+
+def small(truths):
+    def columns(generator):
+        time = np.arange(400) / 100.0
+        known = {"t [s]": (Truth("time", unit="s"), time)}
+        return {**known, **{name: (truth, values(time)) for name, (truth, values) in truths.items()}}
+
+    return table_layout("small", "a test", "linear axis", columns, Table())
+
+
+def test_the_score_counts_a_wrong_column_and_its_missing_mark(tmp_path):
+    """The truth is wrong here, so the right guess of the tool is what the score must refuse."""
+    layout = small(
+        {
+            "pos [m]": (Truth("", unit="m"), np.sin),
+            "vel [m/s]": (Truth("speed", unit="mm/s"), np.cos),
+            "state": (Truth("position", unit="m"), lambda time: np.floor(time)),
+        }
+    )
+    done = score(layout, tmp_path)
+    assert done.right == ("speed", "time") and not done.missing
+    assert [text.split(":")[0] for text in done.wrong] == ["position"]
+    assert [text.split(":")[0] for text in done.units] == ["speed"]
+    assert {text.split(":")[0] for text in done.unmarked} == {"position", "speed"}
+
+
+def test_the_score_counts_joints_that_are_left_out(tmp_path):
+    layout = small(
+        {
+            **{f"q{j}": (Truth("position", str(j)), lambda time, j=j: np.sin(j * time)) for j in (1, 2)},
+            **{f"qd{j}": (Truth("speed", str(j)), lambda time, j=j: j * np.cos(j * time)) for j in (1, 2)},
+            "q_third": (Truth("position", "3"), np.cos),
+        }
+    )
+    done = score(layout, tmp_path)
+    assert "speed" in done.right and [text.split(":")[0] for text in done.wrong if "joints" in text] == ["position"]

@@ -1,0 +1,118 @@
+"""Names of columns in several languages: their quantity, set values, measured values, and other quantities."""
+
+from __future__ import annotations
+
+import pytest
+
+from cdtool.recording import MEASURED
+from cdtool.workflows.init.joint_names import families_by_name
+from cdtool.workflows.init.quantity_words import (
+    is_actual,
+    is_clock,
+    is_current,
+    is_reference,
+    is_something_else,
+    word_for,
+)
+
+
+def quantity_of(name):
+    strengths = {quantity: word_for(quantity, name)[0] for quantity in (*MEASURED, "force")}
+    best = max(strengths, key=strengths.get)
+    return best if strengths[best] else ""
+
+
+@pytest.mark.parametrize(
+    ("quantity", "names"),
+    [
+        ("position", ["Türwinkel", "déplacement", "Posizione", "posición", "实际位置", "現在位置"]),
+        ("position", ["ActPos", "standardhub", "actual.positions"]),
+        ("speed", ["joint_velocities", "actual.velocities"]),
+        ("speed", ["Drehzahl", "vitesse", "Velocità", "velocidad", "电机转速", "回転数", "ActVelo", "dq_3"]),
+        ("acceleration", ["Beschl.", "accélération", "accelerazione", "aceleración", "加速度", "qdd1"]),
+        ("torque", ["Motorstrom", "couple moteur", "coppia", "par_motor", "力矩", "电流", "トルク", "tau_J"]),
+        ("force", ["Kraft", "Force capteur", "Cella di carico", "fuerza", "接触力", "荷重", "fz"]),
+    ],
+)  # fmt: skip
+def test_a_quantity_is_recognised_in_seven_languages(quantity, names):
+    assert {name: quantity_of(name) for name in names} == dict.fromkeys(names, quantity)
+
+
+@pytest.mark.parametrize("name", ["current_pos", "CurrentVelocity", "current_joint_angle"])
+def test_a_present_value_is_no_current(name):
+    assert not is_current(name) and quantity_of(name) in ("position", "speed") and is_actual(name)
+
+
+@pytest.mark.parametrize("name", ["actual_current_0", "CurrentFeedback", "motor current", "Iq"])
+def test_a_motor_current_is_one(name):
+    assert is_current(name) and quantity_of(name) == "torque"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "q_d[3]",
+        "tau_J_d",
+        "Sollhub",
+        "setpos",
+        "指令位置",
+        "目標速度",
+        "consigne",
+        "posición_deseada",
+        "planned_q1",
+        "ideal_pos",
+        "profile_velocity",
+    ],
+)
+def test_set_values_are_recognised(name):
+    assert is_reference(name)
+
+
+@pytest.mark.parametrize("name", ["i_d", "motor_id", "actual_q_0", "settings", "speed"])
+def test_other_values_are_no_set_values(name):
+    assert not is_reference(name)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["computed_torque_1", "gravity_model_effort", "tau_ext_hat_filtered", "跟随误差", "温度", "Spannung",
+     "errore_inseguimento", "robot_current", "actual_TCP_force_0", "tau_dot", "i_d", "M1_CURRENT_FEEDRATE"],
+)  # fmt: skip
+def test_other_quantities_than_those_of_a_joint_are_recognised(name):
+    assert is_something_else(name)
+
+
+@pytest.mark.parametrize("name", ["upper_arm/position", "robot_state/q_0", "external_axis_position", "lower_leg_speed"])
+def test_names_of_links_and_messages_do_not_exclude_a_channel(name):
+    assert not is_something_else(name)
+
+
+@pytest.mark.parametrize("name", ["Tempo", "temps_ms", "tiempo", "时间", "時間[s]", "tm_ms", "duration"])
+def test_clocks_are_recognised_in_seven_languages(name):
+    assert is_clock(name)
+
+
+def test_joints_are_found_by_the_part_of_the_names_that_differs():
+    names = [
+        f"/states/{joint}_joint/{field}" for joint in ("elbow", "wrist_1", "base") for field in ("position", "effort")
+    ]
+    families = families_by_name(names)
+    joints = ("elbow_joint", "wrist_1_joint", "base_joint")
+    assert {part[0] for part in families.values()} == {joints}
+    assert {part[1] for part in families.values()} == {
+        tuple(f"/states/{joint}/{field}" for joint in joints) for field in ("position", "effort")
+    }
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["motor_position", "load_position", "motor_speed", "load_speed"],
+        ["pose_x", "pose_y", "velocity_x", "velocity_y", "position_x", "position_y"],
+        ["actual_position", "target_position", "actual_speed", "target_speed"],
+        ["position", "speed", "torque"],
+    ],
+    ids=["two sides of a gear", "Cartesian axes", "set values", "one joint"],
+)
+def test_other_differences_are_no_joints(names):
+    assert families_by_name(names) == {}
