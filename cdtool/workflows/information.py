@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,6 +14,7 @@ import numpy as np
 from cdtool.clock.stamps import COARSE_SHARE, missing_findings
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
+from cdtool.evaluation.synchronisation.latency import ChannelLatency
 from cdtool.findings import Fact, Finding, worst_first
 from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
 from cdtool.findings.truth import InProgress
@@ -26,6 +27,7 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.log_checks.log_findings import log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
+from cdtool.workflows.log_checks.synchronisation import latency_findings, pooled_latencies
 
 if TYPE_CHECKING:
     from cdtool.ingest.log_statistics import LogStatistics
@@ -50,7 +52,8 @@ class ChannelInfo:
 class Info:
     """A log: its columns as they are in the file, or with a machine file its channels on the load side.
 
-    `dialect` is the format of a text table, as `[csv]` of a machine file; empty for other formats.
+    `dialect` is the format of a text table, as `[csv]` of a machine file; empty for other formats. `latencies` are
+    those of the sync audit, with a machine file; `origin` [s] is added to a log's times to obtain its own clock.
     """
 
     source: str
@@ -59,6 +62,8 @@ class Info:
     channels: tuple[ChannelInfo, ...]
     findings: tuple[Finding, ...]
     dialect: str = ""
+    latencies: tuple[ChannelLatency, ...] = ()
+    origin: float = 0.0
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:
@@ -70,7 +75,7 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
         The log, or a folder with its parts.
     machine : str, Path or MachineFile, optional
         With a machine file the mapped channels are surveyed on the load side, cut into operations, and checked against
-        each other; they are held in memory. Without one, the columns as logged, piece by piece.
+        each other, also how late they are; they are held in memory. Without one, the columns as logged, piece by piece.
 
     Returns
     -------
@@ -134,6 +139,7 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
 
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
+    from cdtool.evaluation.synchronisation.audit import audit
     from cdtool.ingest.reading import read_as_logged
 
     logged = read_as_logged(log, machine_file, unread="loss")
@@ -148,8 +154,28 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     contacts = any_contacts(recording, rules)
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
+    latencies = audit(recording, machine_file.machine, contacts)
+    findings += latency_findings(latencies)
     found = worst_first(findings)
-    return Info(str(log), logged.format, logged.details, tuple(channels), found, logged.dialect)
+    details, origin = logged.details, recording.origin
+    return Info(str(log), logged.format, details, tuple(channels), found, logged.dialect, latencies, origin)
+
+
+def common_latencies(surveys: Sequence[Info]) -> list[Finding]:
+    """Return how late channels are over several logs that were recorded with the same clocks.
+
+    Parameters
+    ----------
+    surveys : sequence of Info
+        The logs, surveyed with a machine file.
+
+    Returns
+    -------
+    list of Finding
+        One per pair of channels that at least two of the logs show.
+    """
+    logs, origins = [survey.latencies for survey in surveys], [survey.origin for survey in surveys]
+    return latency_findings(pooled_latencies(logs, origins))
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:

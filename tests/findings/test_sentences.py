@@ -24,6 +24,7 @@ from cdtool.findings import (
     motion,
     parts,
     scoring,
+    synchronisation,
     tables,
     truth,
     worst_first,
@@ -552,6 +553,36 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (truth.InProgress(0.75), "a contact is in progress when it begins, until 0.750 s: its onset is not recorded"),
+    # synchronisation
+    (
+        synchronisation.ChannelShift(
+            "", "position", "momentum balance", 3.1e-3, 2.4e-3, 3.9e-3, 301.2, "contact", 11, 12, (41e-6, 36e-6, 45e-6)
+        ),
+        (
+            "load cell late by 3.1 ms (2.4 to 3.9) against the position in the momentum balance, from 11 of 12 "
+            "contacts, at 301.2 s; drift 41 ppm (36 to 45); one kind of contact: clock, filters and mechanical delay "
+            "cannot be told apart"
+        ),
+    ),
+    (
+        synchronisation.ChannelShift(
+            "", "speed", "two masses", -8e-3, -9e-3, -7e-3, 2.0, "contact", 8, 8, None, -8.5e-3, -7.5e-3
+        ),
+        (
+            "load cell early by 8.0 ms (7.0 to 9.0) against the speed in the balance of motor and load, from 8 "
+            "contacts; -8.5 ms in stiff and -7.5 ms in soft contacts: a clock's offset is the same in both"
+        ),
+    ),
+    (
+        synchronisation.ChannelShift(
+            "elbow", "position", "derivative", 4.86e-3, 4.79e-3, 4.92e-3, 2.0, "section", 5, 5
+        ),
+        "late by 4.86 ms (4.79 to 4.92) against the position of elbow, from 5 sections",
+    ),
+    (
+        synchronisation.ShiftNotAssessable("", "position", "correlation 0.45", 3),
+        "latency against the position not assessable in 3 events: correlation 0.45",
+    ),
     # scoring
     (
         scoring.OnsetUnseen(2, 0.03, 5.0, 0.03),
