@@ -146,7 +146,21 @@ SENTENCES: list[tuple[Fact, str]] = [
         clocks.StandingClock(400, named=True),
         "named as a clock, but all of its 400 stamps are the same: the clock stands still",
     ),
-    (clocks.CoarseStamps(0.501, named=False), "50.1 % of its stamps repeat: a coarse clock"),
+    (clocks.CoarseStamps(0.501, named=True), "named as a clock, but 50.1 % of its stamps repeat: a coarse clock"),
+    (
+        clocks.CoarseStamps(0.501, named=False),
+        (
+            "50.1 % of its stamps repeat: a coarse clock; choose other stamps in a machine file: "
+            "[channels.mcap] time = { clock = ... }"
+        ),
+    ),
+    (
+        clocks.ClockFactor("elbow", 1000.0, 998.0, "ms and s"),
+        (
+            "the integral of the speed of elbow is 1000 times the position, and the acceleration 998 times the speed's "
+            "derivative: a factor as between ms and s in both points to the clock's unit, in [channels] time"
+        ),
+    ),
     (clocks.EmptyClock(), "named as a clock, but it contains no time stamp"),
     (clocks.BackwardClock(12), "named as a clock, but it runs backward at 12 of its steps"),
     (
@@ -510,6 +524,13 @@ SENTENCES: list[tuple[Fact, str]] = [
         (
             "accelerometer has the wrong scale (slope 5, correlation 0.98 over the speed's derivative): "
             "check unit and ratio"
+        ),
+    ),
+    (
+        motion.AccelerometerScaleWrong("", 0.001, 0.98, as_between="mm and m, or ms and s"),
+        (
+            "accelerometer has the wrong scale (slope 0.001, correlation 0.98 over the speed's derivative): "
+            "check unit and ratio (a factor as between mm and m, or ms and s)"
         ),
     ),
     # truth
