@@ -93,3 +93,18 @@ class ShiftNotAssessable(Fact):
         of = f" of {self.joint}" if self.joint else ""
         events = f" in {counted(self.examined, 'event')}" if self.examined else ""
         return f"latency against the {self.reference}{of} not assessable{events}: {self.reason}"
+
+
+@frozen
+class MeasuredSynchronisation(Fact):
+    """The load cell's synchronisation [s] as measured on all logs; `shown` is the sentence of the audit."""
+
+    synchronisation: float
+    shown: str
+
+    def sentence(self) -> str:
+        """Return the audit's sentence, and what follows for latencies."""
+        return (
+            f"synchronisation measured: {self.shown}; latencies are not corrected, their resolution includes "
+            f"{1e3 * self.synchronisation:.2f} ms"
+        )

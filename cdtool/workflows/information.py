@@ -14,7 +14,6 @@ import numpy as np
 from cdtool.clock.stamps import COARSE_SHARE, missing_findings
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
-from cdtool.evaluation.synchronisation.latency import ChannelLatency
 from cdtool.findings import Fact, Finding, worst_first
 from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
 from cdtool.findings.truth import InProgress
@@ -27,9 +26,9 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.log_checks.log_findings import log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
-from cdtool.workflows.log_checks.synchronisation import latency_findings, pooled_latencies
 
 if TYPE_CHECKING:
+    from cdtool.evaluation.synchronisation.latency import ChannelLatency
     from cdtool.ingest.log_statistics import LogStatistics
 
 
@@ -141,6 +140,7 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
     from cdtool.evaluation.synchronisation.audit import audit
     from cdtool.ingest.reading import read_as_logged
+    from cdtool.workflows.log_checks.synchronisation import latency_findings
 
     logged = read_as_logged(log, machine_file, unread="loss")
     recording = logged.on_load_side(machine_file.machine)
@@ -174,6 +174,10 @@ def common_latencies(surveys: Sequence[Info]) -> list[Finding]:
     list of Finding
         One per pair of channels that at least two of the logs show.
     """
+    if not any(survey.latencies for survey in surveys):
+        return []
+    from cdtool.workflows.log_checks.synchronisation import latency_findings, pooled_latencies
+
     logs, origins = [survey.latencies for survey in surveys], [survey.origin for survey in surveys]
     return latency_findings(pooled_latencies(logs, origins))
 

@@ -26,6 +26,7 @@ from cdtool.registry import plugin_packages
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
+from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Scored, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import shown_path
@@ -96,13 +97,14 @@ def score(
     given = read_triggers(Path(triggers))
     names = tuple(given.rows)
     setup = read_benchmark_file(benchmark, learning=False, also_known=names)
+    setup, measured = with_synchronisation(setup, jobs)
     base = setup.path.parent
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     known = {shown_path(path, base) for _, path in work}
     said, strangers = given.assigned(known)
     gathered = Gathering(setup, names, {}, {})
     gathered.skipped += [Skipped(name, _STRANGER) for name in strangers]
-    gathered.findings += _unlisted(given, said, known, listed_only)
+    gathered.findings += [*measured, *_unlisted(given, said, known, listed_only)]
 
     if listed_only:
         work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]

@@ -604,6 +604,13 @@ SENTENCES: list[tuple[Fact, str]] = [
         synchronisation.ShiftNotAssessable("", "position", "correlation 0.45", 3),
         "latency against the position not assessable in 3 events: correlation 0.45",
     ),
+    (
+        synchronisation.MeasuredSynchronisation(4.2e-3, "load cell late by 3.1 ms (2.0 to 4.2) against the position"),
+        (
+            "synchronisation measured: load cell late by 3.1 ms (2.0 to 4.2) against the position; latencies are not "
+            "corrected, their resolution includes 4.20 ms"
+        ),
+    ),
     # scoring
     (
         scoring.OnsetUnseen(2, 0.03, 5.0, 0.03),

@@ -37,6 +37,7 @@ from cdtool.workflows.benchmark.benchmark_file import (
 )
 from cdtool.workflows.benchmark.learned_thresholds import learn_thresholds, that_can_run
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
+from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import detect_with, score_log
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import RunReading, load_runs, shown_path
@@ -118,6 +119,7 @@ def benchmark(
     compile_loaded()
     begin = perf_counter()
     base = setup.path.parent
+    setup, measured = with_synchronisation(setup, jobs)
     learn = load_runs(setup.learn, machine_file, RunReading(setup.operations, onset=setup.onset, base=base, jobs=jobs))
     seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
     left_out: list[RecordingFinding] = []
@@ -136,7 +138,7 @@ def benchmark(
     gathered = Gathering(setup, setup.detectors, factors, sources)
     gathered.skipped += [*learn.skipped, *learned.skipped]
     gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
-    gathered.findings += [*learn.findings, *left_out, *learned.not_assessable]
+    gathered.findings += [*measured, *learn.findings, *left_out, *learned.not_assessable]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     normals = NormalMotions(normal_motions(learn.operations), Absence.FEW_RUNS)
     scoring = _LogScoring(setup, tuple(used), learned.thresholds, learned.unusable, factors, learn.ranges, normals)

@@ -43,7 +43,8 @@ class ImpactGroup:
 class BenchmarkFile:
     """A validated benchmark file with resolved globs; `impacts` are the scored groups, hold-out last.
 
-    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock.
+    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock, or
+    not known before the logs are audited if `measures_synchronisation`.
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
     versions were read.
     """
@@ -70,6 +71,7 @@ class BenchmarkFile:
     digest: str
     window: float = 1.0
     migrated: tuple[str, ...] = ()
+    measures_synchronisation: bool = False
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -86,7 +88,7 @@ class BenchmarkFile:
             "operations": self.operations,
             "watched_joints": ", ".join(self.watched) or None,
             "label_file": self.labels.source if self.labels else None,
-            "synchronisation_s": self.synchronisation,
+            "synchronisation_s": "measured" if self.measures_synchronisation else self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
         }
@@ -151,6 +153,7 @@ def read_benchmark_file(
         activation=_read_activation(root.table("activation")),
         labels=labels_of(onset, base, _scored(impacts, HOLDOUT)),
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
+        measures_synchronisation=_measures_synchronisation(onset),
         onset=read_onset(onset),
         mass_before_cell=mass_before_cell,
         learn=learn,
@@ -170,6 +173,15 @@ def read_benchmark_file(
     refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
     return benchmark
+
+
+def _measures_synchronisation(onset: Table) -> bool:
+    measured = onset.choice("synchronisation", ("stated", "measured"), "stated") == "measured"
+    if measured and "synchronisation_s" in onset:
+        raise onset.fault(
+            "synchronisation", "is measured, but synchronisation_s is stated too", "remove one of the two"
+        )
+    return measured
 
 
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
