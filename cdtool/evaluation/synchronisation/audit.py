@@ -43,6 +43,9 @@ _MOST_EVENTS = 0.75
 _LEAST_AGREEING = 3
 # Contacts that are examined: spread over the log.
 _MOST_CONTACTS = 200
+# A force that rises within a sample period is not resolved: its delay is uncertain by this share of the period, and by
+# less the longer the rise is. Without noise, contacts at 30 Hz that rise in 20 to 100 ms scatter so much.
+_ALIASING = 0.1
 # A delay whose standard error is larger than this [s] says nothing.
 _LARGEST_ERROR = 0.05
 
@@ -307,6 +310,10 @@ def _event(observed: _Part, parts: Sequence[_Part], window: _Window, width: floa
     delay = delay_of(y, SmoothSignal(wide, predicted), window.start, window.end, longest, is_contact)
     if delay.known and delay.error > _LARGEST_ERROR:
         delay = EventDelay(delay.time, math.nan, math.nan, delay.explained, reason="the signals do not change enough")
+    if delay.known and is_contact:
+        period = max(observed.period, *(part.period for part in parts))
+        aliasing = _ALIASING * period * min(period / window.rise, 1.0)
+        delay = replace(delay, error=math.hypot(delay.error, aliasing))
     return TimedEvent(delay, window.rise)
 
 

@@ -18,6 +18,9 @@ from cdtool.recording import BoolArray, FloatArray
 
 # From so many events on, intervals include the scatter between events, and a drift can be estimated.
 LEAST_EVENTS = 4
+# Of few events' free residuals this share counts: nothing else shows that a standard error is too small. With all of
+# them, intervals of single contacts at 30 to 125 Hz contain the true offset in 82 to 92 of 100 simulated logs.
+_SHARE_OF_FREEDOM = 0.5
 # An event further from the others than this many standard deviations (robust), and than its own errors, is not used.
 _OUTLIER = 6.0
 _LEVEL = 0.95
@@ -99,7 +102,7 @@ def _quantile(freedom: float) -> float:
 def _few(events: Sequence[EventDelay], used: BoolArray) -> float:
     """Return the degrees of freedom of the standard errors of few events."""
     free: float = math.fsum(event.freedom for event, counts in zip(events, used, strict=True) if counts)
-    return max(free, 1.0)
+    return max(_SHARE_OF_FREEDOM * free, 1.0)
 
 
 def _design(times: FloatArray, with_drift: bool) -> FloatArray:

@@ -24,7 +24,7 @@ _UNKNOWN = Interval(math.nan, math.nan, math.nan)
 # The rise times of soft contacts are at least so many times those of stiff ones.
 _KINDS_APART = 2.5
 # An interval is clearly narrower than another one from this ratio.
-_PREFERENCE = 0.7
+_PREFERENCE = 0.5
 # A drift is not assessable if its interval is wider than this to each side [s/s]: no clock drifts so much.
 _WIDEST_DRIFT = 1e-3
 
