@@ -42,8 +42,11 @@ _TIMES = {
     "min and s": "min and s",
     "h and s": "h and s",
 }
-# A log shorter than three windows is divided into so many: its clock may have the wrong unit.
-_PARTS = 20
+# A log shorter than the first number of windows, or of longer sample periods, has other ones, as its clock may have the
+# wrong unit: of so many sample periods, and at least so many windows.
+_FEWEST, _PERIODS, _PARTS = 3.0, 200.0, 20
+# A log with a long gap has at most so many windows: memory and time are bounded.
+_MOST = 1_000_000
 # A factor between units is named if the slope is within this share of it.
 _NEAR = 0.15
 
@@ -91,12 +94,13 @@ def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) ->
     found = []
     # A single joint is not compared with others.
     ranges = [_range(speed.values[:, j]) for j in range(len(recording.joints))] if len(recording.joints) > 1 else [0.0]
+    window = _window(speed, acceleration)
     for j, joint in enumerate(recording.joints):
         name = joint if len(recording.joints) > 1 else ""
         if ranges[j] < _HARDLY * max(ranges):
             found.append(Finding(AccelerometerUncheckable(name, "joint hardly moves"), "acceleration", "note"))
             continue
-        fact = _compare(*_pairs(speed, acceleration, j), name)
+        fact = _compare(*_pairs(speed, acceleration, j, window), name)
         is_wrong = isinstance(fact, AccelerometerTurned | AccelerometerScaleWrong)
         found.append(Finding(fact, "acceleration", "warning" if is_wrong else "note"))
     return found
@@ -139,14 +143,21 @@ def _fits(slope: float) -> bool:
     return 0.7 < slope < 1.4
 
 
-def _pairs(speed: Series, acceleration: Series, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return the change of speed per time and the mean acceleration in consecutive windows, (w,) each."""
+def _window(speed: Series, acceleration: Series) -> float:
+    """Return the length of the windows to compare [s]; 0 if the log is too short."""
+    length = min(speed.time[-1], acceleration.time[-1]) - max(speed.time[0], acceleration.time[0])
+    period = float(np.nanmax((speed.period, acceleration.period, 0.0)))
+    if length > _FEWEST * _WINDOW and period <= _WINDOW:
+        return max(_WINDOW, float(length) / _MOST)
+    window = min(_PERIODS * period, float(length) / _PARTS)
+    return window if window > 2.0 * period else 0.0
+
+
+def _pairs(speed: Series, acceleration: Series, joint: int, window: float) -> tuple[FloatArray, FloatArray]:
+    """Return the change of speed per time and the mean acceleration in consecutive windows [s], (w,) each."""
     start, end = max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1])
-    window = _WINDOW
-    if end - start <= 3.0 * _WINDOW:
-        window = (end - start) / _PARTS
-        if not window > 2.0 * max(speed.period, acceleration.period):
-            return np.empty(0), np.empty(0)
+    if window <= 0.0:
+        return np.empty(0), np.empty(0)
     edges = np.arange(start, end, window)
     if len(edges) < 3:
         return np.empty(0), np.empty(0)

@@ -11,7 +11,7 @@ from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings.clocks import ClockFactor
 from cdtool.findings.motion import AccelerometerScaleWrong, SpeedUnitDoubtful
 from cdtool.recording import FloatArray, Recording, Series
-from cdtool.workflows.log_checks.log_findings import log_findings
+from cdtool.workflows.log_checks.log_findings import _window, log_findings
 from cdtool.workflows.log_checks.motion_check import units_apart
 
 
@@ -41,6 +41,7 @@ def findings(clock: float = 1.0, **factors: float) -> dict[type, object]:
         (1000.0, "ms and s"),
         (1e-3, "ms and s"),
         (1e6, "us and s"),
+        (1e-6, "us and s"),
         (1 / 60.0, "min and s"),
         (60.0, "min and s"),
         (1 / 3600.0, "h and s"),
@@ -72,6 +73,13 @@ def test_a_wrong_speed_alone_blames_the_clock_only_if_both_factors_are_equal():
 
 def test_correct_units_cause_no_warning():
     assert not findings()
+
+
+def test_a_gap_of_centuries_needs_no_more_windows():
+    time, *values = stroke()
+    time = np.where(time > 3.0, time + 1e10, time)
+    channels = {"speed": Series(time, values[1], "m/s"), "acceleration": Series(time, values[2], "m/s2")}
+    assert _window(channels["speed"], channels["acceleration"]) == pytest.approx(1e4)
 
 
 @pytest.mark.parametrize(
