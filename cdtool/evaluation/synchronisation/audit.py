@@ -185,10 +185,10 @@ def _sections(start: float, end: float, period: float, predictor: _Part) -> list
 def _load_cell_latencies(
     recording: Recording, machine: Machine, contacts: Sequence[Contact], others: Sequence[ChannelLatency]
 ) -> list[ChannelLatency]:
-    windows = _contact_windows(recording["force"], contacts)
+    windows = _contact_windows(recording["force"], contacts) if len(recording["force"]) > 2 else []
     bases = [name for name in ("position", "speed") if _is_measured(recording, name)]
     if not bases or not windows:
-        reason = "no contact" if bases else "neither position nor speed is measured"
+        reason = "no contact that the load cell shows" if bases else "neither position nor speed is measured"
         return [ChannelLatency("force", bases[0] if bases else "position", "deceleration", reason=reason)]
     found = []
     for base in bases:
@@ -214,7 +214,7 @@ def _rise_time(force: Series, contact: Contact) -> float:
     over = np.abs(part.values[:, 0] - (contact.rest if math.isfinite(contact.rest) else 0.0))
     known = np.isfinite(over)
     if not known.any():
-        return math.nan
+        return 0.5 * force.period
     high = np.flatnonzero(known & (over >= 0.5 * float(np.max(over[known]))))
     return max(float(part.time[high[0]]) - contact.start, 0.5 * force.period)
 

@@ -128,6 +128,20 @@ def test_unusable_channels_are_not_assessable(count, values):
     assert found and not any(item.assessable for item in found) and all(item.reason for item in found)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("channel", ["force", "torque", "acceleration"])
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_a_channel_of_a_few_samples_beside_good_ones_causes_no_warning(channel, count):
+    time = np.arange(3000) * 1e-3
+    units = {"position": "m", "speed": "m/s", "acceleration": "m/s2", "torque": "N", "force": "N"}
+    channels = {name: Series(time, np.sin(3.0 * time), unit) for name, unit in units.items()}
+    few = 0.5 + 0.1 * np.arange(count)
+    channels[channel] = Series(few, few, units[channel])
+    outside = [Contact(0.5, 0.6, 1e-3, 10.0), Contact(0.0, 0.01, 1e-3, 1.0), Contact(50.0, 50.1, 1e-3, 1.0)]
+    found = audit(Recording("log", "log", ("axis",), channels), axis(), outside)
+    assert {item.channel for item in found} >= {"speed", "force"}
+
+
 def test_logs_with_one_contact_each_are_pooled():
     each = []
     for seed in range(5):
