@@ -23,10 +23,11 @@ def info(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a log's channels, units, rates, duration, gaps, and warnings.
+    """Show a log's channels, units, rates, duration, gaps, and warnings; with a machine file, also how late they are.
 
     Example: cdtool info sample_logs/gate/stiff/01.csv --machine sample_logs/gate/machine.toml
     """
+    from cdtool.workflows.information import common_latencies
     from cdtool.workflows.information import info as survey
 
     done: list[Info] = []
@@ -42,6 +43,10 @@ def info(
     else:
         for item in done:
             _show(item)
+        if common := common_latencies(done):
+            typer.echo(f"\nAll {len(done)} logs, if their clocks are the same:\n")
+            for finding in common:
+                typer.echo(f"{finding.severity}: {plain(str(finding))}")
     leave_with((finding for item in done for finding in item.findings), facts if done else [Fact.NOTHING_USABLE])
 
 

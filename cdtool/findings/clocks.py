@@ -9,6 +9,8 @@ from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.frozen import frozen
 from cdtool.plain_text import counted, first_of
 
+# Of a table's columns, what to do follows from the finding that no clock, or which one, is used.
+_OTHER_STAMPS = "; choose other stamps in a machine file: [channels.mcap] time = { clock = ... }"
 _OWN_CLOCKS = 'time = { column = "time", unit = "s" }'
 
 
@@ -299,6 +301,29 @@ class ClockUnitContradicted(Fact):
 
 
 @frozen
+class ClockFactor(Fact):
+    """Two pairs of channels disagree by the same factor, as two units of time do that are named `as_between`.
+
+    `by_speed` is the integral of the speed over the position, `by_acceleration` the acceleration over the derivative of
+    the speed; the clock alone is part of both. `joint` is empty where there is but one.
+    """
+
+    joint: str
+    by_speed: float
+    by_acceleration: float
+    as_between: str
+
+    def sentence(self) -> str:
+        """Return both factors, and what to check."""
+        of = f" of {self.joint}" if self.joint else ""
+        return (
+            f"the integral of the speed{of} is {self.by_speed:.4g} times the position, and the acceleration "
+            f"{self.by_acceleration:.4g} times the speed's derivative: a factor as between {self.as_between} in both "
+            "points to the clock's unit, in [channels] time"
+        )
+
+
+@frozen
 class NoClock(TemplateFact):
     """No column of a table looks like its clock."""
 
@@ -321,7 +346,10 @@ class StandingClock(Fact):
 
     def sentence(self) -> str:
         """Return how many stamps."""
-        return _named(f"all of its {self.stamps} stamps are the same: the clock stands still", self.named)
+        remedy = (
+            "; name another one, or the sample rate, in [channels] time of a machine file" if not self.named else ""
+        )
+        return _named(f"all of its {self.stamps} stamps are the same: the clock stands still{remedy}", self.named)
 
 
 @frozen
@@ -333,7 +361,8 @@ class CoarseStamps(Fact):
 
     def sentence(self) -> str:
         """Return the share."""
-        return _named(f"{100.0 * self.share:.3g} % of its stamps repeat: a coarse clock", self.named)
+        remedy = "" if self.named else _OTHER_STAMPS
+        return _named(f"{100.0 * self.share:.3g} % of its stamps repeat: a coarse clock{remedy}", self.named)
 
 
 @frozen

@@ -173,11 +173,20 @@ class AccelerometerScaleUncheckable(AccelerometerFit):
 
 @frozen
 class AccelerometerScaleWrong(AccelerometerFit):
-    """The scale is wrong; the log may contain another unit: m/s2 where g is stated, or g."""
+    """The scale is wrong; the log may contain another unit: m/s2 where g is stated, or g.
+
+    The slope may also be a factor as two units differ by that are named `as_between`, of length, angle or time.
+    """
 
     may_hold: Literal["m/s2", "g", ""] = ""
+    as_between: str = ""
 
     def sentence(self) -> str:
         """Return the fit, and the next step."""
-        advice = {"m/s2": "the log may contain m/s2, not g", "g": "the log may contain g", "": "check unit and ratio"}
+        between = f" (a factor as between {self.as_between})" if self.as_between else ""
+        advice = {
+            "m/s2": "the log may contain m/s2, not g",
+            "g": "the log may contain g",
+            "": f"check unit and ratio{between}",
+        }
         return f"accelerometer{_of(self.joint)} has the wrong scale ({self.figures}): {advice[self.may_hold]}"

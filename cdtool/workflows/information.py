@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -31,6 +31,7 @@ from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 from cdtool.workflows.log_checks.placeholders import placeholder_findings
 
 if TYPE_CHECKING:
+    from cdtool.evaluation.synchronisation.latency import ChannelLatency
     from cdtool.ingest.log_statistics import LogStatistics
 
 
@@ -53,7 +54,8 @@ class ChannelInfo:
 class Info:
     """A log: its columns as they are in the file, or with a machine file its channels on the load side.
 
-    `dialect` is the format of a text table, as `[csv]` of a machine file; empty for other formats.
+    `dialect` is the format of a text table, as `[csv]` of a machine file; empty for other formats. `latencies` are
+    those of the sync audit, with a machine file; `origin` [s] is added to a log's times to obtain its own clock.
     """
 
     source: str
@@ -62,6 +64,8 @@ class Info:
     channels: tuple[ChannelInfo, ...]
     findings: tuple[Finding, ...]
     dialect: str = ""
+    latencies: tuple[ChannelLatency, ...] = ()
+    origin: float = 0.0
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:
@@ -73,7 +77,7 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
         The log, or a folder with its parts.
     machine : str, Path or MachineFile, optional
         With a machine file the mapped channels are surveyed on the load side, cut into operations, and checked against
-        each other; they are held in memory. Without one, the columns as logged, piece by piece.
+        each other, also how late they are; they are held in memory. Without one, the columns as logged, piece by piece.
 
     Returns
     -------
@@ -141,7 +145,9 @@ def _described(column: Column, statistics: LogStatistics, table_clock: ClockStat
 
 
 def _mapped(log: Path, machine_file: MachineFile) -> Info:
+    from cdtool.evaluation.synchronisation.audit import audit
     from cdtool.ingest.reading import read_as_logged
+    from cdtool.workflows.log_checks.synchronisation import latency_findings
 
     logged = read_as_logged(log, machine_file, unread="loss")
     recording = logged.on_load_side(machine_file.machine)
@@ -157,8 +163,32 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
     findings += placeholder_findings(recording, machine_file)
+    latencies = audit(recording, machine_file.machine, contacts)
+    findings += latency_findings(latencies)
     found = worst_first(findings)
-    return Info(str(log), logged.format, logged.details, tuple(channels), found, logged.dialect)
+    details, origin = logged.details, recording.origin
+    return Info(str(log), logged.format, details, tuple(channels), found, logged.dialect, latencies, origin)
+
+
+def common_latencies(surveys: Sequence[Info]) -> list[Finding]:
+    """Return how late channels are over several logs that were recorded with the same clocks.
+
+    Parameters
+    ----------
+    surveys : sequence of Info
+        The logs, surveyed with a machine file.
+
+    Returns
+    -------
+    list of Finding
+        One per pair of channels that at least two of the logs show.
+    """
+    if not any(survey.latencies for survey in surveys):
+        return []
+    from cdtool.workflows.log_checks.synchronisation import latency_findings, pooled_latencies
+
+    logs, origins = [survey.latencies for survey in surveys], [survey.origin for survey in surveys]
+    return latency_findings(pooled_latencies(logs, origins))
 
 
 def _label(name: str, recording: Recording, joint: int) -> str:

@@ -27,6 +27,7 @@ from cdtool.registry import plugin_packages
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
+from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Scored, score_runs
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import shown_path
@@ -99,6 +100,7 @@ def score(
     given = read_triggers(Path(triggers))
     names = tuple(given.rows)
     setup = read_benchmark_file(benchmark, learning=False, also_known=names)
+    setup, measured = with_synchronisation(setup, jobs)
     base = setup.path.parent
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     runs = setup.has_runs
@@ -106,6 +108,7 @@ def score(
     said, strangers = given.assigned(known, runs)
     gathered = Gathering(setup, names, {}, {})
     gathered.skipped += [Skipped(name, _STRANGER) for name in strangers]
+    gathered.findings += measured
     if not runs:
         gathered.findings += _unlisted(given.path, said, known, listed_only)
         if listed_only:

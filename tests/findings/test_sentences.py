@@ -26,6 +26,7 @@ from cdtool.findings import (
     placeholders,
     runs,
     scoring,
+    synchronisation,
     tables,
     truth,
     worst_first,
@@ -155,7 +156,21 @@ SENTENCES: list[tuple[Fact, str]] = [
         clocks.StandingClock(400, named=True),
         "named as a clock, but all of its 400 stamps are the same: the clock stands still",
     ),
-    (clocks.CoarseStamps(0.501, named=False), "50.1 % of its stamps repeat: a coarse clock"),
+    (clocks.CoarseStamps(0.501, named=True), "named as a clock, but 50.1 % of its stamps repeat: a coarse clock"),
+    (
+        clocks.CoarseStamps(0.501, named=False),
+        (
+            "50.1 % of its stamps repeat: a coarse clock; choose other stamps in a machine file: "
+            "[channels.mcap] time = { clock = ... }"
+        ),
+    ),
+    (
+        clocks.ClockFactor("elbow", 1000.0, 998.0, "ms and s"),
+        (
+            "the integral of the speed of elbow is 1000 times the position, and the acceleration 998 times the speed's "
+            "derivative: a factor as between ms and s in both points to the clock's unit, in [channels] time"
+        ),
+    ),
     (clocks.EmptyClock(), "named as a clock, but it contains no time stamp"),
     (clocks.BackwardClock(12), "named as a clock, but it runs backward at 12 of its steps"),
     (
@@ -589,6 +604,13 @@ SENTENCES: list[tuple[Fact, str]] = [
             "check unit and ratio"
         ),
     ),
+    (
+        motion.AccelerometerScaleWrong("", 0.001, 0.98, as_between="mm and m, or ms and s"),
+        (
+            "accelerometer has the wrong scale (slope 0.001, correlation 0.98 over the speed's derivative): "
+            "check unit and ratio (a factor as between mm and m, or ms and s)"
+        ),
+    ),
     # truth
     (
         truth.FollowsTorque("elbow", 0.999),
@@ -630,6 +652,43 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (truth.InProgress(0.75), "a contact is in progress when it begins, until 0.750 s: its onset is not recorded"),
+    # synchronisation
+    (
+        synchronisation.ChannelShift(
+            "", "position", "momentum balance", 3.1e-3, 2.4e-3, 3.9e-3, 301.2, "contact", 11, 12, (41e-6, 36e-6, 45e-6)
+        ),
+        (
+            "load cell late by 3.1 ms (2.4 to 3.9) against the position in the momentum balance, from 11 of 12 "
+            "contacts, at 301.2 s; drift 41 ppm (36 to 45); one kind of contact: clock, filters and mechanical delay "
+            "cannot be told apart"
+        ),
+    ),
+    (
+        synchronisation.ChannelShift(
+            "", "speed", "two masses", -8e-3, -9e-3, -7e-3, 2.0, "contact", 8, 8, None, -8.5e-3, -7.5e-3
+        ),
+        (
+            "load cell early by 8.0 ms (7.0 to 9.0) against the speed in the balance of motor and load, from 8 "
+            "contacts; -8.5 ms in stiff and -7.5 ms in soft contacts: a clock's offset is the same in both"
+        ),
+    ),
+    (
+        synchronisation.ChannelShift(
+            "elbow", "position", "derivative", 4.86e-3, 4.79e-3, 4.92e-3, 2.0, "section", 5, 5
+        ),
+        "late by 4.86 ms (4.79 to 4.92) against the position of elbow, from 5 sections",
+    ),
+    (
+        synchronisation.ShiftNotAssessable("", "position", "correlation 0.45", 3),
+        "latency against the position not assessable in 3 events: correlation 0.45",
+    ),
+    (
+        synchronisation.MeasuredSynchronisation(4.2e-3, "load cell late by 3.1 ms (2.0 to 4.2) against the position"),
+        (
+            "synchronisation measured: load cell late by 3.1 ms (2.0 to 4.2) against the position; latencies are not "
+            "corrected, their resolution includes 4.20 ms"
+        ),
+    ),
     # scoring
     (
         scoring.OnsetUnseen(2, 0.03, 5.0, 0.03),

@@ -37,6 +37,7 @@ from cdtool.workflows.benchmark.benchmark_file import (
 )
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds, that_can_run
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
+from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Detect, detect_with, score_runs
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import load_runs, shown_path
@@ -117,6 +118,7 @@ def benchmark(
     used = [machine_file.detector(name) for name in setup.detectors]
     compile_loaded()
     begin = perf_counter()
+    setup, measured = with_synchronisation(setup, jobs)
     learn = load_runs(setup.learn, machine_file, setup.run_reading(jobs))
     seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
     left_out: list[RecordingFinding] = []
@@ -135,7 +137,7 @@ def benchmark(
     gathered = Gathering(setup, setup.detectors, factors, sources)
     gathered.skipped += [*learn.skipped, *learned.skipped]
     gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
-    gathered.findings += [*learn.findings, *left_out, *learned.not_assessable]
+    gathered.findings += [*measured, *learn.findings, *left_out, *learned.not_assessable]
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     normals = normals_for(learn.operations, setup.rule)
     thresholds = ThresholdsByLog.of(setup, learned)

@@ -54,7 +54,8 @@ class ImpactGroup:
 class BenchmarkFile:
     """A validated benchmark file with resolved globs; `impacts` are the scored groups, hold-out last.
 
-    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock.
+    `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock, or
+    not known before the logs are audited if `measures_synchronisation`.
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
     versions were read. `sections` are the parts of scored logs that are used, `learned_sections` those of the logs
     learned from, which end `guard` [s] before their first contact; None: they have no contact.
@@ -85,6 +86,7 @@ class BenchmarkFile:
     sections: Mapping[Path, LogSection] = field(default_factory=dict)
     learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
+    measures_synchronisation: bool = False
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -104,7 +106,7 @@ class BenchmarkFile:
             "watched_joints": ", ".join(self.watched) or None,
             "label_file": self.labels.source if self.labels else None,
             **({"not_contacts": list(self.labels.not_contacts)} if self.labels and self.labels.not_contacts else {}),
-            "synchronisation_s": self.synchronisation,
+            "synchronisation_s": "measured" if self.measures_synchronisation else self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
             "sections": self._in_words(self.sections),
@@ -212,6 +214,7 @@ def read_benchmark_file(
         activation=_read_activation(root.table("activation")),
         labels=labels,
         synchronisation=onset.number("synchronisation_s", 0.0, minimum=0.0),
+        measures_synchronisation=_measures_synchronisation(onset),
         onset=read_onset(onset),
         mass_before_cell=mass_before_cell,
         learn=tuple(learn),
@@ -243,6 +246,15 @@ def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:
     """Return the kinds of contacts that a limit may name; empty if none has a kind."""
     kinds = dict.fromkeys((*machine_file.label_kinds, *(labels.kinds if labels else ())))
     return (*kinds, "") if kinds else ()
+
+
+def _measures_synchronisation(onset: Table) -> bool:
+    measured = onset.choice("synchronisation", ("stated", "measured"), "stated") == "measured"
+    if measured and "synchronisation_s" in onset:
+        raise onset.fault(
+            "synchronisation", "is measured, but synchronisation_s is stated too", "remove one of the two"
+        )
+    return measured
 
 
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:

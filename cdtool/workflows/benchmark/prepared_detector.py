@@ -19,6 +19,7 @@ from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
+from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
 from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import normals_for, normals_of, notes_on
@@ -30,7 +31,7 @@ class PreparedBenchmark:
 
     `learned` has the hashes of the logs learned from, `ranges` the ranges of their channels and `normals` their
     normal motion. `skipped` lists the runs left out in learning, with the reason; `losses` lists what is lost of the
-    others. `notes` concern a signature file of an earlier version.
+    others. `notes` concern a signature file of an earlier version, and a measured synchronisation.
     """
 
     setup: BenchmarkFile
@@ -76,7 +77,7 @@ def prepare_benchmark(
     file, SignatureError if nothing can be learned or the signature does not belong, UsageError for an ambiguous
     detector.
     """
-    setup = read_benchmark_file(file, detectors=(detector,) if detector else ())
+    setup, measured = with_synchronisation(read_benchmark_file(file, detectors=(detector,) if detector else ()))
     machine_file = setup.machine_file
     if signature is not None:
         stored = read_signature(signature)
@@ -98,7 +99,7 @@ def prepare_benchmark(
             run,
             stored.plausible,
             normals_of(stored),
-            tuple(notes_on(stored)),
+            (*measured, *notes_on(stored)),
         )
     setup = with_detectors(setup, [_chosen(setup, detector)])
     instance = machine_file.detector(setup.detectors[0])
@@ -122,6 +123,7 @@ def prepare_benchmark(
         run,
         runs.ranges,
         normals,
+        notes=tuple(measured),
         skipped=(*runs.skipped, *fitted.skipped),
         losses=tuple(item for item in runs.findings if item.is_loss),
     )

@@ -16,15 +16,17 @@ from cdtool.evaluation.statistics.correlation import correlation
 from cdtool.evaluation.truth.doubts import truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Fact, Finding, worst_first
+from cdtool.findings.clocks import ClockFactor
 from cdtool.findings.motion import (
     AccelerometerFit,
     AccelerometerScaleUncheckable,
     AccelerometerScaleWrong,
     AccelerometerTurned,
     AccelerometerUncheckable,
+    SpeedUnitDoubtful,
 )
 from cdtool.recording import Contact, FloatArray, Recording, Series
-from cdtool.workflows.log_checks.motion_check import motion_findings
+from cdtool.workflows.log_checks.motion_check import motion_findings, units_apart
 
 # Length of the windows over which the change of speed and the mean acceleration are compared [s].
 _WINDOW = 0.2
@@ -33,6 +35,20 @@ _LEAST_FOR_SIGN, _LEAST_FOR_SCALE = 0.5, 0.8
 # Below this share of the fastest joint's speed range a joint hardly moves: the accelerometer shows only vibration.
 _HARDLY = 0.1
 _STANDARD_GRAVITY = 9.80665
+# Units of a clock among those that two channels may differ by.
+_TIMES = {
+    "mm and m, or ms and s": "ms and s",
+    "um and m, or us and s": "us and s",
+    "min and s": "min and s",
+    "h and s": "h and s",
+}
+# A log shorter than the first number of windows, or of longer sample periods, has other ones, as its clock may have the
+# wrong unit: of so many sample periods, and at least so many windows.
+_FEWEST, _PERIODS, _PARTS = 3.0, 200.0, 20
+# A log with a long gap has at most so many windows: memory and time are bounded.
+_MOST = 1_000_000
+# A factor between units is named if the slope is within this share of it.
+_NEAR = 0.15
 
 
 def log_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> tuple[Finding, ...]:
@@ -40,8 +56,26 @@ def log_findings(recording: Recording, contacts: Sequence[Contact], rule: OnsetR
 
     `contacts` are the log's contacts by `rule`.
     """
-    found = [*recording.findings, *motion_findings(recording), *accelerometer_findings(recording, contacts)]
+    motion = [*motion_findings(recording), *accelerometer_findings(recording, contacts)]
+    found = [*recording.findings, *clock_findings(motion), *motion]
     return worst_first(dict.fromkeys([*found, *truth_findings(recording, contacts, rule)]))
+
+
+def clock_findings(motion: Sequence[Finding]) -> list[Finding]:
+    """Return one finding per joint whose speed and acceleration both disagree by the same factor of units of time.
+
+    `motion` are the findings about speed and accelerometer.
+    """
+    speeds = {item.fact.joint: item.fact for item in motion if isinstance(item.fact, SpeedUnitDoubtful)}
+    found = []
+    for fact in (item.fact for item in motion):
+        if not isinstance(fact, AccelerometerScaleWrong) or fact.joint not in speeds:
+            continue
+        factor = speeds[fact.joint].integrated / speeds[fact.joint].spanned
+        units = _TIMES.get(units_apart(max(factor, 1.0 / factor)), "")
+        if units and _fits(fact.slope / factor):
+            found.append(Finding(ClockFactor(fact.joint, factor, fact.slope, units), "time"))
+    return found
 
 
 def log_warnings(recording: Recording, contacts: Sequence[Contact], rule: OnsetRule) -> list[RecordingFinding]:
@@ -60,12 +94,13 @@ def accelerometer_findings(recording: Recording, contacts: Sequence[Contact]) ->
     found = []
     # A single joint is not compared with others.
     ranges = [_range(speed.values[:, j]) for j in range(len(recording.joints))] if len(recording.joints) > 1 else [0.0]
+    window = _window(speed, acceleration)
     for j, joint in enumerate(recording.joints):
         name = joint if len(recording.joints) > 1 else ""
         if ranges[j] < _HARDLY * max(ranges):
             found.append(Finding(AccelerometerUncheckable(name, "joint hardly moves"), "acceleration", "note"))
             continue
-        fact = _compare(*_pairs(speed, acceleration, j), name)
+        fact = _compare(*_pairs(speed, acceleration, j, window), name)
         is_wrong = isinstance(fact, AccelerometerTurned | AccelerometerScaleWrong)
         found.append(Finding(fact, "acceleration", "warning" if is_wrong else "note"))
     return found
@@ -100,7 +135,7 @@ def _compare(expected: FloatArray, measured: FloatArray, joint: str) -> Fact:
         return AccelerometerScaleWrong(joint, slope, r, "m/s2")
     if _fits(slope * _STANDARD_GRAVITY):
         return AccelerometerScaleWrong(joint, slope, r, "g")
-    return AccelerometerScaleWrong(joint, slope, r)
+    return AccelerometerScaleWrong(joint, slope, r, as_between=units_apart(max(slope, 1.0 / slope), _NEAR))
 
 
 def _fits(slope: float) -> bool:
@@ -108,15 +143,28 @@ def _fits(slope: float) -> bool:
     return 0.7 < slope < 1.4
 
 
-def _pairs(speed: Series, acceleration: Series, joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return the change of speed per time and the mean acceleration in consecutive windows, (w,) each."""
-    edges = np.arange(max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1]), _WINDOW)
+def _window(speed: Series, acceleration: Series) -> float:
+    """Return the length of the windows to compare [s]; 0 if the log is too short."""
+    length = min(speed.time[-1], acceleration.time[-1]) - max(speed.time[0], acceleration.time[0])
+    period = float(np.nanmax((speed.period, acceleration.period, 0.0)))
+    if length > _FEWEST * _WINDOW and period <= _WINDOW:
+        return max(_WINDOW, float(length) / _MOST)
+    window = min(_PERIODS * period, float(length) / _PARTS)
+    return window if window > 2.0 * period else 0.0
+
+
+def _pairs(speed: Series, acceleration: Series, joint: int, window: float) -> tuple[FloatArray, FloatArray]:
+    """Return the change of speed per time and the mean acceleration in consecutive windows [s], (w,) each."""
+    start, end = max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1])
+    if window <= 0.0:
+        return np.empty(0), np.empty(0)
+    edges = np.arange(start, end, window)
     if len(edges) < 3:
         return np.empty(0), np.empty(0)
     known = np.isfinite(speed.values[:, joint])
     if np.count_nonzero(known) < 2:
         return np.empty(0), np.empty(0)
-    gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / _WINDOW
+    gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / window
     measured = acceleration.values[:, joint]
     present = np.isfinite(measured)
     before = np.searchsorted(acceleration.time, edges)

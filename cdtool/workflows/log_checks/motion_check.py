@@ -40,6 +40,8 @@ _CERTAIN = 2.5
 _FACTORS = (
     (180.0 / np.pi, "deg and rad"),
     (1000.0, "mm and m, or ms and s"),
+    (1e6, "um and m, or us and s"),
+    (3600.0, "h and s"),
     (60.0 / (2.0 * np.pi), "rpm and rad/s"),
     (60.0, "min and s"),
     (6.0, "rpm and deg/s"),
@@ -77,7 +79,7 @@ def _consistency(recording: Recording) -> list[Finding]:
         if expected <= 0.0 or spanned <= 0.0:
             continue
         if not 0.8 < expected / spanned < 1.25:
-            between = _as_between(max(expected / spanned, spanned / expected))
+            between = units_apart(max(expected / spanned, spanned / expected))
             fact = SpeedUnitDoubtful(joint, expected, spanned, position.unit, speed.unit, between)
             found.append(Finding(fact, "speed"))
         elif abs(travelled) > 0.5 * spanned and np.sign(travelled) != np.sign(gained):
@@ -107,12 +109,14 @@ def _moved(values: FloatArray) -> float:
     return span if span > _ABOVE_NOISE * noise else 0.0
 
 
-def _as_between(ratio: float) -> str:
-    """Return the units that differ by this factor; empty if it is none of theirs."""
-    for factor, units in _FACTORS:
-        if abs(ratio / factor - 1.0) < 0.05:
-            return units
-    return ""
+def units_apart(ratio: float, tolerance: float = 0.05) -> str:
+    """Return the units that differ by a factor, the nearest ones within the tolerance; empty if it is none of theirs.
+
+    >>> units_apart(1000.0), units_apart(60.0), units_apart(57.3), units_apart(3.0)
+    ('mm and m, or ms and s', 'min and s', 'deg and rad', '')
+    """
+    factor, units = min(_FACTORS, key=lambda item: abs(math.log(max(ratio, 1e-300) / item[0])))
+    return units if abs(ratio / factor - 1.0) < tolerance else ""
 
 
 def _swapped(recording: Recording, integrals: FloatArray) -> list[Finding]:

@@ -68,16 +68,17 @@ def test_mean_acceleration_and_gain_of_speed_are_those_of_each_window_alone(data
         values = random.normal(size=(len(time), joints))
         values[random.uniform(size=values.shape) < data.draw(st.sampled_from([0.0, 0.3, 1.0]))] = np.nan
         made.append(Series(time, values, "m/s"))
-    for ours, theirs in zip(_pairs(*made, joints - 1), _windows(*made, joints - 1), strict=True):
+    window = data.draw(st.sampled_from([0.2, 0.05]))
+    for ours, theirs in zip(_pairs(*made, joints - 1, window), _windows(*made, joints - 1, window), strict=True):
         assert_same_bits(ours, theirs)
 
 
-def _windows(speed, acceleration, joint):
-    edges = np.arange(max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1]), 0.2)
+def _windows(speed, acceleration, joint, window):
+    edges = np.arange(max(speed.time[0], acceleration.time[0]), min(speed.time[-1], acceleration.time[-1]), window)
     known = np.isfinite(speed.values[:, joint])
     if len(edges) < 3 or np.count_nonzero(known) < 2:
         return np.empty(0), np.empty(0)
-    gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / 0.2
+    gained = np.diff(np.interp(edges, speed.time[known], speed.values[known, joint])) / window
     means = np.full(len(edges) - 1, np.nan)
     for i, (start, end) in enumerate(pairwise(edges)):
         inside = (acceleration.time >= start) & (acceleration.time < end)

@@ -1,0 +1,94 @@
+"""The load cell's synchronisation measured on the logs of a benchmark, as `[onset] synchronisation = "measured"` asks.
+
+Latencies are not corrected: their resolution becomes coarser by what the load cell may be late or early.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cdtool.errors import CdtoolError, ConfigurationError
+from cdtool.evaluation.results import RecordingFinding
+from cdtool.findings import Finding
+from cdtool.findings.synchronisation import MeasuredSynchronisation
+from cdtool.plain_text import counted
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.contacts.true_contacts import any_contacts
+from cdtool.workflows.runs import read_named
+from cdtool.workflows.workers import in_order
+
+if TYPE_CHECKING:
+    from cdtool.evaluation.synchronisation.latency import ChannelLatency
+
+
+@dataclass(frozen=True)
+class _Audited:
+    """The latencies of a log's load cell, and what its times count from [s]."""
+
+    latencies: tuple[ChannelLatency, ...] = ()
+    origin: float = 0.0
+
+
+@dataclass(frozen=True)
+class _LogAudit:
+    """Audits the load cell of one log in the contacts that the load cell itself shows."""
+
+    setup: BenchmarkFile
+
+    def __call__(self, work: tuple[str, Path]) -> _Audited:
+        from cdtool.evaluation.synchronisation.audit import audit
+
+        group, path = work
+        try:
+            setup = self.setup
+            recording = read_named(path, setup.machine_file, setup.path.parent, onset=setup.onset)
+            contacts = any_contacts(recording, self.setup.rules_of(group))
+        except CdtoolError:
+            return _Audited()  # left out with its reason when it is scored
+        own = [contact for contact in contacts if contact.found_by == "load cell"]
+        found = audit(recording, self.setup.machine_file.machine, own) if own else ()
+        return _Audited(tuple(item for item in found if item.channel == "force"), recording.origin)
+
+
+def with_synchronisation(setup: BenchmarkFile, jobs: int = 1) -> tuple[BenchmarkFile, list[RecordingFinding]]:
+    """Return the benchmark with the measured synchronisation, and the finding that says so; unchanged if it is stated.
+
+    The synchronisation is the largest offset that the load cell may have in any contact: the measured one at the
+    contact's time, plus half the width of its 95 % interval. Raises ConfigurationError if it is not assessable.
+    """
+    if not setup.measures_synchronisation:
+        return setup, []
+    from cdtool.workflows.log_checks.synchronisation import latency_findings
+
+    work = [(group, path) for group, item in setup.impacts.items() if group != HOLDOUT for path in item.logs]
+    audited = list(in_order(_LogAudit(setup), work, len(work), jobs))
+    found = _of_all(audited)
+    if found is None or not found.assessable:
+        why = found.reason if found else f"none of {counted(len(work), 'log')} has a contact that its load cell shows"
+        raise ConfigurationError(
+            f"{setup.path}: onset.synchronisation: measured, but not assessable: {why}",
+            "state how far the load cell's clock may be off: synchronisation_s = ...",
+        )
+    half = 0.5 * (found.offset.high - found.offset.low)
+    times = [found.events[number].delay.time for number in found.used]
+    # The interval need not be symmetric about the offset: it reaches both kinds of contacts.
+    most = max(max(abs(found.offset.low), abs(found.offset.high)), *(abs(found.offset_at(t)) + half for t in times))
+    (shown,) = latency_findings([found])
+    fact = MeasuredSynchronisation(most, shown.fact.sentence())
+    finding = RecordingFinding.of(str(setup.path), Finding(fact, "force", "note"))
+    return replace(setup, synchronisation=most), [finding]
+
+
+def _of_all(audited: Sequence[_Audited]) -> ChannelLatency | None:
+    """Return the latency of the load cell over all logs; that of the only log that shows one."""
+    from cdtool.evaluation.synchronisation.latency import preferred
+    from cdtool.workflows.log_checks.synchronisation import pooled_latencies
+
+    known = [item for item in audited if any(latency.assessable for latency in item.latencies)]
+    logs, origins = [item.latencies for item in known], [item.origin for item in known]
+    together = preferred(pooled_latencies(logs, origins)) or (preferred(logs[0]) if logs else ())
+    unknown = preferred([latency for item in audited for latency in item.latencies])
+    return next(iter((*together, *unknown)), None)
