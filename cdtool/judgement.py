@@ -16,6 +16,7 @@ from cdtool.detection import Band, Signal, Status, StatusArray, contiguous
 from cdtool.kernels import kernel
 from cdtool.motion import MotionClass
 from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
+from cdtool.motion.evident_motion import evident_speed
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold, is_per_run
@@ -107,12 +108,18 @@ class Judgement:
         return tuple(self._share(learned[item.motion], item.stroke, item.where) for item in judging)
 
     def _of_stroke(self, number: int) -> _Share:
-        """Evaluate the threshold in one stroke alone."""
-        time, last = self.signal.time, number + 1 == len(self.strokes)
-        judges = time >= self.strokes[number].applies
-        if not last:
-            judges &= time < self.strokes[number + 1].applies
+        """Evaluate the threshold in one stroke alone, and at rest after it: a contact that halts it ends the stroke."""
+        judges = self.signal.time >= self.strokes[number].applies
+        if number + 1 < len(self.strokes):
+            judges &= self.signal.time < self._moves_after(self.strokes[number + 1].applies)
         return self._share(self.thresholds[0], number, judges)
+
+    def _moves_after(self, applies: float) -> float:
+        """Return when a joint moves again after `applies` [s], at most `hold` later."""
+        speed = self.recording["speed"]
+        moves = speed.derived("any joint moves", lambda: speed.time[evident_speed(speed).any(axis=1)])
+        after = int(np.searchsorted(moves, applies, side="right"))
+        return min(float(moves[after]) if after < len(moves) else np.inf, applies + self.hold)
 
     def _share(self, threshold: FittedThreshold, number: int, judges: BoolArray) -> _Share:
         """Evaluate a class in a stroke, without other motions before it, so that its filters start there."""

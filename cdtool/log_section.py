@@ -15,8 +15,13 @@ from cdtool.plain_text import digits
 from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.units import find_unit
 
-_TEXT = re.compile(r"\s*(?P<number>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>[^\d\s.]\S*)\s*", re.ASCII)
+_TEXT = re.compile(r"\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+))\s*(?P<unit>[^\d\s.]\S*)\s*", re.ASCII)
 _UNITS = ("s", "m", "rad")
+_SHOWN = 40
+# A distance counts as reached after this many consecutive samples: a single wrong value is no motion.
+_HELD = 3
+# Samples whose median is the first position.
+_FIRST = 3
 MARK_HINT = "give a number with its unit: a time as 3.2s or 250ms, a distance travelled as 0.8m or 1.2rad"
 
 
@@ -36,8 +41,11 @@ class Mark:
         match = _TEXT.fullmatch(text)
         unit = find_unit(match["unit"]) if match else None
         if match is None or unit is None or unit.si not in _UNITS:
-            raise UsageError(f"is '{text}'", MARK_HINT)
-        return cls(float(match["number"]) * unit.factor, unit.si)
+            raise UsageError(f"is '{text[:_SHOWN]}'", MARK_HINT)
+        value = float(match["number"]) * unit.factor
+        if not math.isfinite(value) or (unit.si != "s" and not value > 0.0):
+            raise UsageError(f"is '{text[:_SHOWN]}'", f"{MARK_HINT}; a distance is above 0")
+        return cls(value, unit.si)
 
     def __str__(self) -> str:
         return f"{digits(self.value)} {self.unit}{'' if self.unit == 's' else ' of travel'}"
@@ -196,6 +204,12 @@ def _travel(recording: Recording, mark: Mark) -> tuple[FloatArray, FloatArray]:
     time, values = series.time[present], series.values[present, joint]
     if channel == "speed":
         values = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))))[: len(values)]
+    if channel == "position" and series.unit == "rad":
+        values = np.unwrap(values)  # an encoder that starts again at half a turn
     if not len(values):
         raise RecordingError(f"{recording.name}: {channel} has no sample to determine {mark}", "give times instead")
-    return time, np.maximum.accumulate(np.abs(values - values[0]))
+    distance = np.abs(values - np.median(values[:_FIRST]))
+    held = np.zeros(len(distance))
+    if len(distance) >= _HELD:
+        held[_HELD - 1 :] = np.lib.stride_tricks.sliding_window_view(distance, _HELD).min(axis=1)
+    return time, np.maximum.accumulate(held)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from cdtool.detection import Band, Signal, Status
+from cdtool.errors import UsageError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.median_kernel import quantile_of
 from cdtool.motion.evident_motion import evident_speed
@@ -159,6 +160,10 @@ class Baseline:
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)
         check_above(self.warm_up, 0.0, "warm-up")
+        if not math.isfinite(self.safety_factor * self.warm_up):
+            raise UsageError(
+                f"warm-up is {self.warm_up:g} s, safety factor {self.safety_factor:g}", "give finite numbers"
+            )
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedBaseline:  # noqa: ARG002  the contract's
         """Return the threshold; it needs no runs."""

@@ -330,12 +330,12 @@ def _detected(scored: Scored, log: Path, benchmark: PreparedBenchmark) -> Detect
         tuple(item.matchings[0] for item, _ in judged),
         benchmark.described,
         benchmark.setup.activation,
-        scored.log.digest in benchmark.learned,
+        benchmark.has_judged_itself(scored.log),
         benchmark.window(log),
         tuple(rows for _, rows in judged),
         matched.not_scored,
         (*matched.findings, *benchmark.setup.rules_of("").findings, *benchmark.notes),
-        benchmark.normals,
+        benchmark.normals_for(scored.log),
         benchmark.setup.onset.described,
     )
 

@@ -16,6 +16,8 @@ from cdtool.tables import Table
 from cdtool.value_words import value_in_words
 from cdtool.workflows.runs import find_logs, shown_path
 
+_WHOLE = LogSection()
+
 
 @dataclass(frozen=True)
 class LogsOf:
@@ -47,7 +49,7 @@ class LogsOf:
             section, pattern = common, entry
             if isinstance(entry, dict):
                 own = Table(entry, table.where, f"{table.prefix}logs[{number}].")
-                pattern, section = own.text("path"), _section(own).within(common)
+                pattern, section = own.text("path"), _section(own, common)
                 own.finish()
             texts = Table({"logs": pattern}, table.where, table.prefix).texts("logs")
             for path in find_logs(texts, self.base, table.key("logs"), runs=self.runs):
@@ -64,11 +66,11 @@ class LogsOf:
         return split_run(log)[0] if self.runs else log
 
 
-def _section(table: Table) -> LogSection:
-    """Return `from` and `to` of a table."""
+def _section(table: Table, common: LogSection = _WHOLE) -> LogSection:
+    """Return `from` and `to` of a table; those of `common` where it has none."""
     begin, end = (_mark(table, name) for name in ("from", "to"))
     try:
-        return LogSection(begin, end)
+        return LogSection(begin, end).within(common)
     except UsageError as fault:
         raise table.fault("to", fault.message, fault.hint) from fault
 
@@ -105,8 +107,10 @@ def named_logs(table: Table, found_logs: LogsOf, scored: Sequence[Path]) -> dict
     return found
 
 
-def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path]) -> Labels | None:
+def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Sequence[Path] = ()) -> Labels | None:
     """Return the label file, whose rows must all be about one of the `scored` logs; None without a file.
+
+    Rows about a log `learned` from have its whole path: a file's name alone is that of a scored log.
 
     If logs are cut into runs, each row is about a run of a log, LOG#ID. Raises ConfigurationError for a row that
     matches no log, or for a file name that matches several.
@@ -122,7 +126,10 @@ def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path]) -> Labels | No
     path = base / onset.text("labels")
     labels = read_labels(path, not_contacts=not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
     runs = logs.runs
-    recordings = [shown_path(split_run(log)[0] if runs else log, base) for log in scored]
+    recordings, others = (
+        [shown_path(split_run(log)[0] if runs else log, base) for log in some] for some in (scored, learned)
+    )
+    recordings += [name for name in others if name in labels.contacts]
     for name, recording in by_recording(path, labels.contacts, set(recordings), runs=runs).items():
         if runs and recording in recordings:
             raise ConfigurationError(

@@ -45,6 +45,15 @@ def test_a_benchmark_needs_no_runs_to_learn_from_and_ignores_them_for_the_limits
     assert bool(results["provenance"]["learned_runs"]) is False
 
 
+def test_a_budget_needs_runs_even_so(gate_folder):
+    file = gate_folder / "budget.toml"
+    file.write_text(f'false_alarm_budget = "1/10op"\n{BENCHMARK.format(learn="")}', encoding="utf-8")
+    done = cdtool("benchmark", file)
+    assert done.status == 2 and "budget of 1/10op is set on runs (add impact-free logs: [learn] logs)" in one_line(
+        done.err
+    )
+
+
 def test_another_threshold_still_needs_runs(gate_folder):
     file = gate_folder / "needs.toml"
     file.write_text(BENCHMARK.format(learn="").replace('name = "baseline", warm_up = 0.8', 'name = "limit"'))
@@ -100,6 +109,18 @@ def test_each_stroke_of_a_log_that_is_cut_has_limits_of_its_own():
     assert [round(alarm.time, 1) for alarm in back.verdict.alarms][:1] == [15.0]
     assert back.statistic.status[(back.statistic.time > 10.2) & (back.statistic.time < 11.0)].all()
     assert Status.OTHER_SPEED not in np.unique(back.statistic.status)
+
+
+def test_a_contact_that_halts_the_axis_is_judged_by_the_limits_of_its_stroke():
+    recording, signal = there_and_back()
+    time = signal.time
+    speed = recording["speed"].values[:, 0] * (time < 5.0)
+    rising = np.where(time < 5.0, signal.values[:, 0], 10.0 + 30.0 * (time - 5.0))
+    halted = Recording("slide", "slide.csv", ("slide",), {"speed": Series(time, speed, "m/s")})
+    pressed = signal.changed(values=rising[:, np.newaxis])
+    limits = (Baseline(sides="one").fit([]),)
+    found = _judge_log(operations_of(halted, "motion"), "any", pressed, limits, Activation(), 1.0)
+    assert 5.0 < found[0].verdict.alarms[0].time < 5.3
 
 
 def test_a_log_that_is_not_cut_keeps_the_limits_of_its_first_seconds_and_monitors_the_present_direction():

@@ -148,7 +148,17 @@ def test_widening_limits_follow_the_square_root_of_the_time_since_the_warm_up():
     np.testing.assert_allclose(band.lower[first:, 0], -8.0 * np.sqrt(1.0 + elapsed), rtol=1e-12)
 
 
-@pytest.mark.parametrize("setting", [{"sides": "left"}, {"warm_up": 0.0}, {"warm_up": -1.0}, {"safety_factor": 0.0}])
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"sides": "left"},
+        {"warm_up": 0.0},
+        {"warm_up": -1.0},
+        {"warm_up": np.inf},
+        {"safety_factor": np.inf},
+        {"safety_factor": 0.0},
+    ],
+)
 def test_settings_must_be_above_zero(setting):
     with pytest.raises(UsageError):
         Baseline(**setting)

@@ -38,10 +38,10 @@ from cdtool.workflows.benchmark.benchmark_file import (
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds, that_can_run
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
-from cdtool.workflows.benchmark.scoring import Detect, detect_with, score_runs
+from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import load_runs, shown_path
-from cdtool.workflows.signature.normal_runs import normals_for
+from cdtool.workflows.signature.normal_runs import NormalsWithout, normals_for
 from cdtool.workflows.signature.threshold_settings import set_by_hand
 from cdtool.workflows.workers import Progress
 
@@ -133,7 +133,7 @@ def benchmark(
     learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
     seconds["detecting"] = perf_counter() - begin - seconds["reading"]
     factors = _factors(setup, learned.thresholds)
-    sources = {operation.recording.digest: operation.recording.name for operation in learn.operations}
+    sources = {operation.recording.digest: operation.whole.name for operation in learn.operations}
     gathered = Gathering(setup, setup.detectors, factors, sources)
     gathered.skipped += [*learn.skipped, *learned.skipped]
     gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
@@ -141,7 +141,8 @@ def benchmark(
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     normals = normals_for(learn.operations, setup.rule)
     thresholds = ThresholdsByLog.of(setup, learned)
-    scoring = _LogScoring(setup, tuple(used), thresholds, learned.unusable, factors, learn.ranges, normals)
+    runs = learn.operations if setup.both else ()
+    scoring = _LogScoring(setup, tuple(used), thresholds, learned.unusable, factors, learn.ranges, normals, runs)
     gathered.score(scoring, work, jobs, progress)
     seconds = {"reading": seconds["reading"] + gathered.reading, "detecting": seconds["detecting"] + gathered.detecting}
     gathered.skipped += _labels_without_run(setup, gathered.scored)
@@ -162,10 +163,17 @@ class _LogScoring:
     factors: Mapping[str, FloatArray]
     ranges: PlausibleRanges
     normals: NormalMotions
+    runs: tuple[Operation, ...]
 
     def __call__(self, group: str, path: Path, wanted: WantedTraces) -> list[LogOutcome]:
         scored = score_runs(self.setup, group, path, self._detection_of, self.factors, self.ranges)
-        return [outcome_of(item, self.setup, self.normals, wanted) for item in scored]
+        return [outcome_of(item, self.setup, self._normals_for(item), wanted) for item in scored]
+
+    def _normals_for(self, scored: Scored) -> NormalMotions | NormalsWithout:
+        """Return the normal motion that a log is compared with: without its own."""
+        if not self.runs or scored.log is None:
+            return self.normals
+        return NormalsWithout(self.runs, scored.log.name, self.setup.rule)
 
     def _detection_of(self, log: Path) -> tuple[Detect, list[RecordingFinding]]:
         thresholds, findings = self.thresholds.without(log)

@@ -136,7 +136,7 @@ class BenchmarkFile:
         """Return how the logs to learn from are read."""
         rules = ScoringRules(self.onset, self.window, self.labels, self.synchronisation, self.mass_before_cell)
         part = PartToLearnFrom(rules, self.learned_sections, self.guard)
-        needed = self.guard is not None or self.learned_sections
+        needed = self.guard is not None or self.learned_sections or self.labels
         return RunReading(
             self.operations, onset=self.onset, base=self.path.parent, part=part if needed else None, jobs=jobs
         )
@@ -200,7 +200,7 @@ def read_benchmark_file(
     impacts, sections = _groups(root, found, window, force)
     onset = root.table("onset")
     migrated = migrated_onset(onset)
-    labels = labels_of(onset, found, [*_scored(impacts, HOLDOUT), *(learn if guard is not None else ())])
+    labels = labels_of(onset, found, _scored(impacts, HOLDOUT), tuple(learn))
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,

@@ -57,6 +57,8 @@ def learn_thresholds(
         learned.thresholds.update((detector.name, (setup.rule.fit([]),)) for detector in detectors)
         learned.unused.update(operation.name for operation in operations)
         return learned
+    if is_per_run(setup.rule) and not setup.learn:
+        raise UsageError(f"a false-alarm budget of {setup.budget} is set on runs", "add impact-free logs: [learn] logs")
     left_out = LeftOut()
     unused: list[set[str]] = []
     for detector in detectors:

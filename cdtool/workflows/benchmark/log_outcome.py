@@ -27,6 +27,10 @@ from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.scoring import Scored
 from cdtool.workflows.contacts.judged_operation import Judged
 from cdtool.workflows.detector_inputs import inputs_of
+from cdtool.workflows.signature.normal_runs import NormalsWithout
+
+# The normal motion of impact-free runs, or how it is made when it is needed.
+Normals = NormalMotions | NormalsWithout
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ class WantedTraces:
     choice: TraceChoice
 
 
-def outcome_of(scored: Scored, setup: BenchmarkFile, normals: NormalMotions, wanted: WantedTraces) -> LogOutcome:
+def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: WantedTraces) -> LogOutcome:
     """Return what remains of a scored log; alarms are explained by comparison with `normals`, for wanted traces."""
     return LogOutcome(
         recording=scored.recording,
@@ -108,7 +112,7 @@ def outcome_of(scored: Scored, setup: BenchmarkFile, normals: NormalMotions, wan
     )
 
 
-def _operation(judged: Judged, setup: BenchmarkFile, normals: NormalMotions, wanted: WantedTraces) -> OperationOutcome:
+def _operation(judged: Judged, setup: BenchmarkFile, normals: Normals, wanted: WantedTraces) -> OperationOutcome:
     pairs = list(zip(judged.detections, judged.matchings, strict=True))
     missed = [item.detector for item, made in pairs if any(match.outcome == "missed" for match in made.matches)]
     false = [item.detector for item, made in pairs if made.false_alarms]
@@ -142,7 +146,7 @@ def _of_detector(detection: Detection, matching: Matching, swept: Swept | None) 
     )
 
 
-def _trace(judged: Judged, setup: BenchmarkFile, normals: NormalMotions) -> Trace:
+def _trace(judged: Judged, setup: BenchmarkFile, normals: Normals) -> Trace:
     compared = normals.for_one_operation()
     return make_trace(
         judged.group,

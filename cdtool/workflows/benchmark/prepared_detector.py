@@ -13,15 +13,17 @@ from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.ingest.run_reading import split_run
+from cdtool.operations import Operation
 from cdtool.plain_text import counted
 from cdtool.plausible import PlausibleRanges
+from cdtool.recording import Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
-from cdtool.workflows.runs import load_runs, shown_path
+from cdtool.workflows.runs import load_runs
 from cdtool.workflows.signature.normal_runs import normals_for, normals_of, notes_on
 
 
@@ -29,9 +31,10 @@ from cdtool.workflows.signature.normal_runs import normals_for, normals_of, note
 class PreparedBenchmark:
     """A detector with its threshold in `cdtool benchmark`; `described` states in words where the threshold is from.
 
-    `learned` has the hashes of the logs learned from, `ranges` the ranges of their channels and `normals` their
-    normal motion. `skipped` lists the runs left out in learning, with the reason; `losses` lists what is lost of the
-    others. `notes` concern a signature file of an earlier version, and a measured synchronisation.
+    `learned` has the hashes of the logs learned from with their names, `runs` their operations, `ranges` the ranges of
+    their channels and `normals` their normal motion. `skipped` lists the runs left out in learning, with the reason;
+    `losses` lists what is lost of the others. `run` returns how a log is detected: a log does not judge itself. `notes`
+    concern a signature file of an earlier version, and a measured synchronisation.
     """
 
     setup: BenchmarkFile
@@ -44,6 +47,7 @@ class PreparedBenchmark:
     notes: tuple[RecordingFinding, ...] = ()
     skipped: tuple[Skipped, ...] = ()
     losses: tuple[RecordingFinding, ...] = ()
+    runs: tuple[Operation, ...] = ()
 
     def score(self, log: Path) -> list[Scored]:
         """Return the rows of a log, or of each of its runs, as in a benchmark: with the window of its group, if any.
@@ -52,6 +56,18 @@ class PreparedBenchmark:
         """
         group, path = self._listed(log)
         return score_runs(self.setup, group, path, self.run, {}, self.ranges)
+
+    def has_judged_itself(self, recording: Recording) -> bool:
+        """Return whether a recording was learned from for its own limits; a copy under another name counts as well."""
+        learned = self.learned.get(recording.digest)
+        return learned is not None and not (self.setup.both and learned == recording.name)
+
+    def normals_for(self, recording: Recording) -> NormalMotions:
+        """Return the normal motion that a recording is compared with: without its own."""
+        others = [item for item in self.runs if item.whole.name != recording.name]
+        if not self.setup.both or len(others) == len(self.runs):
+            return self.normals
+        return normals_for(others, self.setup.rule)
 
     def window(self, log: Path) -> float:
         """Return how long after its onset a contact of the log may be detected [s]."""
@@ -111,8 +127,7 @@ def prepare_benchmark(
     many += f" of {classes} classes of motion" if classes > 1 else ""
     origin = "from each run itself" if is_per_run(setup.rule) else f"learned from {many}"
     described = f"threshold '{setup.threshold}' of {setup.path.name}, {origin}"
-    others = {shown_path(path, setup.path.parent) for path in setup.both}
-    hashes = {item.recording.digest: item.recording.name for item in used if item.whole.name not in others}
+    hashes = {item.recording.digest: item.whole.name for item in used}
     run = _running(ThresholdsByLog.of(setup, fitted), instance, fitted.unusable)
     normals = normals_for(used, setup.rule)
     return PreparedBenchmark(
@@ -126,6 +141,7 @@ def prepare_benchmark(
         notes=tuple(measured),
         skipped=(*runs.skipped, *fitted.skipped),
         losses=tuple(item for item in runs.findings if item.is_loss),
+        runs=tuple(used),
     )
 
 

@@ -13,7 +13,7 @@ from cdtool.plain_text import digits
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
-from cdtool.workflows.contacts.true_contacts import any_contacts
+from cdtool.workflows.contacts.true_contacts import any_contacts, missing_truth
 
 # The shortest part that is learned from [s]: detectors start up in less.
 _SHORTEST = 0.5
@@ -35,29 +35,40 @@ class PartToLearnFrom:
         section = self.sections.get(path, LogSection())
         if self.guard is None:
             part = section.of(recording)
+            if self._is_labelled(recording):
+                return part, section.contacts_of(recording, any_contacts(recording, self.rules))
             return part, contacts_shown(part, self.rules.onset)
         contacts = any_contacts(recording, self.rules)
-        if not contacts and not self._is_known(recording):
+        if not contacts and not self._is_labelled(recording):
+            self._refuse_without_truth(path, recording)
+        if any(item.in_progress for item in contacts):
+            raise RecordingError(f"{path}: a contact is in progress at its start: nothing before it to learn from")
+        begin, end = section.times(recording)
+        doubt = self.rules.synchronisation + self.guard
+        first = min((item.start - item.uncertainty for item in contacts), default=math.inf)
+        end = min(end, first - doubt)
+        part = recording.between(begin, end)
+        if not part.channels or not part.duration >= _SHORTEST:
+            left = digits(max(0.0, end - max(begin, recording.start)))
+            where = f"{digits(doubt)} s before the contact at {digits(first)} s"
+            raise RecordingError(
+                f"{path}: {left} s to learn from, {where}: at least {digits(_SHORTEST)} s are needed",
+                "reduce the guard (guard_s, --guard), or leave the log out",
+            )
+        return part, ()
+
+    def _is_labelled(self, recording: Recording) -> bool:
+        labels = self.rules.labels
+        return labels is not None and labels.name_of(recording.name) is not None
+
+    def _refuse_without_truth(self, path: Path, recording: Recording) -> None:
+        """Raise RecordingError if a contact would not be seen: without ground truth, or where it is lost."""
+        if not any(channel in recording for channel in GROUND_TRUTH):
             raise RecordingError(
                 f"{path}: no ground truth: until = 'onset' needs a load cell, a label or an event",
                 "map one in [channels], name the log in the label file, or give the part by from and to",
             )
-        if any(item.in_progress for item in contacts):
-            raise RecordingError(f"{path}: a contact is in progress at its start: nothing before it to learn from")
-        first = min((item.start - item.uncertainty for item in contacts), default=math.inf)
-        begin, end = section.times(recording)
-        end = min(end, first - self.guard)
-        part = recording.between(begin, end)
-        if not part.channels or not part.duration >= _SHORTEST:
-            left = max(0.0, end - max(begin, recording.start))
+        if missing := missing_truth(recording):
             raise RecordingError(
-                f"{path}: {digits(left)} s before the contact at {digits(first)} s (guard {digits(self.guard)} s "
-                f"included): at least {digits(_SHORTEST)} s are needed",
-                "reduce guard_s, or leave the log out of [learn]",
+                f"{path}: no contact found, and {missing}", "give the part by from and to, or remove it"
             )
-        return part, ()
-
-    def _is_known(self, recording: Recording) -> bool:
-        labels = self.rules.labels
-        named = labels is not None and labels.name_of(recording.name) is not None
-        return named or any(channel in recording for channel in GROUND_TRUTH)

@@ -58,7 +58,7 @@ def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list
         if not any(channel in recording for channel in GROUND_TRUTH):
             raise RecordingError(f"{path}: no ground truth: {item}", "an impact log requires it, or a label file")
     contacts = find_contacts(recording, rules.onset)
-    if not contacts and (missing := _missing(recording)):
+    if not contacts and (missing := missing_truth(recording)):
         raise RecordingError(
             f"{path}: no contact found ({rules.onset.described}), and {missing}", "copy the log again, or remove it"
         )
@@ -69,11 +69,13 @@ def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list
     return contacts
 
 
-def _missing(recording: Recording) -> str:
+def missing_truth(recording: Recording) -> str:
     """Return what is missing from a log that may contain the contact; empty for a complete log."""
     if damage := lost(recording):
         return f"part of the log is lost: {damage[0].reason}"
     if "force" not in recording:
+        if "label" in recording and not np.isfinite(recording["label"].values).all():
+            return "samples of the label are missing"
         return ""
     clock = cell_samples(recording["force"]).clock
     present = clock.time

@@ -150,6 +150,77 @@ def test_a_log_learned_from_up_to_a_mark_may_be_scored_as_well(gate):
     assert len(setup.both) == 4 and {row.outcome for row in benchmark(setup).results.contacts} == {"detected"}
 
 
+def test_logs_that_are_cut_into_strokes_are_scored_without_their_own_strokes(gate):
+    done = benchmark(setup_of(gate, HEAD, 'operations = "motion"\n', LEARN, ONSET, GROUPS)).results
+    assert [row.outcome for row in done.contacts] == ["detected"] * 7 and not done.false_alarms
+
+
+def changed_copy(gate, folder, column, change):
+    """A copy of the set in which one log's column is changed, row by row."""
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    log = folder / "stiff" / "01.csv"
+    header, *rows = log.read_text(encoding="utf-8").splitlines()
+    k = header.split(",").index(column)
+    cells = [row.split(",") for row in rows]
+    for i, row in enumerate(cells):
+        row[k] = change(i, row[k])
+    log.write_text("\n".join([header, *(",".join(row) for row in cells)]), encoding="utf-8")
+    return log
+
+
+@pytest.mark.parametrize("first", [0, 5000])
+def test_a_log_whose_load_cell_is_lost_is_left_out_because_its_contact_would_be_learned(gate, tmp_path, first):
+    changed_copy(gate, tmp_path, "load_cell", lambda i, cell: "" if i >= first else cell)
+    runs, _ = learned_of(setup_of(tmp_path, HEAD, LEARN, ONSET, GROUPS))
+    assert [item.recording for item in runs.skipped] == ["stiff/01.csv"]
+    assert "no contact found, and the load cell" in runs.skipped[0].reason
+    done = benchmark(setup_of(tmp_path, HEAD, LEARN, ONSET, GROUPS)).results
+    assert [row.outcome for row in done.contacts] == ["detected"] * 6
+
+
+def labels_of_contacts(gate):
+    rows = [
+        row for row in benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS)).results.contacts if row.group == "stiff"
+    ]
+    lines = [f"{row.recording},{row.onset_s},{row.onset_s + 0.2}" for row in rows]
+    (gate / "labels.csv").write_text("\n".join(["recording,start_s,end_s", *lines]), encoding="utf-8")
+
+
+def test_the_label_file_keeps_a_contact_out_of_a_part_that_is_learned_from(gate):
+    labels_of_contacts(gate)
+    machine = (gate / "machine.toml").read_text(encoding="utf-8").splitlines()
+    (gate / "blind.toml").write_text("\n".join(line for line in machine if "load_cell" not in line), encoding="utf-8")
+    learn = '[learn]\nlogs = ["free/*.csv", { path = "stiff/*.csv", to = "7s" }]\n'
+    onset = '[onset]\nlabels = "labels.csv"\n'
+    stiff = '[impacts.stiff]\nlogs = ["stiff/*.csv"]\n'
+    setup = setup_of(gate, HEAD.replace("machine.toml", "blind.toml"), learn, onset, stiff)
+    runs, _ = learned_of(setup)
+    assert [item.recording for item in runs.skipped] == [f"stiff/0{i}.csv" for i in range(1, 5)]
+    assert all("shows a contact" in item.reason for item in runs.skipped)
+    assert {row.outcome for row in benchmark(setup).results.contacts} == {"detected"}
+
+
+def test_the_load_cells_synchronisation_is_part_of_the_guard(gate):
+    plain, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
+    late, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, "synchronisation_s = 0.5\n", GROUPS))
+    for before, after in zip(plain.operations, late.operations, strict=True):
+        assert before.recording.end - after.recording.end == pytest.approx(0.5, abs=0.002)
+
+
+def test_a_copy_of_a_log_is_said_to_have_been_learned_from(gate, tmp_path):
+    prepared = prepare_benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
+    assert not cdtool.detect(gate / "stiff" / "01.csv", benchmark=prepared).learned
+    shutil.copy(gate / "stiff" / "01.csv", tmp_path / "copy.csv")
+    assert cdtool.detect(tmp_path / "copy.csv", benchmark=prepared).learned
+
+
+def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate):
+    prepared = prepare_benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
+    log = prepared.score(gate / "stiff" / "01.csv")[0].log
+    assert log is not None and prepared.normals.motions[0].runs == 7
+    assert prepared.normals_for(log).motions[0].runs == 6
+
+
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
@@ -167,6 +238,10 @@ def test_a_log_learned_from_up_to_a_mark_may_be_scored_as_well(gate):
         ),
         ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [{ to = '3s' }]\n"), r"impacts.x.logs\[0\].path: is missing"),
         ((HEAD, LEARN, GROUPS, "[impacts.x]\nlogs = [3]\n"), "impacts.x.logs: is 3"),
+        (
+            (HEAD, LEARN, GROUPS, '[impacts.x]\nfrom = "3s"\nlogs = [{ path = "free/01.csv", to = "1s" }]\n'),
+            r"impacts.x.logs\[0\].to: the end, 1 s, is not after the begin, 3 s",
+        ),
         (
             (HEAD, LEARN, '[impacts.x]\nlogs = ["free/*.csv", { path = "free/01.csv", to = "3s" }]\n'),
             "names .*01.csv with two different parts",
