@@ -4,6 +4,7 @@ Every command is available as a function:
 
     cdtool.read("run.csv", "machine.toml")                              -> Recording
         cdtool.init("run.csv")                                              -> Drafted: a draft of machine.toml
+        cdtool.init_study(logs, "study")                                    -> DraftedStudy: also of benchmark.toml
         cdtool.convert("run.csv", "run.parquet", "machine.toml")            -> Converted
         cdtool.recover("damaged.mcap", "clean.mcap")                        -> Recovered
     cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.detection import detect, detect_runs
     from cdtool.workflows.explaining import explain, explain_runs
     from cdtool.workflows.information import info
-    from cdtool.workflows.init.drafting import init
+    from cdtool.workflows.init.drafting import init, init_study
     from cdtool.workflows.planning import plan
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
@@ -62,6 +63,7 @@ _API = {
     "score": "cdtool.workflows.score_triggers:score",
     "convert": "cdtool.workflows.convert.converting:convert",
     "init": "cdtool.workflows.init.drafting:init",
+    "init_study": "cdtool.workflows.init.drafting:init_study",
     "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",
@@ -83,6 +85,7 @@ __all__ = [
     "explain_runs",
     "info",
     "init",
+    "init_study",
     "learn_signature",
     "plan",
     "read",

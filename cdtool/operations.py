@@ -90,7 +90,7 @@ class RunCut:
         by, colon, column = operations.partition(":")
         if by in ("column", "label") and colon:
             if not column.strip():
-                raise UsageError(f"operations '{operations}' names no column", f"write {by}:NAME")
+                raise UsageError(f"operations '{operations}' has no column's name", f"write {by}:NAME")
             return cls("column" if by == "column" else "label", column.strip())
         raise UsageError(f"unknown operations '{operations}'", nearest(operations, (*HOW_TO_CUT, *_RUN_CUTS)))
 

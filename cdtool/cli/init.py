@@ -3,37 +3,89 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.cli.console import leave_with, plain, print_json, with_findings
+from cdtool.cli.console import leave, leave_with, plain, print_json, print_skipped, with_findings
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
+from cdtool.errors import UsageError
+
+if TYPE_CHECKING:
+    from cdtool.workflows.init.drafting import Drafted, DraftedStudy
 
 
 def init(
-    log: Annotated[Path, typer.Argument(help="A recording of the machine.", metavar="LOG")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Machine file to write.")] = Path("machine.toml"),
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+    logs: Annotated[list[Path], typer.Argument(help="Recordings of one machine.", metavar="LOG...")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output", "-o", help="Machine file to write (.toml); or a folder for a machine file and a benchmark file."
+        ),
+    ] = Path("machine.toml"),
+    machine: Annotated[
+        Path | None,
+        typer.Option("--machine", "-m", help="With a folder: use this machine file, draft only the benchmark."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draft a machine file from a log: channels and units guessed from names and numbers, each guess marked.
+    """Draft a machine file from a log, or with a folder as output also a benchmark file from several logs.
 
-    Example: cdtool init sample_logs/gate/stiff/03.csv -o machine.toml
+    Channels and units are guessed from names and numbers, groups from the ground truth; each guess is marked.
+
+    Example: cdtool init sample_logs/gate/stiff/*.csv -o study
     """
     from cdtool.workflows.init.drafting import init as draft
+    from cdtool.workflows.init.drafting import init_study
 
-    with late_progress("analysing the log"):
-        drafted = draft(log, output, force=force)
+    if output.suffix == ".toml":
+        if len(logs) > 1 or machine is not None:
+            what = "--machine" if machine is not None else f"{len(logs)} logs"
+            raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
+        with late_progress("analysing the log"):
+            drafted = draft(logs[0], output, force=force)
+        if as_json:
+            print_json(with_findings(drafted))
+        else:
+            typer.echo(drafted.text)
+            first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
+            typer.echo(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
+            typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(drafted.path)}")
+        _warn(drafted)
+        leave_with(drafted.findings)
+        return
+    with late_progress("analysing the logs"):
+        study = init_study(logs, output, machine=machine, force=force)
     if as_json:
-        print_json(with_findings(drafted))
+        print_json(asdict(study))
     else:
-        typer.echo(drafted.text)
-        first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
-        typer.echo(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
-        typer.echo(f"  cdtool info {_quoted(log)} --machine {_quoted(drafted.path)}")
+        _show(study, logs, output)
+    if study.machine:
+        _warn(study.machine)
+    print_skipped(study.skipped)
+    leave(study.skipped)
+
+
+def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
+    typer.echo(study.text)
+    names = [*([study.machine_path] if study.machine else []), study.path, *study.beside]
+    typer.echo(
+        f"{', '.join(map(plain, names))} written: drafts based on guesses. Check each line marked CHECK, then run"
+    )
+    typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(study.machine_path)}")
+    if study.beside:
+        typer.echo(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
+        some = " ".join(_quoted(log) for log in logs[:2]) + (" ..." if len(logs) > 2 else "")
+        typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
+    typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
+
+
+def _warn(drafted: Drafted) -> None:
+    """Print what is wrong with a draft to stderr."""
     if not drafted.channels:
         typer.echo(
             "warning: no column's name or values indicate a torque, speed or position: all are comments", err=True
@@ -43,7 +95,6 @@ def init(
     for finding in drafted.findings:
         if finding.severity == "loss":
             typer.echo(f"loss: {plain(finding)}", err=True)
-    leave_with(drafted.findings)
 
 
 def _quoted(path: object) -> str:

@@ -166,7 +166,7 @@ def test_an_arm_is_explained_joint_by_joint():
     ("log", "arguments", "words"),
     [
         ("stiff/01.csv", ("--limit", "250"), ("a limit requires a detector",)),
-        ("stiff/01.csv", ("-d", "gm"), ("a signature or a limit",)),
+        ("stiff/01.csv", ("-d", "gm"), ("a signature, a limit or a warm-up",)),
         ("stiff/01.csv", ("-d", "gm", "--limit", "many"), ("--limit", "many")),
         ("stiff/01.csv", ("-d", "gmm", "--limit", "3"), ("gmm", "did you mean gm")),
         ("stiff/01.csv", ("-d", "gm", "--limit", "3", "--plot", "why.gif"), ("why.gif", ".svg")),

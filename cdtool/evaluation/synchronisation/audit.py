@@ -105,6 +105,21 @@ def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -
     instead (two masses, connected by an elastic transmission). Friction enters as constant in a contact, scale and
     offset are estimated in every event. The method fails where neither holds: contacts that the machine's inertia does
     not feel (very slow ones), clamping at standstill, robots whose contact moves another joint than the one examined.
+
+    Examples
+    --------
+    The stamps of a speed are 4 ms late.
+
+    >>> from cdtool.machines.linear_axis import LinearAxis
+    >>> from cdtool.recording import Series
+    >>> from cdtool.tables import Table
+    >>> time = np.arange(0.0, 6.0, 0.005)
+    >>> position = Series(time, 0.3 * np.sin(2.0 * time) ** 3, "m")
+    >>> speed = Series(time + 0.004, 1.8 * np.sin(2.0 * time) ** 2 * np.cos(2.0 * time), "m/s")
+    >>> axis = LinearAxis.from_table(Table({"coordinates": "load"}, "machine.toml"))
+    >>> found = audit(Recording("run", "", ("axis",), {"position": position, "speed": speed}), axis, [])
+    >>> found[0].channel, found[0].reference, round(found[0].offset.value, 4)
+    ('speed', 'position', 0.004)
     """
     found: list[ChannelLatency] = []
     # Of implausibly large values squares are infinite: what they are part of is not assessable.

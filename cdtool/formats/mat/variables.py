@@ -102,8 +102,3 @@ def left_out(name: str, what: str) -> Finding:
 def with_article(kind: str) -> str:
     """Return a noun with its indefinite article."""
     return f"{'an' if kind.lower().startswith(_AN) else 'a'} {kind}"
-
-
-def rows_of(shape: tuple[int, ...]) -> int:
-    """Return the number of rows that an array is read as; 0 if it is empty or has more than two dimensions."""
-    return max(shape) if len(shape) == 2 and 0 not in shape else 0

@@ -33,7 +33,7 @@ class PreparedBenchmark:
 
     `learned` has the hashes of the logs learned from with their names, `runs` their operations, `ranges` the ranges of
     their channels and `normals` their normal motion. `skipped` lists the runs left out in learning, with the reason;
-    `losses` lists what is lost of the others. `run` returns how a log is detected: a log does not judge itself. `notes`
+    `losses` lists what is lost of the others. `run` returns how a log is detected: without its own part. `notes`
     concern a signature file of an earlier version, and a measured synchronisation.
     """
 

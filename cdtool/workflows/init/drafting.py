@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from cdtool.errors import CdtoolError, RecordingError, UsageError
+from cdtool.evaluation.results import Skipped
 from cdtool.files import write_text
 from cdtool.findings import Finding
 from cdtool.findings.clocks import ClockUnitAssumed
@@ -14,6 +16,7 @@ from cdtool.findings.motion import AccelerometerTurned
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.information import info
+from cdtool.workflows.init.benchmark_draft import draft_benchmark
 from cdtool.workflows.init.channel_guess import guess_channels
 from cdtool.workflows.init.derived_speed import propose_low_pass
 from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
@@ -72,11 +75,83 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
     (True, True, True)
     """
     target = Path(output)
-    if target.exists() and not force:
-        raise UsageError(f"{target}: already exists", "choose another name with -o, or overwrite it with --force")
+    _refuse_existing(force, target)
     drafted = replace(_settled(Path(log), _drafted(Path(log))), path=str(target))
     write_text(target, drafted.text)
     return drafted
+
+
+@dataclass(frozen=True)
+class DraftedStudy:
+    """A machine file and a benchmark file in one folder: their paths, the benchmark's text, and logs left out.
+
+    `machine` is the draft of the machine file, None if one was given; `beside` are further files that were written.
+    """
+
+    machine: Drafted | None
+    machine_path: str
+    path: str
+    text: str
+    beside: tuple[str, ...]
+    skipped: tuple[Skipped, ...]
+
+
+def init_study(
+    logs: Sequence[str | Path], folder: str | Path, *, machine: str | Path | None = None, force: bool = False
+) -> DraftedStudy:
+    """Write drafts of a machine file and of a benchmark file for some logs into a folder.
+
+    Parameters
+    ----------
+    logs : sequence of str or Path
+        The logs of one machine; the machine file is drafted from the first.
+    folder : str or Path
+        The folder to write to; it is made if it does not exist.
+    machine : str or Path, optional
+        A machine file to use in place of a draft; it is named in the benchmark file.
+    force : bool, optional
+        Replace existing files.
+
+    Returns
+    -------
+    DraftedStudy
+        What was written. The groups follow from the logs' ground truth, folders and names.
+
+    Raises
+    ------
+    UsageError
+        A file already exists.
+    CdtoolError
+        No log can be read, or the machine file is wrong.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> from pathlib import Path
+    >>> logs = sorted(Path("sample_logs/gate/stiff").iterdir())
+    >>> study = cdtool.init_study(logs, "study", machine="sample_logs/gate/machine.toml")
+    >>> "[impacts.stiff]" in study.text, "above_n" in study.text
+    (True, True)
+    """
+    target, paths = Path(folder), [Path(log) for log in logs]
+    file = target / "benchmark.toml"
+    _refuse_existing(force, file, *([target / "machine.toml"] if machine is None else []))
+    target.mkdir(parents=True, exist_ok=True)
+    drafted = None if machine is not None else init(paths[0], target / "machine.toml", force=force)
+    machine_path = Path(machine) if machine is not None else target / "machine.toml"
+    made = draft_benchmark(paths, read_machine_file(machine_path), target)
+    _refuse_existing(force, *(target / name for name in made.beside))
+    write_text(file, made.text)
+    for name, text in made.beside.items():
+        write_text(target / name, text)
+    beside = tuple(str(target / name) for name in made.beside)
+    return DraftedStudy(drafted, str(machine_path), str(file), made.text, beside, made.skipped)
+
+
+def _refuse_existing(force: bool, *targets: Path) -> None:
+    for target in targets:
+        if target.exists() and not force:
+            raise UsageError(f"{target}: already exists", "choose another name with -o, or overwrite it with --force")
 
 
 def _settled(log: Path, draft: Draft) -> Drafted:

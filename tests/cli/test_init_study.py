@@ -1,0 +1,118 @@
+"""`cdtool init LOG... -o DIR`: a machine file and a benchmark file that run as drafted."""
+
+import json
+import shutil
+import tomllib
+
+import pytest
+
+import cdtool as api
+from tests.command import cdtool, one_line
+
+
+@pytest.fixture
+def gate(gate_folder, tmp_path):
+    folder = tmp_path / "logs"
+    shutil.copytree(gate_folder, folder)
+    return folder
+
+
+def csv_logs(folder, *groups):
+    return [log for group in groups for log in sorted((folder / group).glob("*.csv"))]
+
+
+def drafted(folder):
+    return tomllib.loads((folder / "benchmark.toml").read_text(encoding="utf-8"))
+
+
+def test_the_draft_runs_as_it_is_and_detects_the_impacts(gate, tmp_path):
+    done = cdtool("init", *csv_logs(gate, "free", "stiff"), "-o", tmp_path / "study")
+    assert done.status == 0, done.err
+    assert "cdtool benchmark" in done.out and "cdtool info" in done.out
+    values = drafted(tmp_path / "study")
+    assert values["machine"] == "machine.toml" and set(values["detectors"]) == {"pt", "pi", "td"}
+    assert values["impacts"]["stiff"]["logs"] == ["../logs/stiff/*.csv"]
+    run = cdtool("benchmark", tmp_path / "study" / "benchmark.toml", "-o", tmp_path / "r.json")
+    assert run.status in (0, 1), run.err
+    results = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+    assert {row["outcome"] for row in results["contacts"] if row["detector"] == "pure_inertia"} == {"detected"}
+
+
+def test_logs_are_grouped_by_folder_and_the_free_ones_are_learned_from(gate, tmp_path):
+    study = api.init_study(csv_logs(gate, "free", "stiff"), tmp_path / "study", machine=gate / "machine.toml")
+    assert study.machine is None and study.machine_path == str(gate / "machine.toml")
+    values = drafted(tmp_path / "study")
+    free = len(csv_logs(gate, "free"))
+    if free >= 10:
+        assert "until" not in values["learn"] and "gm" in values["detectors"]
+    assert list(values["impacts"]) == ["stiff"] and values["onset"]["above_n"] > 0.0
+
+
+def test_without_impact_free_logs_it_learns_from_what_is_before_the_contacts(gate, tmp_path):
+    logs = csv_logs(gate, "stiff")
+    for number in range(2):  # other logs of the same kind
+        logs.append(gate / "stiff" / f"9{number}.csv")
+        logs[-1].write_text(logs[number].read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    api.init_study(logs, tmp_path / "study", machine=gate / "machine.toml")
+    values = drafted(tmp_path / "study")
+    assert (values["threshold"], values["learn"]["until"]) == ("limit", "onset")
+    api.init_study(csv_logs(gate, "stiff")[:2], tmp_path / "two", machine=gate / "machine.toml")
+    assert drafted(tmp_path / "two")["threshold"] == "baseline" and "learn" not in drafted(tmp_path / "two")
+    for folder in ("study", "two"):
+        assert cdtool("benchmark", tmp_path / folder / "benchmark.toml", "--detectors", "gm").status == 0
+
+
+def test_file_names_make_the_groups_of_a_single_folder(gate, tmp_path):
+    mixed = tmp_path / "mixed"
+    mixed.mkdir()
+    for name, log in zip(("wall_01", "wall_02", "foam_01"), 2 * csv_logs(gate, "stiff"), strict=False):
+        shutil.copy(log, mixed / f"{name}.csv")
+    api.init_study(sorted(mixed.iterdir()), tmp_path / "study", machine=gate / "machine.toml")
+    groups = drafted(tmp_path / "study")["impacts"]
+    assert groups == {"foam": {"logs": ["../mixed/foam_01.csv"]}, "wall": {"logs": ["../mixed/wall*.csv"]}}
+
+
+def test_without_ground_truth_it_writes_a_label_file_to_fill_in(gate, tmp_path):
+    text = (gate / "machine.toml").read_text(encoding="utf-8")
+    (gate / "blind.toml").write_text("\n".join(line for line in text.splitlines() if "force =" not in line))
+    logs = csv_logs(gate, "stiff")
+    done = cdtool("init", *logs, "-m", gate / "blind.toml", "-o", tmp_path / "study")
+    assert done.status == 0 and "fill in" in done.out
+    rows = (tmp_path / "study" / "labels.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0] == "recording,start_s,end_s" and len(rows) == 1 + len(logs)
+    contacts = {
+        log.name: api.detect(log, gate / "machine.toml", detector="gm", limit=[400]).contacts[0] for log in logs
+    }
+    filled = [rows[0], *(f"{row[:-2]},{contacts[row[:-2].rpartition('/')[2]].start},6.9" for row in rows[1:])]
+    (tmp_path / "study" / "labels.csv").write_text("\n".join(filled), encoding="utf-8")
+    assert cdtool("benchmark", tmp_path / "study" / "benchmark.toml", "--detectors", "gm").status == 0
+
+
+def test_a_log_that_cannot_be_read_is_named_and_the_others_are_drafted(gate, tmp_path):
+    (gate / "stiff" / "broken.csv").write_text("not,a\nlog,\n", encoding="utf-8")
+    done = cdtool("init", *csv_logs(gate, "stiff"), "-m", gate / "machine.toml", "-o", tmp_path / "study")
+    assert done.status == 3 and "broken.csv" in done.err
+    assert "../logs/stiff/*.csv" not in (tmp_path / "study" / "benchmark.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("a.csv", "b.csv", "-o", "m.toml"), "--output is the file m.toml, with 2 logs (give a folder: -o study)"),
+        (("a.csv", "-m", "x.toml", "-o", "m.toml"), "--output is the file m.toml, with --machine"),
+        (("a.csv", "b.csv"), "--output is the file machine.toml, with 2 logs"),
+        (("missing.csv", "-o", "study"), "missing.csv"),
+    ],
+)
+def test_a_wrong_call_is_one_line(arguments, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = cdtool("init", *arguments)
+    assert done.status == 2 and words in one_line(done.err) and "Traceback" not in done.err
+
+
+def test_existing_files_are_replaced_only_with_force(gate, tmp_path):
+    logs = csv_logs(gate, "stiff")
+    assert cdtool("init", *logs, "-o", tmp_path / "study").status == 0
+    again = cdtool("init", *logs, "-o", tmp_path / "study")
+    assert again.status == 2 and "benchmark.toml: already exists" in again.err
+    assert cdtool("init", *logs, "-o", tmp_path / "study", "--force", "--json").status == 0
