@@ -26,6 +26,8 @@ JOINTS = 6
 _STEP = 1e-3
 # How long it takes to stop [s].
 _BRAKING = 0.06
+# How far the robot is behind its command [s].
+_LAG = 0.02
 _TORQUE_CONSTANT = np.array([9.5, 9.5, 9.5, 7.0, 7.0, 7.0])  # N m per A, at the joint
 _INERTIA = np.array([6.0, 5.0, 2.0, 0.3, 0.2, 0.1])  # kg m2
 _VISCOUS = np.array([12.0, 12.0, 8.0, 2.0, 2.0, 1.5])  # N m s/rad
@@ -73,11 +75,11 @@ def _collision(rng: np.random.Generator) -> Collision:
     onset = rest + ramp + rng.uniform(0.45, 0.85) * cruise
     tool_speed = float(np.abs(top) @ _LEVER)
     force, stop = _contact(time, onset, tool_speed, rng)
-    # The controller stops the robot; the command stays where it was until then.
-    held = np.clip(1.0 - (time - stop) / _BRAKING, 0.0, 1.0)
-    command_share = share * np.clip(1.0 - (time - stop - 0.02) / _BRAKING, 0.0, 1.0)
-    speed = (share * held)[:, np.newaxis] * top
-    command = command_share[:, np.newaxis] * top
+    # The controller stops the robot, which follows the command with a lag.
+    commanded = share * np.clip(1.0 - (time - stop) / _BRAKING, 0.0, 1.0)
+    followed = np.interp(time - _LAG, time, commanded)
+    speed = followed[:, np.newaxis] * top
+    command = commanded[:, np.newaxis] * top
     position = _POSE + np.cumsum(speed, axis=0) * _STEP
     wanted = _POSE + np.cumsum(command, axis=0) * _STEP
     current = _current(position, speed, np.gradient(speed, _STEP, axis=0))

@@ -16,6 +16,8 @@ _DRIVES = 0.6
 # A block directly behind the speeds is preferred unless another one is explained better by this much.
 _BETTER = 0.1
 _BEHIND = 0.2
+# A position is at most this share of its travel from its set value.
+_APART = 0.1
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def find_blocks(streams: list[Stream]) -> Blocks | None:
     found = {"position": _block(streams, chosen, joints), "speed": _block(streams, speed, joints)}
     taken = {chosen, speed}
     for first in positions:
-        if first != chosen and motion.likeness(found["position"], _block(streams, first, joints)) > _ALIKE:
+        if abs(first - chosen) >= joints and _same_values(found["position"], _block(streams, first, joints)):
             found["reference_position"] = _block(streams, first, joints)
             taken.add(first)
             if speeds_of[first][1] != speed:
@@ -85,7 +87,7 @@ def _joints(streams: list[Stream], fits: FloatArray) -> int:
             first, half = pairs[0][0], joints // 2
             if joints % 2 == 0 and half:
                 parts = _block(streams, first, half), _block(streams, first + half, half)
-                if motion.likeness(*parts) > _ALIKE:
+                if _same_values(*parts):
                     return half  # measured and set values, one behind the other
             return joints
     return 0
@@ -114,6 +116,9 @@ def _effort(
         for first in range(len(streams) - joints + 1)
         if not used & set(range(first, first + joints))
     }
+    # A table has its blocks at distances of J columns.
+    aligned = {first: share for first, share in shares.items() if (first - behind) % joints == 0}
+    shares = aligned if max(aligned.values(), default=0.0) >= _DRIVES else shares
     if not shares:
         return None, 0.0
     best = max(shares, key=lambda first: shares[first] + _BETTER * (first == behind))
@@ -121,6 +126,18 @@ def _effort(
     if shares[best] < _DRIVES or (joints == 1 and motion.rests_and_peaks(block)):
         return None, shares[best]
     return block, shares[best]
+
+
+def _same_values(one: Stream, other: Stream) -> bool:
+    """Return whether two blocks of positions are set values and what follows them: like courses, with equal values.
+
+    The joints of a robot often move in proportion, so that like courses alone say nothing.
+    """
+    if motion.likeness(one, other) <= _ALIKE or len(one.values) != len(other.values):
+        return False
+    apart = np.nanmedian(np.abs(one.values - other.values), axis=0)
+    travel = np.nanmax(one.values, axis=0) - np.nanmin(one.values, axis=0)
+    return bool(np.all(apart <= _APART * np.maximum(travel, np.nanmax(travel) * _APART)))
 
 
 def _block(streams: list[Stream], first: int, joints: int) -> Stream:
