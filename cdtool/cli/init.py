@@ -71,6 +71,8 @@ def init(
 
 
 def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
+    from cdtool.workflows.init.benchmark_draft import patterns
+
     typer.echo(study.text)
     names = [*([study.machine_path] if study.machine else []), study.path, *study.beside]
     typer.echo(
@@ -79,7 +81,7 @@ def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
     typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(study.machine_path)}")
     if study.beside:
         typer.echo(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
-        some = " ".join(_quoted(log) for log in logs[:2]) + (" ..." if len(logs) > 2 else "")
+        some = " ".join(pattern if "*" in pattern else _quoted(pattern) for pattern in patterns(logs, Path()))
         typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
     typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
 

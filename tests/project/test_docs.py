@@ -59,6 +59,7 @@ COMMANDS = {
     "docs/study.md": 2,
     "docs/containers.md": 2,
     "docs/init.md": 2,
+    "docs/first-log.md": 6,
 }
 EXAMPLES = {
     "docs/python.md": 13,

@@ -167,6 +167,7 @@ def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_po
             f"{why} Limits are learned from what is before the contacts,",
             "# and each log is scored with what was learned from the others.",
             'threshold = "limit"',
+            '# Or, without learning: threshold = { name = "baseline", safety_factor = 10, widen = true }',
             "",
             "[learn]",
             'until = "onset"',
@@ -222,11 +223,34 @@ def _label_file(logs: Sequence[_Log], folder: Path) -> str:
 
 
 def _paths(logs: Sequence[_Log], folder: Path) -> str:
-    """Return patterns that match exactly these logs, or their paths."""
-    patterns: list[str] = []
+    """Return a TOML array of the logs' patterns."""
+    return _listed(patterns([log.path for log in logs], folder))
+
+
+def patterns(logs: Sequence[Path], folder: Path) -> list[str]:
+    """Return patterns that match exactly these logs, or their paths, relative to a folder.
+
+    Parameters
+    ----------
+    logs : sequence of Path
+        The logs.
+    folder : Path
+        What the patterns are relative to.
+
+    Returns
+    -------
+    list of str
+        A pattern for all logs of a folder and suffix where one fits, else their paths.
+
+    Examples
+    --------
+    >>> patterns(sorted(Path("sample_logs/gate/soft").iterdir()), Path("sample_logs"))
+    ['gate/soft/*.mcap', 'gate/soft/*.csv']
+    """
+    found: list[str] = []
     by_place: dict[tuple[Path, str], list[Path]] = {}
     for log in logs:
-        by_place.setdefault((log.path.parent, log.path.suffix), []).append(log.path)
+        by_place.setdefault((log.parent, log.suffix), []).append(log)
     for (parent, suffix), members in by_place.items():
         stems = {_NUMBER.sub("", path.stem) for path in members}
         stem = stems.pop() if len(stems) == 1 else None
@@ -234,8 +258,8 @@ def _paths(logs: Sequence[_Log], folder: Path) -> str:
         wanted = {path.resolve() for path in members}
         fitting = [each for each in candidates if {path.resolve() for path in parent.glob(each)} == wanted]
         names = fitting[:1] if fitting and len(members) > 1 else [path.name for path in members]
-        patterns += [_relative(parent / name, folder) for name in names]
-    return _listed(patterns)
+        found += [_relative(parent / name, folder) for name in names]
+    return found
 
 
 def _listed(texts: Iterable[str]) -> str:

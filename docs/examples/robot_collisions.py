@@ -1,4 +1,4 @@
-"""Collisions of a six-joint robot, logged as strangers log them: python -m tests.synthetic.robot_collisions FOLDER
+"""Collisions of a six-joint robot, logged as strangers log them: python docs/examples/robot_collisions.py FOLDER
 
 34 CSV files without a header: 40 columns, steps of 17 to 33 ms with jitter, one motion per file that ends in a
 collision somewhere on its way, no impact-free run. Columns: time [s], then for six joints position [rad], speed [rad/s]
@@ -13,6 +13,7 @@ the pose, and the contact through the joints' levers.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from cdtool.recording import FloatArray
 
 FILES = 34
 JOINTS = 6
+# Standard deviations of position [rad], speed [rad/s] and current [A].
+NOISE = (2e-5, 8e-4, 0.04)
 # The motion is computed at this step [s].
 _STEP = 1e-3
 # How long it takes to stop [s].
@@ -85,7 +88,8 @@ def _collision(rng: np.random.Generator) -> Collision:
     current = _current(position, speed, np.gradient(speed, _STEP, axis=0))
     target = _current(wanted, command, np.gradient(command, _STEP, axis=0)) * rng.uniform(0.85, 0.95)
     current += force[:, np.newaxis] * _LEVER * np.sign(top) / _TORQUE_CONSTANT
-    return Collision(_logged(time, position, speed, current, wanted, command, target, force, top, rng), onset)
+    measured, computed = (position, speed, current), (wanted, command, target)
+    return Collision(_logged(time, measured, computed, force, rng), onset)
 
 
 def _contact(time: FloatArray, onset: float, speed: float, rng: np.random.Generator) -> tuple[FloatArray, float]:
@@ -112,14 +116,9 @@ def _current(position: FloatArray, speed: FloatArray, acceleration: FloatArray) 
 
 def _logged(
     time: FloatArray,
-    position: FloatArray,
-    speed: FloatArray,
-    current: FloatArray,
-    wanted: FloatArray,
-    command: FloatArray,
-    target: FloatArray,
+    measured: Sequence[FloatArray],
+    computed: Sequence[FloatArray],
     force: FloatArray,
-    top: FloatArray,
     rng: np.random.Generator,
 ) -> FloatArray:
     """Return the rows (n, 40): samples on a jittered clock, with the sensors' noise, steps and offsets."""
@@ -131,21 +130,22 @@ def _logged(
     direction = rng.standard_normal(3)
     direction /= np.linalg.norm(direction)
     tool = force[at, np.newaxis] * direction + rng.uniform(-6.0, 6.0, 3) + 0.6 * rng.standard_normal((rows, 3))
-    columns = [
-        stamps,
-        position[at] + 2e-5 * rng.standard_normal((rows, JOINTS)),
-        speed[at] + 8e-4 * rng.standard_normal((rows, JOINTS)),
-        current[at] + 0.04 * rng.standard_normal((rows, JOINTS)),
-        wanted[at],
-        command[at],
-        target[at],
-        tool,
+    noisy = [
+        values[at] + noise * rng.standard_normal((rows, JOINTS)) for values, noise in zip(measured, NOISE, strict=True)
     ]
+    columns = [stamps, *noisy, *(values[at] for values in computed), tool]
     return np.column_stack(columns)
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Write the set to the folder that is given; 2 without one."""
     if len(sys.argv) != 2:
-        sys.exit(__doc__)
+        print(__doc__)
+        return 2
     written = write_collisions(Path(sys.argv[1]))
     print(f"{len(written)} logs and onsets.csv written to {sys.argv[1]}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
