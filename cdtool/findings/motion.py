@@ -25,17 +25,19 @@ class NoMotion(TemplateFact):
 
 @frozen
 class Motion(Fact):
-    """Strokes, nominal speed and main direction."""
+    """Strokes, nominal speed and main direction; `joint` leads the motion, empty where there is but one."""
 
     strokes: int
     nominal_speed: float
     unit: str
     direction: Literal["forward", "backward"]
+    joint: str = ""
 
     def sentence(self) -> str:
         """Return all of it."""
+        of = f" of {self.joint}" if self.joint else ""
         return (
-            f"{counted(self.strokes, 'stroke')} by motion; nominal speed {self.nominal_speed:.4g} {self.unit}, "
+            f"{counted(self.strokes, 'stroke')} by motion; nominal speed{of} {self.nominal_speed:.4g} {self.unit}, "
             f"mainly {self.direction}"
         )
 
@@ -88,12 +90,17 @@ class JointsSwapped(TemplateFact):
 
 
 @frozen
-class BelowMinimumSpeed(TemplateFact):
-    """The nominal speed is below the detector's `minimum` one."""
+class BelowMinimumSpeed(Fact):
+    """The nominal speed is below the detector's `minimum` one; `joint` is empty where there is but one."""
 
     minimum: float
+    unit: str
+    joint: str = ""
 
-    words = "nominal speed below minimum_speed ({minimum:g}): not applicable"
+    def sentence(self) -> str:
+        """Return the joint and the minimum."""
+        of = f" of {self.joint}" if self.joint else ""
+        return f"nominal speed{of} below minimum_speed ({self.minimum:g} {self.unit}): not applicable"
 
 
 @frozen

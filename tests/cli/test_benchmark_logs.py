@@ -34,11 +34,16 @@ def read(gate_folder: Path, tmp_path: Path):
     return run
 
 
-@pytest.mark.parametrize("row", ["stiff/1.csv,5.0,5.2\n", "free/01.csv,,\n"])
+@pytest.mark.parametrize("row", ["stiff/1.csv,5.0,5.2\n", "free/99.csv,,\n"])
 def test_a_label_that_fits_no_scored_recording_is_refused_with_its_line(read, row):
     name = row.split(",")[0]
     with pytest.raises(ConfigurationError, match=rf"labels\.csv line 3: '{name}' is not a scored recording"):
         read(LEARN, STIFF, ONSET, labels=f"02.csv,5.0,5.2\n{row}")
+
+
+def test_a_label_may_be_about_a_log_that_is_learned_from_by_its_whole_path(read):
+    labels = read(LEARN, STIFF, ONSET, labels="02.csv,5.0,5.2\nfree/01.csv,,\n").labels
+    assert labels is not None and labels.name_of("free/01.csv") == "free/01.csv"
 
 
 def test_the_onset_rule_of_a_report_names_the_label_file(read):

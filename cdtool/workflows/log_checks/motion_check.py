@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 
@@ -58,7 +59,8 @@ def motion_findings(recording: Recording) -> list[Finding]:
         return [Finding(NoMotion(), "speed", "note")]
     unit = recording["speed"].unit
     strokes = len(motion_spans(recording))
-    fact = Motion(strokes, motion.nominal_speed, unit, "forward" if motion.direction > 0 else "backward")
+    direction: Literal["forward", "backward"] = "forward" if motion.direction > 0 else "backward"
+    fact = Motion(strokes, motion.nominal_speed, unit, direction, _joint_name(recording, motion.joint))
     return [Finding(fact, "speed", "note"), *_consistency(recording)]
 
 
@@ -119,6 +121,11 @@ def units_apart(ratio: float, tolerance: float = 0.05) -> str:
     return units if abs(ratio / factor - 1.0) < tolerance else ""
 
 
+def _joint_name(recording: Recording, joint: int) -> str:
+    """Return the name of a joint; empty if there is but one."""
+    return recording.joints[joint] if len(recording.joints) > 1 else ""
+
+
 def _swapped(recording: Recording, integrals: FloatArray) -> list[Finding]:
     """Return joints whose position follows the speed of another joint: columns in the wrong order."""
     speed, position = recording["speed"], recording["position"]
@@ -159,7 +166,9 @@ def bandwidth_findings(recording: Recording, machine_file: MachineFile) -> list[
     motion = motion_class(recording)
     detector = of_joint(machine_file.detector("friction_ekf"), motion.joint, len(recording.joints))
     if motion.nominal_speed < detector.minimum_speed:
-        return [Finding(BelowMinimumSpeed(detector.minimum_speed), "friction_ekf")]
+        name = _joint_name(recording, motion.joint)
+        below = BelowMinimumSpeed(detector.minimum_speed, recording["speed"].unit, name)
+        return [Finding(below, "friction_ekf")]
     inertia = float(machine_file.machine.nominal_inertia[motion.joint])
     if inertia <= 0.0:
         return []
