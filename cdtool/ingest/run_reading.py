@@ -16,7 +16,7 @@ import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.columns import Column
-from cdtool.errors import RecordingError
+from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.channels import AbsentTruth
 from cdtool.findings.runs import ReturningIds, SamplesOutsideRuns
@@ -100,6 +100,11 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
         The machine file does not fit the log.
     """
     path, pattern = split_run(log)
+    if machine_file.files_beside(path):
+        raise ConfigurationError(
+            f"{machine_file.path}: a channel in a file of its own cannot be divided into the runs of {path}",
+            "write each run to a log of its own, or map a channel of the log",
+        )
     whole = _CutLog.of(path, machine_file, cut)
     segments = whole.segments
     lengths = whole.lengths

@@ -129,7 +129,8 @@ def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Seque
     recordings, others = (
         [shown_path(split_run(log)[0] if runs else log, base) for log in some] for some in (scored, learned)
     )
-    recordings += [name for name in others if name in labels.contacts]
+    labelled = {name.partition("#")[0] if runs else name for name in labels.contacts}
+    recordings += [name for name in others if name in labelled and name not in recordings]
     for name, recording in by_recording(path, labels.contacts, set(recordings), runs=runs).items():
         if runs and recording in recordings:
             raise ConfigurationError(

@@ -179,8 +179,8 @@ def _with_channels(path: Path, recording: Recording) -> Recording:
     return recording
 
 
-# Returns the part of a log, given by its path and recording, that is learned from, and the contacts in it. Raises
-# RecordingError if no part of it is usable.
+# Returns the part of a log or run that is learned from, and the contacts in it, given the log's path as it is listed
+# and the recording. Raises RecordingError if no part of it is usable.
 PartOfLog = Callable[[Path, Recording], tuple[Recording, Sequence[Contact]]]
 
 
@@ -223,18 +223,18 @@ def load_runs(
     known = ranges or PlausibleRanges.learned(
         [item.recording for log in logs if isinstance(log, LogRuns) for item in log.runs]
     )
-    logged: list[tuple[Path, LoggedRecording | CdtoolError]] = []
+    logged: list[tuple[Path, Path, LoggedRecording | CdtoolError]] = []  # as listed, the log or its run
     for path, log in zip(paths, logs, strict=True):
         if isinstance(log, CdtoolError):
-            logged.append((path, log))
+            logged.append((path, path, log))
         elif cut is None:
-            logged += [(path, item) for item in log.runs]
+            logged += [(path, path, item) for item in log.runs]
         else:
-            logged += [(Path(item.recording.source), item) for item in log.runs]
+            logged += [(path, Path(item.recording.source), item) for item in log.runs]
             of_log, about_log = reported(log, path, base)
             skipped += of_log
             findings += about_log
-    for path, item in logged:
+    for listed, path, item in logged:
         try:
             if isinstance(item, CdtoolError):
                 raise item
@@ -242,7 +242,7 @@ def load_runs(
             recording = with_scalar_force(replace(recording, name=shown_path(path, base)), rule)
             contacts: Sequence[Contact] | None = None
             if reading.part:
-                recording, contacts = reading.part(path, recording)
+                recording, contacts = reading.part(listed, recording)
             parts = operations_of(recording, reading.operations)
         except CdtoolError as fault:
             skipped.append(unread(path, base, fault))

@@ -276,3 +276,103 @@ def test_the_files_of_runs_may_not_be_overwritten(folder, together):
     before = (folder / "all.csv").read_bytes()
     refused = command("benchmark", together, "-o", folder / "all.csv", "--force")
     assert refused.status == 2 and (folder / "all.csv").read_bytes() == before
+
+
+def changed(folder: Path, name: str, operations: str, logs: str, *changes: tuple[str, str]) -> Path:
+    """Write the benchmark file with some of its text replaced."""
+    path = benchmark_file(folder, name, operations, logs)
+    text = path.read_text()
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after)
+    path.write_text(text)
+    return path
+
+
+def both_ways(folder, *changes):
+    """Results from separate files and from runs of one file, with the same changes of the benchmark file."""
+    plain = cdtool.benchmark(changed(folder, "plain", "", "{}.csv", *changes))
+    cut = cdtool.benchmark(changed(folder, "cut", 'operations = "column:run_id"', "all.csv#{}", *changes))
+    return plain.results, cut.results
+
+
+@pytest.mark.parametrize("part", ['to = "5s"', 'from = "0.5s"\nto = "0.6m"'])
+def test_parts_of_runs_that_are_learned_from_are_those_of_separate_files(folder, part):
+    plain, cut = both_ways(folder, ("[learn]", f"[learn]\n{part}"))
+    assert figures(cut) == figures(plain)
+    assert (
+        list(cut.provenance["learned_sections"].values()) == 1 * list(plain.provenance["learned_sections"].values())[:1]
+    )
+
+
+def test_runs_are_learned_from_until_their_onset_and_scored_without_their_own_part(folder):
+    until = (
+        ("[learn]", '[signature]\nforce = true\n[learn]\nuntil = "onset"'),
+        ("[signature]\nforce = true\n[holdout]", "[holdout]"),
+    )
+    several = '"{0}stiff_*", "{0}soft_*", "{0}free_*"'
+    plain = changed(
+        folder,
+        "plain",
+        'threshold = "limit"',
+        "{}.csv",
+        *until,
+        ('"free_*.csv"', several.format("").replace("*", "*.csv")),
+    )
+    text = plain.read_text()
+    cut = folder / "cut.toml"
+    named = text.replace('threshold = "limit"', 'threshold = "limit"\noperations = "column:run_id"')
+    for key in ("free", "holdout", "stiff", "soft"):
+        named = named.replace(f'"{key}_*.csv"', f'"all.csv#{key}_*"')
+    cut.write_text(named)
+    one, other = cdtool.benchmark(plain).results, cdtool.benchmark(cut).results
+    assert figures(other) == figures(one)
+    patterns = ("all.csv#stiff_*", "all.csv#soft_*")
+    assert other.provenance["scored_without_own_part"] == list(patterns)
+    cut.write_text(named.replace('"all.csv#stiff_*", "all.csv#soft_*", "all.csv#free_*"', '"all.csv#[fs]*"'))
+    assert figures(cdtool.benchmark(cut).results) == figures(one), "other patterns name the same runs"
+
+
+def test_the_synchronisation_is_measured_on_runs_as_on_files(folder):
+    plain, cut = both_ways(folder, ("above_n = 20.0", 'above_n = 20.0\nsynchronisation = "measured"'))
+    assert figures(cut) == figures(plain)
+    early = 'to = "3s"\nlogs = '
+    with pytest.raises(ConfigurationError, match="measured, but not assessable"):
+        both_ways(
+            folder,
+            ("above_n = 20.0", 'above_n = 20.0\nsynchronisation = "measured"'),
+            ("[impacts.stiff]\nlogs = ", f"[impacts.stiff]\n{early}"),
+            ("[impacts.soft]\nlogs = ", f"[impacts.soft]\n{early}"),
+        )
+
+
+def test_a_load_cell_in_a_file_of_its_own_cannot_be_divided_into_runs(folder):
+    machine = (folder / "machine.toml").read_text().splitlines()
+    own = 'force = { file = "cell_{stem}.csv", column = "F", unit = "N", time_offset = 0.0, '
+    own += 'time = { column = "t", unit = "s" } }'
+    lines = [own if line.startswith("force = { column") else line for line in machine]
+    (folder / "own.toml").write_text("\n".join(lines))
+    path = changed(folder, "own_cell", 'operations = "column:run_id"', "all.csv#{}", ("machine.toml", "own.toml"))
+    with pytest.raises(ConfigurationError, match="operations: cannot divide a channel that is in a file of its own"):
+        cdtool.benchmark(path)
+    arguments = ("-m", folder / "own.toml", "--operations", "column:run_id", "-d", "gm", "--limit", "200")
+    done = command("detect", f"{folder / 'all.csv'}#stiff_03", *arguments)
+    assert done.status == 2 and "cannot be divided into the runs of" in one_line(done.err)
+
+
+def test_a_label_may_be_about_a_run_of_a_file_that_is_only_learned_from(folder):
+    (folder / "learned.csv").write_text((folder / "all.csv").read_text())
+    (folder / "about_runs.csv").write_text(
+        "recording,start_s,end_s\nlearned.csv#free_03,2.0,2.1\nall.csv#stiff_03,6.2,6.4\n"
+    )
+    onset = ("above_n = 20.0\nback_to_n = 8.0", 'labels = "about_runs.csv"')
+    path = changed(
+        folder,
+        "about",
+        'operations = "column:run_id"\nthreshold = "baseline"',
+        "all.csv#{}",
+        onset,
+        ("all.csv#free", "learned.csv#free"),
+    )
+    done = cdtool.benchmark(path).results
+    assert [item.recording for item in done.skipped if "shows a contact" in item.reason] == ["learned.csv#free_03"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -126,8 +127,13 @@ class BenchmarkFile:
     @cached_property
     def both(self) -> tuple[Path, ...]:
         """Return the scored logs that are also learned from: each is scored with what the others gave."""
+        if self.guard is None and not self.learned_sections:
+            return ()
+        logs = [path for name, group in self.impacts.items() if name != HOLDOUT for path in group.logs]
+        if self.has_runs:
+            return tuple(log for log in logs if any(_may_share_a_run(log, other) for other in self.learn))
         learned = {path.resolve() for path in self.learn}
-        return tuple(path for group in self.impacts.values() for path in group.logs if path.resolve() in learned)
+        return tuple(path for path in logs if path.resolve() in learned)
 
     def _in_words(self, sections: Mapping[Path, LogSection]) -> dict[str, str]:
         return {shown_path(path, self.path.parent): str(section) for path, section in sections.items()}
@@ -190,6 +196,9 @@ def read_benchmark_file(
     threshold, rule = read_threshold(root, signature)
     operations = _read_operations(root)
     found = LogsOf(base, machine_file, RunCut.of(operations) is not None)
+    if found.runs and (machine_file.columns.beside or machine_file.topics.beside):
+        hint = "write each run to a log of its own, or map a channel of the log"
+        raise root.fault("operations", "cannot divide a channel that is in a file of its own into runs", hint)
     needs_runs = learning and not is_per_run(rule)
     learn_table = root.table("learn", required=needs_runs)
     guard = _guard(learn_table)
@@ -285,6 +294,14 @@ def with_only(setup: BenchmarkFile, detectors: Sequence[str]) -> BenchmarkFile:
     """Return the benchmark with only these detectors, and the limits set for them or for every detector."""
     limits = tuple(rule for rule in setup.limits if rule.detector in (ALL, *detectors))
     return replace(setup, detectors=tuple(detectors), limits=limits)
+
+
+def _may_share_a_run(one: Path, other: Path) -> bool:
+    """Return whether two logs, each as FILE or FILE#PATTERN, can name the same run."""
+    (file, first), (other_file, second) = split_run(one), split_run(other)
+    if file.resolve() != other_file.resolve():
+        return False
+    return not first or not second or fnmatchcase(first, second) or fnmatchcase(second, first)
 
 
 def _guard(learn: Table) -> float | None:

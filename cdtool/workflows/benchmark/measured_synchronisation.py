@@ -14,10 +14,12 @@ from cdtool.errors import CdtoolError, ConfigurationError
 from cdtool.evaluation.results import RecordingFinding
 from cdtool.findings import Finding
 from cdtool.findings.synchronisation import MeasuredSynchronisation
+from cdtool.log_section import LogSection
+from cdtool.operations import RunCut
 from cdtool.plain_text import counted
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.contacts.true_contacts import any_contacts
-from cdtool.workflows.runs import read_named
+from cdtool.workflows.runs import named_on_load_side, runs_of
 from cdtool.workflows.workers import in_order
 
 if TYPE_CHECKING:
@@ -38,19 +40,30 @@ class _LogAudit:
 
     setup: BenchmarkFile
 
-    def __call__(self, work: tuple[str, Path]) -> _Audited:
+    def __call__(self, work: tuple[str, Path]) -> list[_Audited]:
         from cdtool.evaluation.synchronisation.audit import audit
 
         group, path = work
+        setup = self.setup
+        cut = RunCut.of(setup.operations)
         try:
-            setup = self.setup
-            recording = read_named(path, setup.machine_file, setup.path.parent, onset=setup.onset)
-            contacts = any_contacts(recording, self.setup.rules_of(group))
+            runs = runs_of(path, setup.machine_file, cut).runs
         except CdtoolError:
-            return _Audited()  # left out with its reason when it is scored
-        own = [contact for contact in contacts if contact.found_by == "load cell"]
-        found = audit(recording, self.setup.machine_file.machine, own) if own else ()
-        return _Audited(tuple(item for item in found if item.channel == "force"), recording.origin)
+            return []  # left out with its reason when it is scored
+        audited = []
+        for logged in runs:
+            run = path if cut is None else Path(logged.recording.source)
+            try:
+                whole = named_on_load_side(logged, run, setup.machine_file, setup.path.parent, None, setup.onset)
+                section = setup.sections.get(path, LogSection())
+                recording = section.of(whole)
+                contacts = section.contacts_of(whole, any_contacts(whole, setup.rules_of(group)))
+            except CdtoolError:
+                continue
+            own = [contact for contact in contacts if contact.found_by == "load cell"]
+            found = audit(recording, setup.machine_file.machine, own) if own else ()
+            audited.append(_Audited(tuple(item for item in found if item.channel == "force"), recording.origin))
+        return audited
 
 
 def with_synchronisation(setup: BenchmarkFile, jobs: int = 1) -> tuple[BenchmarkFile, list[RecordingFinding]]:
@@ -64,7 +77,7 @@ def with_synchronisation(setup: BenchmarkFile, jobs: int = 1) -> tuple[Benchmark
     from cdtool.workflows.log_checks.synchronisation import latency_findings
 
     work = [(group, path) for group, item in setup.impacts.items() if group != HOLDOUT for path in item.logs]
-    audited = list(in_order(_LogAudit(setup), work, len(work), jobs))
+    audited = [item for log in in_order(_LogAudit(setup), work, len(work), jobs) for item in log]
     found = _of_all(audited)
     if found is None or not found.assessable:
         why = found.reason if found else f"none of {counted(len(work), 'log')} has a contact that its load cell shows"

@@ -30,9 +30,12 @@ class PartToLearnFrom:
     sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
 
-    def __call__(self, path: Path, recording: Recording) -> tuple[Recording, Sequence[Contact]]:
-        """Return the part of a log and the contacts in it; raises RecordingError if there is no such part."""
-        section = self.sections.get(path, LogSection())
+    def __call__(self, listed: Path, recording: Recording) -> tuple[Recording, Sequence[Contact]]:
+        """Return the part of a log or run and the contacts in it; raises RecordingError if there is no such part.
+
+        `listed` is the path under which `sections` has it.
+        """
+        section, path = self.sections.get(listed, LogSection()), recording.source
         if self.guard is None:
             part = section.of(recording)
             if self._is_labelled(recording):
@@ -61,7 +64,7 @@ class PartToLearnFrom:
         labels = self.rules.labels
         return labels is not None and labels.name_of(recording.name) is not None
 
-    def _refuse_without_truth(self, path: Path, recording: Recording) -> None:
+    def _refuse_without_truth(self, path: str, recording: Recording) -> None:
         """Raise RecordingError if a contact would not be seen: without ground truth, or where it is lost."""
         if not any(channel in recording for channel in GROUND_TRUTH):
             raise RecordingError(
