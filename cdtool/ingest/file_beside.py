@@ -16,7 +16,7 @@ import numpy as np
 from cdtool.channels import ChannelMap, ChannelSource, OwnFile
 from cdtool.dynamics import Machine
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
+from cdtool.findings import Finding, Severity
 from cdtool.findings.channels import AbsentFile, AbsentTruth
 from cdtool.findings.clocks import ClocksApart, FileAligned, TriggersDiffer, TriggersDrift
 from cdtool.formats.source import Source
@@ -105,10 +105,12 @@ def _with_file(
             "check how the clocks are aligned",
         )
     aligned = FileAligned(path.name, shift.seconds, own.align, shift.within, len(moved) - len(inside))
+    # More outside than inside: the clocks may have other units, or be aligned wrongly.
+    severity: Severity = "warning" if 2 * len(inside) < len(moved) else "note"
     return replace(
         recording,
         channels={**recording.channels, name: inside},
-        findings=(*recording.findings, *findings, *shift.findings, Finding(aligned, name, "note")),
+        findings=(*recording.findings, *findings, *shift.findings, Finding(aligned, name, severity)),
         beside=(*recording.beside, (path.name, beside.digest)),
         truth_clock=max(recording.truth_clock, shift.within),
     )

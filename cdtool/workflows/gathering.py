@@ -182,8 +182,9 @@ class Gathering:
 
     @property
     def scored(self) -> frozenset[str]:
-        """Return the names of the recordings that were scored."""
-        return frozenset(item.recording.recording for item in self.outcomes if item.recording)
+        """Return the names of the recordings that were scored or left out by name."""
+        skipped = {item.recording for item in self.skipped}
+        return frozenset(skipped.union(item.recording.recording for item in self.outcomes if item.recording))
 
     def _refuse_learned(self, recording: RecordingResult) -> None:
         before = self._scored.get(recording.sha256, "") if recording.sha256 else ""
