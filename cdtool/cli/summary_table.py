@@ -11,6 +11,7 @@ import typer
 from cdtool.cli.console import leave, number, plain, say, table
 from cdtool.cli.truth_shown import show_truth
 from cdtool.exit_status import Fact
+from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
@@ -62,6 +63,10 @@ def show_table(evaluated: Evaluated) -> None:
             f"{item.detector}: safety factor {item.safety_factor:.3g} for a budget of {item.budget}: "
             f"{item.alarms} {_what(item)} {item.operations} operations ({item.hours:.3g} h) used to set it"
         )
+    if provenance.get("learned_until"):
+        say(f"learned from each log until {provenance['learned_until']}")
+    if others := provenance.get("scored_without_own_part"):
+        say(f"{counted(len(others), 'recording')} scored with thresholds learned from the other recordings")
     for line in partly_unassessed(evaluated.results, evaluated.summaries)[:_SHOWN]:
         say(line)
     show_truth(evaluated)

@@ -13,6 +13,8 @@ from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
 from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
 from cdtool.workflows.runs import load_runs
+from tests.command import cdtool as command
+from tests.command import one_line
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["gm"]\nthreshold = "limit"\n'
 LEARN = '[learn]\nuntil = "onset"\nlogs = ["stiff/*.csv", "soft/*.csv"]\n'
@@ -46,6 +48,12 @@ def test_all_contacts_are_detected_and_nothing_before_them_is_an_alarm(gate):
     provenance = done.results.provenance
     assert provenance["learned_until"] == "0.2 s before the first contact of each log"
     assert sorted(provenance["scored_without_own_part"]) == sorted(provenance["learned_runs"])
+
+
+def test_the_screen_states_how_it_was_learned(gate):
+    done = command("benchmark", setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
+    assert "learned from each log until 0.2 s before the first contact of each log" in one_line(done.out)
+    assert "7 recordings scored with thresholds learned from the other recordings" in one_line(done.out)
 
 
 def test_what_is_learned_ends_before_the_onset_by_the_guard(gate):
