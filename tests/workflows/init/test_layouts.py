@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 
 import numpy as np
@@ -94,3 +95,19 @@ def test_the_score_counts_joints_that_are_left_out(tmp_path):
     )
     done = score(layout, tmp_path)
     assert "speed" in done.right and [text.split(":")[0] for text in done.wrong if "joints" in text] == ["position"]
+
+
+def test_the_score_accepts_further_channels_of_a_column_and_optional_columns(tmp_path):
+    """The position is a set value that may be mapped as a measured one; the current may stay unmapped."""
+    layout = small({"pos [m]": (Truth("", unit="m"), np.sin), "strange": (Truth("torque"), np.ones_like)})
+    strict = score(layout, tmp_path)
+    assert strict.missing == ("torque",) and [text.split(":")[0] for text in strict.wrong] == ["position"]
+    accepting = dataclasses.replace(layout, accept={"pos [m]": ("position",), "strange": ("",)})
+    done = score(accepting, tmp_path)
+    assert done.expected == done.right == ("time",) and not done.missing
+
+
+def test_the_score_knows_columns_by_their_order_where_the_reader_has_other_names(tmp_path):
+    layout = small({"pos [m]": (Truth("position", unit="m"), np.sin)})
+    renamed = dataclasses.replace(layout, truth=dict(zip(("A", "B"), layout.truth.values(), strict=True)))
+    assert set(score(renamed, tmp_path).right) == {"time", "position"}
