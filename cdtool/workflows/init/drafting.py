@@ -159,8 +159,8 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
 
 
 def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
-    """Return the doubt about a clock's unit known only from its name, if only another unit fits the ratio."""
-    if clock is None or not clock.by_name or ratio is None or ratio.fitting:
+    """Return the doubt about a clock's unit that is only written, if only another unit fits the ratio."""
+    if clock is None or not clock.written or ratio is None or ratio.fitting:
         return ""
     other = ratio_of(channels, replace(clock, told=""), messages_si=False)
     if other is None or not other.fitting or other.tick:
