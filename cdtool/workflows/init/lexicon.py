@@ -58,7 +58,9 @@ LONG: Mapping[str, tuple[str, ...]] = {
 }
 # Words that must be separate.
 SHORT: Mapping[str, tuple[str, ...]] = {
-    "position": _listed("pos posn phi theta q qm qmsr x s p mp jp ip ang enc encoder", "weg lage hub geber drehgeber", "course"),
+    "position": _listed(
+        "pos posn phi theta q qm qmsr x s p mp jp ip ang enc encoder", "weg lage hub geber drehgeber", "course"
+    ),
     "speed": _listed("mv jv qd dq qp qdot dphi dtheta thetad thetadot w n v vx vel velo spd rpm", "giri"),
     "acceleration": _listed("acc acel qdd ddq qddot ddtheta ax ay az a"),
     "torque": _listed("tau trq tor tq mt jt iq isq i m pwm duty u amps amp curr cur", "par"),
