@@ -273,7 +273,13 @@ def _drive(channels: Channels) -> None:
 def _drive_score(channels: Channels, item: Named, share: float) -> float:
     """Rank efforts: those that inertia and friction explain, then by name; a torque before a current."""
     alike = [_alike(item, (0.0, "", found.stream)) for found in channels.found.values()]
-    score = item[0] + _PHYSICS * (share > _DRIVES_BY_LETTER) + max(alike, default=0.0) + is_actual(item[2].name)
+    score = (
+        item[0]
+        + _PHYSICS * (share > _DRIVES_BY_LETTER)
+        + max(share, 0.0)
+        + max(alike, default=0.0)
+        + is_actual(item[2].name)
+    )
     return score - 0.6 * is_current(label(item[2]))
 
 
@@ -285,7 +291,7 @@ def _rate_and_position(channels: Channels) -> tuple[Stream | None, Stream | None
 
 
 def _acceleration(channels: Channels) -> None:
-    named = [item for item in _named_for(channels, "acceleration") if item[2].moves]
+    named = [item for item in _named_for(channels, "acceleration") if item[2].moves and not motion.is_flag(item[2])]
     if not named:
         return
     speed = channels.found.get("speed")
