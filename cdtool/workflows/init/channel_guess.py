@@ -92,15 +92,34 @@ def name_strength(quantity: str, stream: Stream) -> tuple[float, str]:
 
 
 def _joint_count(streams: Iterable[Stream]) -> int:
-    """Return the width of the families with the most quantities; of several such widths the largest."""
+    """Return the width of the families with the most quantities; of several such widths the largest.
+
+    Families of efforts alone are several motors of one joint if a single position or speed is named.
+    """
     quantities: dict[int, set[str]] = {}
     for stream in streams:
         for quantity in ("position", "speed", "torque"):
             strength, word = name_strength(quantity, stream) if stream.moves and stream.width > 1 else (0.0, "")
             if strength and (word != _TOLD_UNIT or stream.width > 2):
                 quantities.setdefault(stream.width, set()).add(quantity)
+    if all(found == {"torque"} for found in quantities.values()) and _has_single_motion(streams):
+        return 1
     several = [(len(found), width) for width, found in quantities.items()]
     return max(several)[1] if several else 1
+
+
+def _has_single_motion(streams: Iterable[Stream]) -> bool:
+    """Whether a column of no family has the name of a measured position or speed that moves."""
+    listed = list(streams)
+    of_families = {column for stream in listed if stream.width > 1 for column in stream.columns}
+    return any(
+        stream.width == 1
+        and stream.moves
+        and not of_families & set(stream.columns)
+        and not is_reference(stream.name)
+        and any(name_strength(quantity, stream)[0] >= _SPEAKS for quantity in ("position", "speed"))
+        for stream in listed
+    )
 
 
 def _elements(stream: Stream) -> list[Stream]:
@@ -229,7 +248,7 @@ def _partner(channels: Channels, stream: Stream, other: str) -> None:
         pair = (stream, candidate) if other == "speed" else (candidate, stream)
         return motion.integral_fit(*pair).correlation
 
-    found = _best(_unnamed_for(channels, other), fit)
+    found = _best([item for item in _unnamed_for(channels, other) if not is_reference(item.name)], fit)
     if found is not None and found[0] > _FITS:
         relation = "integral" if other == "speed" else "derivative"
         channels.take(other, found[1], f"its {relation} fits '{stream.name}', r = {found[0]:.3f}", _BY_COURSE)

@@ -12,7 +12,7 @@ from cdtool.formats.source import Source
 from cdtool.ingest.clock_guess import GuessedClock, guess_clock
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
-from cdtool.workflows.init.quantity_words import is_clock, is_counter, word_for
+from cdtool.workflows.init.quantity_words import is_clock, is_counter, name_in_group, word_for
 from cdtool.workflows.init.units_in_names import unit_in_name
 
 _UNITS = ("s", "ms", "us", "ns", "min")
@@ -127,7 +127,8 @@ def _is_measured(name: str) -> bool:
 
 
 def _has_clock_name(name: str) -> bool:
-    return is_clock(name) and not _is_measured(name)
+    own = name_in_group(name)
+    return is_clock(own) and not _is_measured(own)
 
 
 def _has_time_unit(column: Column) -> bool:

@@ -34,7 +34,8 @@ _TAILS = {
     "kgf": "kgf", "a": "A", "ma": "mA", "v": "V", "mv": "mV", "percent": "%", "prozent": "%", "pct": "%",
     "counts": "count", "tr_min": "rpm", "giri_min": "rpm", "rev_min": "rpm", "r_min": "rpm", "rev_s": "rev/s",
     "rad_sec": "rad/s", "deg_sec": "deg/s", "mm_min": "mm/min", "count": "count", "cnt": "count",
-    "meters": "m", "metres": "m", "meters_per_sec": "m/s", "meters_per_second": "m/s", "cnts": "count", "inc": "count", "ticks": "count",
+    "cnts": "count", "inc": "count", "ticks": "count",
+    "meters": "m", "metres": "m", "meters_per_sec": "m/s", "meters_per_second": "m/s",
 }  # fmt: skip
 _SEPARATOR = re.compile(r"[\W_]+")
 # Units of other quantities: temperature, power, frequency, pressure, resistance, energy.
