@@ -76,7 +76,8 @@ def is_something_else(name: str) -> bool:
 @lru_cache(maxsize=4096)
 def what_else(name: str) -> str:
     """Return what a name indicates instead of a channel: "a temperature"; an empty text if nothing does."""
-    if (channel := name_in_group(name)) != name and is_clock(channel):
+    channel = name_in_group(name)
+    if channel != name and is_clock(channel) and not any(word_for(quantity, channel)[0] for quantity in lexicon.LONG):
         return "a time"
     joined = "_".join(words(name))
     return next((reason for reason, pattern in lexicon.OTHERS if pattern.search(joined)), "")
