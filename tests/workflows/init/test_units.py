@@ -177,3 +177,13 @@ def test_a_clock_with_empty_cells_gives_way_to_a_complete_one(tmp_path):
     lines[2000] = "," + lines[2000].split(",", 1)[1]
     path.write_text("\n".join(lines) + "\n")
     assert drafted(path, tmp_path).channels["time"]["column"] == "timestamp"
+
+
+@pytest.mark.parametrize("column", ["time [s]", "时间(s)"])
+def test_a_clock_whose_header_states_seconds_but_counts_milliseconds_is_marked(tmp_path, column):
+    run = stroke()
+    draft = drafted_columns(
+        tmp_path, {column: 1e3 * run.time, "pos [mm]": 1e3 * run.travel, "vel [mm/s]": 1e3 * run.speed}
+    )
+    assert draft.channels["time"]["unit"] == "s" and draft.checked("time")
+    assert "ms with mm, mm/s fits the ratio, s does not" in draft.said("time")
