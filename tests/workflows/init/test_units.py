@@ -187,3 +187,12 @@ def test_a_clock_whose_header_states_seconds_but_counts_milliseconds_is_marked(t
     )
     assert draft.channels["time"]["unit"] == "s" and draft.checked("time")
     assert "ms with mm, mm/s fits the ratio, s does not" in draft.said("time")
+
+
+@pytest.mark.parametrize(("step", "doubted"), [(20.0, True), (1.0, True), (0.02, False)])
+def test_a_stated_unit_that_makes_a_log_slower_than_any_is_marked_without_a_motion_to_compare(tmp_path, step, doubted):
+    run = stroke(0.02)
+    clock = np.arange(len(run.time)) * step
+    draft = drafted_columns(tmp_path, {"time [s]": clock, "pos [mm]": 1e3 * run.travel})
+    assert draft.checked("time") is doubted
+    assert ("Hz" in draft.said("time")) is doubted
