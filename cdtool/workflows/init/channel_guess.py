@@ -33,6 +33,8 @@ _MOST_PAIRS = 32
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
 # A set value is ahead of its measured value by at least this share of a sample.
 _AHEAD = 0.2
+# Above this correlation, and without any lead, it is the measured value once more.
+_SAME = 0.999999
 # A set value that resembles another channel by this much more is not that of this one.
 _CLOSER = 0.2
 _BY_COURSE = "guessed from its values only"
@@ -426,6 +428,8 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
         return
     own, others = word_for(quantity, label(stream)), word_for(quantity, label(other))
     ahead = motion.lead(stream, other)
+    if correlation > _SAME and abs(ahead) < _AHEAD and not is_reference(other.name):
+        return  # the same sensor in another unit
     if abs(ahead) < _AHEAD:
         smoother = motion.roughness(other) < motion.roughness(stream)
         alike = own[1] == others[1] or not others[1] or is_reference(other.name)

@@ -151,7 +151,7 @@ OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
         "a following error",
         re.compile(
             r"schlepp|following|deviation|abweichung|error|err(?:_|$)|(?:^|_)lag(?:_|$)|diff(?:_|$)|(?:^|_)dev(?:_|$)"
-            r"|ecart|erreur|errore|inseguimento|seguimiento|误差|誤差|偏差"
+            r"|ecart|erreur|errore|inseguimento|seguimiento|误差|誤差|偏差|溜り|溜まり|滞留"
         ),
     ),
     (

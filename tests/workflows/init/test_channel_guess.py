@@ -202,3 +202,15 @@ def test_measured_and_interpolated_positions_are_known_by_two_letters(tmp_path):
     assert draft.channels["position"]["columns"] == ["mp1", "mp2"]
     assert draft.channels["torque"]["columns"] == ["mt1", "mt2"]
     assert draft.channels["reference_position"]["columns"] == ["ip1", "ip2"]
+
+
+def test_the_same_position_in_counts_is_no_set_value(tmp_path):
+    run = stroke()
+    draft = drafted_columns(
+        tmp_path,
+        {
+            "t [s]": run.time, "speed [m/s]": run.speed, "pos [m]": np.round(run.travel, 3),
+            "motor current [A]": run.torque, "tachometer": np.floor(6631.6 * run.travel),
+        },
+    )  # fmt: skip
+    assert column(draft, "position") == "pos [m]" and "reference_position" not in draft.channels
