@@ -118,3 +118,7 @@ def test_words_in_cells_do_not_change_the_decision(log):
     rows = "".join(f"{i},門が閉じた\n" for i in range(50))
     source = Csv().columns(log(("t,状態\n" + rows).encode("cp932")))
     assert source.names == ("t", "状態") and list(source.columns) == ["t"]
+
+
+def test_words_behind_many_rows_of_numbers_are_recognised():
+    assert east_asian(b"1,2\n" * 8000 + table(JAPANESE[3], "cp932")) == "cp932"

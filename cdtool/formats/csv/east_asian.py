@@ -18,12 +18,16 @@ _LETTERS, _DIFFERENT = {"cp932": 3, "gb18030": 4}, 3
 _COMMON, _IN_WORDS = 0.75, 0.5
 # A word directly behind a small letter is part of a Latin one.
 _WORD = re.compile(r"([a-z]?)([^\x00-\x7f]+)")
+_HIGH = re.compile(rb"[\x80-\xff]")
+_DECIDING_BYTES = 1 << 14
 _SYMBOLS_OF_JAPAN = range(0x81, 0x84)
 _SYMBOLS_OF_CHINA = (0xA1, 0xA2, 0xA3, 0xA6, 0xA9)
 
 
 def east_asian(sample: bytes) -> str | None:
     """Return "cp932" or "gb18030" for text in one of them, which is not UTF-8; None for any other text.
+
+    The lines from the first with a byte above 0x7f on decide, up to 16 KB of them.
 
     Parameters
     ----------
@@ -37,9 +41,12 @@ def east_asian(sample: bytes) -> str | None:
     >>> east_asian("Zeit,Größe,Türöffnung,créée".encode("cp1252")) is None
     True
     """
+    first = _HIGH.search(sample)
+    begin = sample.rfind(b"\n", 0, first.start()) + 1 if first else 0
+    lines = sample[begin : begin + _DECIDING_BYTES]
     for encoding, kind in (("cp932", _japanese), ("gb18030", _chinese)):
         try:
-            text = codecs.getincrementaldecoder(encoding)().decode(sample)
+            text = codecs.getincrementaldecoder(encoding)().decode(lines)
         except UnicodeDecodeError:
             continue
         if _is_plausible(Counter(_WORD.findall(text)), encoding, kind):

@@ -40,8 +40,6 @@ _CLOSER = 0.2
 _BY_COURSE = "guessed from its values only"
 # Below this correlation a letter alone (`a`, `s`, `n`) is no name of what the physics denies.
 _DENIES = 0.5
-# Below this one it is not even the acceleration of something that moves with the joint.
-_UNRELATED = 0.2
 # A one-letter name is weaker evidence for a quantity than the first; a unit alone is the second, `J1` alone the third.
 _SPEAKS, _BY_UNIT, _BY_JOINT = 2.0, 0.8, 0.5
 # Physics that agrees counts more than any name.
@@ -323,7 +321,7 @@ def _acceleration(channels: Channels) -> None:
     fits = {id(item[2]): motion.derivative_fit(item[2], speed.stream).correlation for item in top}
     chosen = max(top, key=lambda item: abs(fits[id(item[2])]))
     correlation = fits[id(chosen[2])]
-    if abs(correlation) < (_DENIES if chosen[0] < _SPEAKS else _UNRELATED):
+    if chosen[0] < _SPEAKS and abs(correlation) < _DENIES:
         return
     told = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
     rivals = [item for item in top if abs(fits[id(item[2])]) > _FITS] if told else top
