@@ -28,8 +28,10 @@ _UNITS = ((0.5, "s"), (500.0, "ms"), (5e5, "us"), (np.inf, "ns"))
 # seconds has longer steps.
 _EXCEL_FIRST, _EXCEL_LAST, _EXCEL_STEP = 36526.0, 73051.0, 5e-5
 _DAY = 86400.0
-# A column is a clock if at least this share of its steps is forward, and at least this share is near the median.
+# A column is a clock if at least this share of its steps is forward, and at least this share is near the median: within
+# the first limits, as multiples of it, or the second ones for a column with the name of a clock.
 _FORWARD, _REGULAR = 0.95, 0.8
+_NEAR, _NEAR_IF_NAMED = (0.5, 1.5), (0.1, 10.0)
 # Up to this many time stamps are kept in memory (32 MiB) instead of being read again.
 _MOST_KEPT = 1 << 22
 # Yields the pieces of a column's values; each call starts again from the first piece.
@@ -99,7 +101,7 @@ def find_clock(
         if known.steps < 3 or known.forward < _FORWARD * known.steps:
             continue
         stamps = _stamps(column, known.present, read_column)
-        step = _usual_step(stamps())
+        step = _usual_step(stamps(), _NEAR_IF_NAMED if is_clock_name(column) else _NEAR)
         if step is not None:
             return _describe(source.columns[column], source.first_row, step, stamps)
     return None
@@ -113,7 +115,7 @@ def _stamps(column: str, count: int, read_column: ReadColumn) -> Callable[[], It
     return lambda: kept
 
 
-def _usual_step(stamps: Iterable[FloatArray]) -> float | None:
+def _usual_step(stamps: Iterable[FloatArray], near: tuple[float, float]) -> float | None:
     """Return the median step between time stamps; None if the steps are too irregular for a clock."""
     steps, last = Distribution(), np.empty(0)
     for piece in stamps:
@@ -121,7 +123,7 @@ def _usual_step(stamps: Iterable[FloatArray]) -> float | None:
         steps.add(np.diff(known))
         last = known[-1:]
     median = steps.median
-    regular = median > 0.0 and steps.share(0.5 * median, 1.5 * median) >= _REGULAR
+    regular = median > 0.0 and steps.share(near[0] * median, near[1] * median) >= _REGULAR
     return median if regular else None
 
 

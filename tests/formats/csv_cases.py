@@ -139,6 +139,8 @@ def _lettered(table: Table, codec: str, names: tuple[str, str, str]) -> Content:
 for _codec, _names in {
     "latin-1": ("t [µs]", "größe [°]", "b"),
     "cp1252": ("t", "Kraft – Ist [µN]", "€"),
+    "cp932": ("時間", "位置 [mm]", "トルク"),
+    "gb18030": ("时间", "位置 [mm]", "转速"),
     "utf-8": ("zeit", "ω [°/s]", "Δx"),
     "utf-16": ("t", "力", "b"),
 }.items():

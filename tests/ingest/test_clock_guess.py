@@ -28,3 +28,11 @@ def test_the_last_part_of_a_name_is_that_of_a_clock(name):
 @pytest.mark.parametrize("name", ["log.torque", "speed [m.t]", "target.q"])
 def test_other_last_parts_are_no_clocks(name):
     assert not is_clock_name(name)
+
+
+@pytest.mark.parametrize(("name", "is_one"), [("time", True), ("travel", False)])
+def test_uneven_steps_are_those_of_a_clock_only_if_its_name_says_so(tmp_path, name, is_one):
+    steps = np.random.default_rng(1).choice([0.005, 0.016, 0.031, 0.047], 2000)
+    path = tmp_path / "log.csv"
+    path.write_text(f"{name},torque\n" + "".join(f"{time:.3f},{i % 7}\n" for i, time in enumerate(np.cumsum(steps))))
+    assert any(getattr(finding.fact, "evidence", "") == "steps" for finding in info(path).findings) is is_one

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from cdtool.errors import RecordingError
+from cdtool.formats.csv.east_asian import east_asian
 from cdtool.formats.csv.text import UNIT_BYTES, Text
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
@@ -124,6 +125,8 @@ def _narrow(sample: bytes) -> str:
     try:
         codecs.getincrementaldecoder("utf-8")().decode(sample)
     except UnicodeDecodeError:
+        if asian := east_asian(sample):
+            return asian
         # Bytes 0x80 to 0x9f are letters and quotes in Windows-1252, control characters in Latin-1.
         return "cp1252" if any(0x80 <= byte <= 0x9F for byte in set(sample)) else "latin-1"
     return "utf-8"

@@ -47,7 +47,12 @@ _SCORED = 150
 # A strong separator that occurs equally often in this share of the lines is preferred, even with fewer numbers.
 _CONSISTENT = 0.9
 _STRONG = "\t;|"
-_SHOWN_ENCODINGS = {"cp1252": "Windows-1252", "latin-1": "Latin-1"}
+_SHOWN_ENCODINGS = {
+    "cp1252": "Windows-1252",
+    "latin-1": "Latin-1",
+    "cp932": "Shift-JIS",
+    "gb18030": "GB18030",
+}
 _LOOKED = 200
 _MOST = 12
 # Dialects of previous tables, for files with an equal head and rows of the same shape.

@@ -33,6 +33,8 @@ _MOST_PAIRS = 32
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
 # A set value is ahead of its measured value by at least this share of a sample.
 _AHEAD = 0.2
+# Above this correlation, and without any lead, it is the measured value once more.
+_SAME = 0.999999
 # A set value that resembles another channel by this much more is not that of this one.
 _CLOSER = 0.2
 _BY_COURSE = "guessed from its values only"
@@ -90,15 +92,34 @@ def name_strength(quantity: str, stream: Stream) -> tuple[float, str]:
 
 
 def _joint_count(streams: Iterable[Stream]) -> int:
-    """Return the width of the families with the most quantities; of several such widths the largest."""
+    """Return the width of the families with the most quantities; of several such widths the largest.
+
+    Families of efforts alone are several motors of one joint if a single position or speed is named.
+    """
     quantities: dict[int, set[str]] = {}
     for stream in streams:
         for quantity in ("position", "speed", "torque"):
             strength, word = name_strength(quantity, stream) if stream.moves and stream.width > 1 else (0.0, "")
             if strength and (word != _TOLD_UNIT or stream.width > 2):
                 quantities.setdefault(stream.width, set()).add(quantity)
+    if all(found == {"torque"} for found in quantities.values()) and _has_single_motion(streams):
+        return 1
     several = [(len(found), width) for width, found in quantities.items()]
     return max(several)[1] if several else 1
+
+
+def _has_single_motion(streams: Iterable[Stream]) -> bool:
+    """Whether a column of no family has the name of a measured position or speed that moves."""
+    listed = list(streams)
+    of_families = {column for stream in listed if stream.width > 1 for column in stream.columns}
+    return any(
+        stream.width == 1
+        and stream.moves
+        and not of_families & set(stream.columns)
+        and not is_reference(stream.name)
+        and any(name_strength(quantity, stream)[0] >= _SPEAKS for quantity in ("position", "speed"))
+        for stream in listed
+    )
 
 
 def _elements(stream: Stream) -> list[Stream]:
@@ -227,7 +248,7 @@ def _partner(channels: Channels, stream: Stream, other: str) -> None:
         pair = (stream, candidate) if other == "speed" else (candidate, stream)
         return motion.integral_fit(*pair).correlation
 
-    found = _best(_unnamed_for(channels, other), fit)
+    found = _best([item for item in _unnamed_for(channels, other) if not is_reference(item.name)], fit)
     if found is not None and found[0] > _FITS:
         relation = "integral" if other == "speed" else "derivative"
         channels.take(other, found[1], f"its {relation} fits '{stream.name}', r = {found[0]:.3f}", _BY_COURSE)
@@ -271,7 +292,13 @@ def _drive(channels: Channels) -> None:
 def _drive_score(channels: Channels, item: Named, share: float) -> float:
     """Rank efforts: those that inertia and friction explain, then by name; a torque before a current."""
     alike = [_alike(item, (0.0, "", found.stream)) for found in channels.found.values()]
-    score = item[0] + _PHYSICS * (share > _DRIVES_BY_LETTER) + max(alike, default=0.0) + is_actual(item[2].name)
+    score = (
+        item[0]
+        + _PHYSICS * (share > _DRIVES_BY_LETTER)
+        + max(share, 0.0)
+        + max(alike, default=0.0)
+        + is_actual(item[2].name)
+    )
     return score - 0.6 * is_current(label(item[2]))
 
 
@@ -283,7 +310,7 @@ def _rate_and_position(channels: Channels) -> tuple[Stream | None, Stream | None
 
 
 def _acceleration(channels: Channels) -> None:
-    named = [item for item in _named_for(channels, "acceleration") if item[2].moves]
+    named = [item for item in _named_for(channels, "acceleration") if item[2].moves and not motion.is_flag(item[2])]
     if not named:
         return
     speed = channels.found.get("speed")
@@ -399,6 +426,8 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
         return
     own, others = word_for(quantity, label(stream)), word_for(quantity, label(other))
     ahead = motion.lead(stream, other)
+    if correlation > _SAME and abs(ahead) < _AHEAD and not is_reference(other.name):
+        return  # the same sensor in another unit
     if abs(ahead) < _AHEAD:
         smoother = motion.roughness(other) < motion.roughness(stream)
         alike = own[1] == others[1] or not others[1] or is_reference(other.name)

@@ -28,6 +28,9 @@ from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
 from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
 
+# Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
+_SLOWEST = 2.0
+
 
 @dataclass(frozen=True)
 class Drafted:
@@ -234,12 +237,16 @@ def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ..
 
 
 def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) -> str:
-    """Return the doubt about a clock's unit known only from its name, if only another unit fits the ratio."""
-    if clock is None or not clock.by_name or ratio is None or ratio.fitting:
+    """Return the doubt about a clock's unit that is only written: another fits the ratio, or the rate is too low."""
+    if clock is None or not clock.written:
         return ""
+    rate = 1.0 / (clock.step * seconds(clock.unit))
+    slow = f"steps of {clock.step:.4g} {clock.unit} are {rate:.3g} Hz" if rate < _SLOWEST else ""
+    if ratio is None or ratio.fitting:
+        return slow
     other = ratio_of(channels, replace(clock, told=""), messages_si=False)
     if other is None or not other.fitting or other.tick:
-        return ""
+        return slow
     first = other.fitting[0]
     return f"{first.clock} with {first.position}, {first.speed} fits the ratio, {clock.unit} does not"
 

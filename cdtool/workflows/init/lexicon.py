@@ -58,10 +58,12 @@ LONG: Mapping[str, tuple[str, ...]] = {
 }
 # Words that must be separate.
 SHORT: Mapping[str, tuple[str, ...]] = {
-    "position": _listed("pos posn phi theta q qm qmsr x s p ang enc encoder", "weg lage hub geber drehgeber", "course"),
-    "speed": _listed("qd dq qp qdot dphi dtheta thetad thetadot w n v vx vel velo spd rpm", "giri"),
+    "position": _listed(
+        "pos posn phi theta q qm qmsr x s p mp jp ip ang enc encoder", "weg lage hub geber drehgeber", "course"
+    ),
+    "speed": _listed("mv jv qd dq qp qdot dphi dtheta thetad thetadot w n v vx vel velo spd rpm", "giri"),
     "acceleration": _listed("acc acel qdd ddq qddot ddtheta ax ay az a"),
-    "torque": _listed("tau trq tor tq iq isq i m pwm duty u amps amp curr cur", "par"),
+    "torque": _listed("tau trq tor tq mt jt iq isq i m pwm duty u amps amp curr cur", "par"),
     "force": _listed("cell f fx fy fz", "dms"),
     "label": (),
     "trigger": ("trig",),
@@ -90,7 +92,7 @@ REFERENCE_LONG = _listed(
     "指令 目标 给定 设定 参考",
     "目標 設定",
 )
-REFERENCE_SHORT = _listed("ref des dest cmd sp goal qg set demand dem ipo cons traj trajectory")
+REFERENCE_SHORT = _listed("ref des dest cmd sp ip goal qg set demand dem ipo cons traj trajectory")
 REFERENCE_STARTS = _listed("set cmd ref des tgt goal dem")
 ACTUAL_LONG = _listed(
     "actual measured feedback estimate",
@@ -149,7 +151,7 @@ OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
         "a following error",
         re.compile(
             r"schlepp|following|deviation|abweichung|error|err(?:_|$)|(?:^|_)lag(?:_|$)|diff(?:_|$)|(?:^|_)dev(?:_|$)"
-            r"|ecart|erreur|errore|inseguimento|seguimiento|误差|誤差|偏差"
+            r"|ecart|erreur|errore|inseguimento|seguimiento|误差|誤差|偏差|溜り|溜まり|滞留"
         ),
     ),
     (
@@ -168,6 +170,7 @@ OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
             r".*(?:ext(?:_|$|msr)|external|(?:^|_)hat(?:_|$)|(?:^|_)model(?:_|$))"
         ),
     ),
+    ("an electrical speed", re.compile(r"(?:^|_)erpm(?:_|$)")),
     ("the current of the cabinet", re.compile(r"(?:robot|io|system|bus|supply|battery|main|input)_current")),
     ("a flux-forming current", re.compile(r"(?:^|_)(?:i_?s?d|motor_id)(?:_|$)")),
     ("a rate of an effort", re.compile(r"(?:^|_)(?:dtau|taud|tau_dot|torque_rate|jerk)(?:_|$)")),

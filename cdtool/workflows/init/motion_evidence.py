@@ -175,6 +175,11 @@ def is_regular(stream: Stream) -> bool:
     return len(steps) > 2 and float(np.min(steps)) > 0.0 and float(np.ptp(steps)) < 0.5 * float(np.median(steps))
 
 
+def is_flag(stream: Stream) -> bool:
+    """Whether a stream has only the values 0 and 1, as a state has."""
+    return bool(np.isin(stream.values[np.isfinite(stream.values)], (0.0, 1.0)).all())
+
+
 def rests_and_peaks(stream: Stream) -> bool:
     """Whether a stream looks like a load cell: constant for most of the time, short high peaks, no integers."""
     values = stream.values[np.isfinite(stream.values)]

@@ -17,6 +17,8 @@ _LETTERS = 2  # a one-letter word is weak evidence
 _PRESENTS, _JOINT_NOUNS = ("current", "cur", "curr"), ("jnt", "joints")
 _BEFORE_D = ("q", "dq", "ddq", "j", "tau", "theta", "x", "pos", "vel")
 _SPLIT = re.compile(r"[\W\d_]+")
+# The last part of a path in quotes, as TDMS files have.
+_IN_GROUP = re.compile(r"^/'.*'/'(.*)'$")
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
@@ -74,8 +76,16 @@ def is_something_else(name: str) -> bool:
 @lru_cache(maxsize=4096)
 def what_else(name: str) -> str:
     """Return what a name indicates instead of a channel: "a temperature"; an empty text if nothing does."""
+    channel = name_in_group(name)
+    if channel != name and is_clock(channel) and not any(word_for(quantity, channel)[0] for quantity in lexicon.LONG):
+        return "a time"
     joined = "_".join(words(name))
     return next((reason for reason, pattern in lexicon.OTHERS if pattern.search(joined)), "")
+
+
+def name_in_group(name: str) -> str:
+    """Return the channel of a path of group and channel, `/'Forza [N]'/'Time'`; any other name as it is."""
+    return _IN_GROUP.sub(r"\1", name)
 
 
 def is_clock(name: str) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -19,6 +20,8 @@ _NUMBER = re.compile(r"\d+")
 _MOST = 1e100
 # `position[:]` with more elements than this is not a list of joints.
 _MOST_JOINTS = 64
+# Numbers with gaps are joints if at least so many families have the same.
+_SHARED = 3
 
 
 @dataclass(frozen=True)
@@ -140,7 +143,10 @@ def _possible(values: FloatArray) -> FloatArray:
 
 
 def _families(singles: Mapping[str, Stream]) -> list[Stream]:
-    """Find families: `tau_1, tau_2`, `q[0] ... q[5]`, `axis1_speed, axis2_speed`: names with one consecutive number."""
+    """Find families: `tau_1, tau_2`, `q[0] ... q[5]`, `axis1_speed, axis2_speed`: names with one consecutive number.
+
+    Other numbers, as in `LOAD|1, LOAD|2, LOAD|6`, are joints if several families have the same.
+    """
     if all(name.isdigit() for name in singles):
         return []  # a table without a header: its names are column numbers
     members: dict[tuple[str, str], dict[int, Stream]] = {}
@@ -148,6 +154,7 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
         for number in _NUMBER.finditer(split_unit(name)[0]):
             key = (name[: number.start()], name[number.end() :])
             members.setdefault(key, {})[int(number[0])] = stream
+    shared = Counter(frozenset(parts) for parts in members.values())
     found = []
     for (before, after), parts in members.items():
         numbers = sorted(parts)
@@ -156,7 +163,10 @@ def _families(singles: Mapping[str, Stream]) -> list[Stream]:
         if (
             2 <= len(numbers) <= _MOST_JOINTS
             and numbers[0] in (0, 1)
-            and numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+            and (
+                numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+                or (len(numbers) > 2 and shared[frozenset(numbers)] >= _SHARED)
+            )
             and alike
         ):
             found.append(joined([parts[number] for number in numbers], f"{before}#{after}"))

@@ -12,7 +12,7 @@ from cdtool.formats.source import Source
 from cdtool.ingest.clock_guess import GuessedClock, guess_clock
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
-from cdtool.workflows.init.quantity_words import is_clock, is_counter, word_for
+from cdtool.workflows.init.quantity_words import is_clock, is_counter, name_in_group, word_for
 from cdtool.workflows.init.units_in_names import unit_in_name
 
 _UNITS = ("s", "ms", "us", "ns", "min")
@@ -31,8 +31,8 @@ _RARE = 2.0  # minutes are this much less likely than an unusual rate
 class TableClock:
     """A table's clock: the median `step` of its stamps, in its own unit, and the seconds assumed per unit.
 
-    `told` is the certain source of the unit; if empty, `unit` is guessed from the steps. `by_name`: this source is only
-    the name of the column.
+    `told` is the source of the unit; if empty, `unit` is guessed from the steps. `written`: this source is only a text,
+    the header or the column's name, which the motion may contradict.
     """
 
     column: str
@@ -41,7 +41,7 @@ class TableClock:
     unit: str
     told: str
     counts: bool = False
-    by_name: bool = False
+    written: bool = False
 
     def units(self) -> tuple[str, ...]:
         """Return the possible units of its stamps; empty for a counter."""
@@ -74,14 +74,14 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):
         against, stated = f", although its header states {column.unit}", None
     if stated is not None and stated.si == "s":
-        return replace(clock, unit=str(column.unit), told="the header, which states the unit"), found
+        return replace(clock, unit=str(column.unit), told="the header, which states the unit", written=True), found
     if taken_off:
         # The reader of a table converts days to seconds.
         days = assumed > 2.0 * seconds("min")
         return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
     named = unit_in_name("time", found.column)
     if named and clock.unlikely(named) < 2 * _RARE:
-        return replace(clock, unit=named, told="the unit in its name", by_name=True), found
+        return replace(clock, unit=named, told="the unit in its name", written=True), found
     return replace(clock, unit=min(clock.units() or (unit,), key=clock.unlikely)), found
 
 
@@ -127,7 +127,8 @@ def _is_measured(name: str) -> bool:
 
 
 def _has_clock_name(name: str) -> bool:
-    return is_clock(name) and not _is_measured(name)
+    own = name_in_group(name)
+    return is_clock(own) and not _is_measured(own)
 
 
 def _has_time_unit(column: Column) -> bool:

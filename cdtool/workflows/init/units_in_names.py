@@ -35,6 +35,7 @@ _TAILS = {
     "counts": "count", "tr_min": "rpm", "giri_min": "rpm", "rev_min": "rpm", "r_min": "rpm", "rev_s": "rev/s",
     "rad_sec": "rad/s", "deg_sec": "deg/s", "mm_min": "mm/min", "count": "count", "cnt": "count",
     "cnts": "count", "inc": "count", "ticks": "count",
+    "meters": "m", "metres": "m", "meters_per_sec": "m/s", "meters_per_second": "m/s",
 }  # fmt: skip
 _SEPARATOR = re.compile(r"[\W_]+")
 # Units of other quantities: temperature, power, frequency, pressure, resistance, energy.
@@ -126,7 +127,7 @@ def _measures(quantity: str, unit: str) -> bool:
 def _split(name: str) -> tuple[str, str, str]:
     """Return (the name before the ending, the ending, its unit); empty texts without such an ending."""
     parts = [part for part in _SEPARATOR.split(name) if part]
-    return _tail(parts, 2) or _after_slash(name) or _tail(parts, 1) or (name, "", "")
+    return _tail(parts, 3) or _tail(parts, 2) or _after_slash(name) or _tail(parts, 1) or (name, "", "")
 
 
 def _tail(parts: list[str], count: int) -> tuple[str, str, str] | None:

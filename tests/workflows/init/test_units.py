@@ -177,3 +177,22 @@ def test_a_clock_with_empty_cells_gives_way_to_a_complete_one(tmp_path):
     lines[2000] = "," + lines[2000].split(",", 1)[1]
     path.write_text("\n".join(lines) + "\n")
     assert drafted(path, tmp_path).channels["time"]["column"] == "timestamp"
+
+
+@pytest.mark.parametrize("column", ["time [s]", "时间(s)"])
+def test_a_clock_whose_header_states_seconds_but_counts_milliseconds_is_marked(tmp_path, column):
+    run = stroke()
+    draft = drafted_columns(
+        tmp_path, {column: 1e3 * run.time, "pos [mm]": 1e3 * run.travel, "vel [mm/s]": 1e3 * run.speed}
+    )
+    assert draft.channels["time"]["unit"] == "s" and draft.checked("time")
+    assert "ms with mm, mm/s fits the ratio, s does not" in draft.said("time")
+
+
+@pytest.mark.parametrize(("step", "doubted"), [(20.0, True), (1.0, True), (0.02, False)])
+def test_a_stated_unit_that_makes_a_log_slower_than_any_is_marked_without_a_motion_to_compare(tmp_path, step, doubted):
+    run = stroke(0.02)
+    clock = np.arange(len(run.time)) * step
+    draft = drafted_columns(tmp_path, {"time [s]": clock, "pos [mm]": 1e3 * run.travel})
+    assert draft.checked("time") is doubted
+    assert ("Hz" in draft.said("time")) is doubted

@@ -76,7 +76,8 @@ def test_other_values_are_no_set_values(name):
 @pytest.mark.parametrize(
     "name",
     ["computed_torque_1", "gravity_model_effort", "tau_ext_hat_filtered", "跟随误差", "温度", "Spannung",
-     "errore_inseguimento", "robot_current", "actual_TCP_force_0", "tau_dot", "i_d", "M1_CURRENT_FEEDRATE"],
+     "errore_inseguimento", "溜りパルス", "erpm", "robot_current", "actual_TCP_force_0", "tau_dot", "i_d",
+     "M1_CURRENT_FEEDRATE"],
 )  # fmt: skip
 def test_other_quantities_than_those_of_a_joint_are_recognised(name):
     assert is_something_else(name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,9 @@ class Truth:
 class Layout:
     """A kind of log: who writes such files, how a small look-alike is written, and the truth by column name.
 
-    `machine` is "linear axis", "rotary axis" or "robot".
+    `machine` is "linear axis", "rotary axis" or "robot". `accept` are further channels that are right for a column, and
+    "" if it may also stay unmapped: a set value has the channel "" and accepts `reference_position`. Where the reader
+    has other names for the columns (a header of several lines), the truth is that of the columns in order.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Layout:
     machine: str
     write: Callable[[Path, Generator], None]
     truth: Mapping[str, Truth]
+    accept: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 Columns = Mapping[str, tuple[Truth, FloatArray]]

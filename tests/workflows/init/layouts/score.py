@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import CdtoolError
+from cdtool.ingest.reading import choose_format
 from cdtool.units import find_unit
 from cdtool.workflows.init.drafting import init
 from tests.workflows.init.layouts.layout import Layout, Truth
@@ -19,12 +20,28 @@ _TYPES = {"linear axis": ("linear_axis",), "rotary axis": ("rotary_axis",), "rob
 
 
 @dataclass(frozen=True)
+class Known:
+    """What a column of a file is, and all channels that are right for it; "" among them if it may stay unmapped."""
+
+    truth: Truth
+    accepted: frozenset[str]
+
+    @property
+    def required(self) -> bool:
+        """Return whether the column belongs to a channel that the draft should map."""
+        return bool(self.truth.channel) and "" not in self.accepted
+
+
+_UNKNOWN = Known(Truth(), frozenset(("",)))
+
+
+@dataclass(frozen=True)
 class Score:
     """The draft of one layout: channels that it should map, those mapped right, and the errors.
 
-    A channel is right if every joint has its column, in one order for all channels. `wrong` are channels with another
-    column and a wrong kind of machine, `units` right channels with a wrong unit; `unmarked` are those of both without
-    a CHECK mark. `missing` are channels of the log that the draft does not map.
+    A channel is right if every joint has a column of it, in one order for all channels. `wrong` are channels with
+    another column and a wrong kind of machine, `units` right channels with a wrong unit; `unmarked` are those of both
+    without a CHECK mark. `missing` are channels of the log that the draft does not map.
     """
 
     name: str
@@ -41,18 +58,19 @@ def score(layout: Layout, folder: Path) -> Score:
     """Write a log of the layout, draft its machine file and compare the draft with the truth."""
     log = folder / f"{layout.name.replace(' ', '_').replace('&', '')}{layout.suffix}"
     layout.write(log, np.random.default_rng(7))
-    truth = {name: _as_channel(item) for name, item in layout.truth.items()}
-    expected = sorted({item.channel for item in truth.values() if item.channel})
+    known = {name: _known(item, layout.accept.get(name, ())) for name, item in layout.truth.items()}
+    expected = sorted({item.truth.channel for item in known.values() if item.required})
     try:
         text = init(log, folder / "machine.toml", force=True).text
+        known = _by_file_names(known, choose_format(log).columns(log).names)
     except CdtoolError as fault:
         return Score(layout.name, tuple(expected), (), tuple(expected), (), (), (), str(fault))
     values = tomllib.loads(text)
     channels = values["channels"].get("mcap", values["channels"])
-    order = _joint_order(channels, truth)
+    order = _joint_order(channels, known)
     parts = {name: part for name, part in channels.items() if isinstance(part, dict)}
-    faults = {name: _fault(name, part, truth, order) for name, part in parts.items()}
-    units = {name: "" if faults[name] else _unit_fault(name, part, truth) for name, part in parts.items()}
+    faults = {name: _fault(name, part, known, order) for name, part in parts.items()}
+    units = {name: "" if faults[name] else _unit_fault(name, part, known) for name, part in parts.items()}
     if values["machine"]["type"] not in _TYPES[layout.machine]:
         faults["type"] = values["machine"]["type"]
     errors = {**units, **{name: fault for name, fault in faults.items() if fault}}
@@ -71,8 +89,16 @@ def _listed(faults: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(f"{name}: {fault}" for name, fault in faults.items() if fault)
 
 
-def _as_channel(truth: Truth) -> Truth:
-    return Truth("torque", truth.joint, truth.unit) if truth.channel == "current" else truth
+def _known(truth: Truth, accept: Sequence[str]) -> Known:
+    channel = "torque" if truth.channel == "current" else truth.channel
+    return Known(Truth(channel, truth.joint, truth.unit), frozenset((channel, *accept)))
+
+
+def _by_file_names(known: Mapping[str, Known], names: Sequence[str]) -> dict[str, Known]:
+    """Return what the columns are by the names that the file's reader has for them: the same, or those in order."""
+    if len(names) != len(known):
+        return dict(known)
+    return dict(known) | {name: item for name, item in zip(names, known.values(), strict=True) if name not in known}
 
 
 def _columns_of(part: dict) -> list[str]:
@@ -82,39 +108,41 @@ def _columns_of(part: dict) -> list[str]:
     return [str(column) for column in listed if column is not None]
 
 
-def _joint_order(channels: dict, truth: dict[str, Truth]) -> list[str]:
+def _joint_order(channels: dict, known: Mapping[str, Known]) -> list[str]:
     """Return the joints in the order of the first channel of several columns that are of different joints."""
     for name in ("position", "speed", "torque", *channels):
         part = channels.get(name)
         columns = _columns_of(part) if isinstance(part, dict) else []
-        joints = [truth[column].joint for column in columns if column in truth]
+        joints = [known[column].truth.joint for column in columns if column in known]
         if len(joints) > 1 and len(set(joints)) == len(joints) and all(joints):
             return joints
     return []
 
 
-def _fault(channel: str, part: dict, truth: Mapping[str, Truth], order: Sequence[str]) -> str:
+def _fault(channel: str, part: dict, known: Mapping[str, Known], order: Sequence[str]) -> str:
     """Return what is wrong with the columns of a mapped channel, or an empty text."""
     columns = _columns_of(part)
+    required = {name: item.truth for name, item in known.items() if item.required and item.truth.channel == channel}
     if not columns:
-        known = next((name for name, item in truth.items() if item.channel == "time"), "")
-        return f"a placeholder instead of {known!r}" if known else ""
+        clock = next((name for name in required if channel == "time"), "")
+        return f"a placeholder instead of {clock!r}" if clock else ""
     for k, column in enumerate(columns):
-        item = truth.get(column, Truth())
-        if item.channel != channel:
-            return f"column {column!r} is {item.channel or 'no channel'}"
-        if item.joint and len(columns) > 1 and order and item.joint != order[k]:
-            return f"column {column!r} is joint {item.joint} in place of {order[k]}"
-    joints = {item.joint for item in truth.values() if item.channel == channel and item.joint}
-    if len(columns) < len(joints):
-        return f"{len(columns)} of {len(joints)} joints"
+        item = known.get(column, _UNKNOWN)
+        if channel not in item.accepted:
+            return f"column {column!r} is {item.truth.channel or 'no channel'}"
+        if item.truth.joint and len(columns) > 1 and order and item.truth.joint != order[k]:
+            return f"column {column!r} is joint {item.truth.joint} in place of {order[k]}"
+    joints = {truth.joint for truth in required.values() if truth.joint}
+    covered = joints & {known[column].truth.joint for column in columns}
+    if len(covered) < len(joints):
+        return f"{len(covered)} of {len(joints)} joints"
     return ""
 
 
-def _unit_fault(channel: str, part: dict, truth: Mapping[str, Truth]) -> str:
+def _unit_fault(channel: str, part: dict, known: Mapping[str, Known]) -> str:
     """Return what is wrong with the unit of a channel with the right columns, or an empty text."""
     columns = _columns_of(part)
-    true_unit = truth[columns[0]].unit if columns else ""
+    true_unit = known[columns[0]].truth.unit if columns else ""
     if channel == "time" and "rate_hz" in part:
         return f"counts instead of {true_unit!r}" if true_unit else ""
     drafted = part.get("unit", "")
