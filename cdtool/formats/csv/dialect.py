@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from cdtool.channels import TablePins
 from cdtool.findings import Finding
@@ -12,7 +12,7 @@ from cdtool.formats.csv.stamps import StampLayouts
 from cdtool.formats.csv.text import Text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Dialect:
     """The dialect of a text table: rows of `width` cells start in line `first_line` (from 1), at byte `offset`.
 
@@ -27,26 +27,26 @@ class Dialect:
     pins: TablePins
     separator: str
     marks: Marks
-    comment: str
-    commented: bool
     missing: tuple[str, ...]
     header: tuple[str, ...] | None
-    header_line: int
-    units: tuple[str, ...]
-    units_line: int
-    header_text: tuple[str, ...]
-    from_comment: bool
-    preamble: tuple[int, ...]
     first_line: int
     sampled: int
     offset: int
     width: int
     kinds: str
-    trailing: bool
-    blank_is_missing: bool
-    stamped: dict[int, StampLayouts]
     words: dict[int, SampleCell]
-    findings: tuple[Finding, ...]
+    comment: str = ""
+    commented: bool = False
+    header_line: int = 0
+    units: tuple[str, ...] = ()
+    units_line: int = 0
+    header_text: tuple[str, ...] = ()
+    from_comment: bool = False
+    preamble: tuple[int, ...] = ()
+    trailing: bool = False
+    blank_is_missing: bool = False
+    stamped: dict[int, StampLayouts] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
     short_rows: bool = False
 
     @property

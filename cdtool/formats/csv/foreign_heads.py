@@ -8,7 +8,7 @@ _MARK = b"\xef\xbb\xbf"
 # In any encoding: a name is within the first bytes once NUL bytes and byte order marks are removed.
 _FIRST_BYTES = 96
 LABVIEW = "LabVIEW Measurement"
-# TwinCAT Scope: the key of the first line, and the keys by which its exports are told from other tables.
+# TwinCAT Scope: the key of the first line, and the keys that identify its exports.
 NAME = "Name"
 SCOPE_TITLE = "TwinCAT Scope"
 SCOPE_STARTS = ("Starttime of export", "StartRecord")
