@@ -1,15 +1,16 @@
 """Values that no sensor of a machine measures: fill values, integer overflow, spikes. Masked, counted, and a loss.
 
 `IMPOSSIBLE` applies to every channel. Other plausible ranges are learned from impact-free runs and stored with them; a
-log is compared with these, sample by sample, and never with its own later samples. Ranges are of channels as logged, in
-SI, before anything is derived from them.
+log is compared with these, sample by sample, and never with its own later samples: a log that is learned from and
+scored is compared with the ranges of others (`LearnedRanges`). Ranges are of channels as logged, in SI, before anything
+is derived from them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
@@ -47,6 +48,8 @@ _EDGE = 3
 # After a leap to a new zero, a position counts again once it has stayed within this multiple of the usual reach for
 # this long [s], and has moved by this share of the reach.
 _AMONG, _SETTLED, _MOVED = 1.5, 0.1, 0.02
+# Ranges without a log are learned at most so many times, each time without a part of the logs.
+_FOLDS = 10
 
 _VALUES = "Array(float64, 2, 'C', readonly=True)"
 
@@ -145,6 +148,32 @@ class PlausibleRanges:
             if not (np.isfinite(figures).all() and item.reach > 0.0 <= min(item.rate, item.extreme)):
                 raise ValueError(f"a plausible range of {name} with reach {item.reach:g} and rate {item.rate:g}")
         return cls(channels)
+
+
+@dataclass(frozen=True)
+class LearnedRanges:
+    """The plausible ranges of all runs, and for runs that are scored too, those of other runs only, by name."""
+
+    all: PlausibleRanges
+    by_name: Mapping[str, PlausibleRanges] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, runs: Mapping[str, Recording], scored: Collection[str]) -> Self:
+        """Learn from runs by name as logged; `scored` are the names of those that are compared with ranges themselves.
+
+        With more than 10 runs, ranges are learned 10 times, each time without a tenth of them.
+        """
+        own = [name for name in runs if name in scored]
+        by_name: dict[str, PlausibleRanges] = {}
+        for fold in range(min(_FOLDS, len(own))):
+            left_out = own[fold::_FOLDS]
+            ranges = PlausibleRanges.learned([item for name, item in runs.items() if name not in left_out])
+            by_name |= dict.fromkeys(left_out, ranges)
+        return cls(PlausibleRanges.learned(list(runs.values())), by_name)
+
+    def without(self, name: str) -> PlausibleRanges:
+        """Return the ranges that a log is compared with: of a log that was learned from, those of others."""
+        return self.by_name.get(name, self.all)
 
 
 def _learned(series: Sequence[Series], moves: bool) -> ChannelRange | None:

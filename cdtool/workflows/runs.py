@@ -18,7 +18,7 @@ from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, RunCut, operations_of
-from cdtool.plausible import PlausibleRanges
+from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
@@ -27,12 +27,15 @@ from cdtool.workflows.workers import Progress, in_order
 
 @dataclass(frozen=True)
 class Runs:
-    """The operations of some logs, what was left out, findings to report, and the plausible ranges of channels."""
+    """The operations of some logs, what was left out, findings to report, and the plausible ranges of channels.
+
+    `ranges` are those of what is learned from: of a part of a log, that part.
+    """
 
     operations: tuple[Operation, ...]
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
-    ranges: PlausibleRanges
+    ranges: LearnedRanges
 
 
 def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = False) -> list[Path]:
@@ -188,8 +191,9 @@ PartOfLog = Callable[[Path, Recording], tuple[Recording, Sequence[Contact]]]
 class RunReading:
     """How impact-free logs are read: cut by `operations`, contacts refused by the `onset` rule, named below `base`.
 
-    `part` returns the part of a log that is learned from and the contacts in it; None: the whole log. `jobs` logs are
-    read in parallel; `progress` is called after each.
+    `part` returns the part of a log that is learned from and the contacts in it; None: the whole log. `scored` are the
+    logs and runs that are also scored, each by what the others teach. `jobs` logs are read in parallel; `progress` is
+    called after each.
     """
 
     operations: str
@@ -197,6 +201,7 @@ class RunReading:
     onset: OnsetRule | None = None
     base: Path | None = None
     part: PartOfLog | None = None
+    scored: Callable[[Path], bool] | None = None
     jobs: int = 1
     progress: Progress | None = None
 
@@ -220,9 +225,6 @@ def load_runs(
 
     cut = RunCut.of(reading.operations)
     logs = list(in_order(_AsLogged(machine_file, cut), paths, len(paths), jobs, reading.progress))
-    known = ranges or PlausibleRanges.learned(
-        [item.recording for log in logs if isinstance(log, LogRuns) for item in log.runs]
-    )
     logged: list[tuple[Path, Path, LoggedRecording | CdtoolError]] = []  # as listed, the log or its run
     for path, log in zip(paths, logs, strict=True):
         if isinstance(log, CdtoolError):
@@ -234,11 +236,12 @@ def load_runs(
             of_log, about_log = reported(log, path, base)
             skipped += of_log
             findings += about_log
+    known = LearnedRanges(ranges) if ranges else _ranges_of(logged, machine_file.machine, reading, rule)
     for listed, path, item in logged:
         try:
             if isinstance(item, CdtoolError):
                 raise item
-            recording = item.on_load_side(machine_file.machine, known, to_learn=True)
+            recording = item.on_load_side(machine_file.machine, known.all, to_learn=True)
             recording = with_scalar_force(replace(recording, name=shown_path(path, base)), rule)
             contacts: Sequence[Contact] | None = None
             if reading.part:
@@ -263,6 +266,32 @@ def load_runs(
         findings.extend(log_warnings(recording, contacts, rule))
         without.extend((recording.name, item) for item in absent_truth(recording))
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known)
+
+
+def _ranges_of(
+    logged: Sequence[tuple[Path, Path, LoggedRecording | CdtoolError]],
+    machine: Machine,
+    reading: RunReading,
+    rule: OnsetRule,
+) -> LearnedRanges:
+    """Return the plausible ranges of what is learned from: nothing else of a log may affect them."""
+    parts: dict[str, Recording] = {}
+    scored: list[str] = []
+    for listed, path, item in logged:
+        if isinstance(item, CdtoolError):
+            continue
+        name, part = shown_path(path, reading.base), item.recording
+        if reading.part:
+            try:
+                whole = with_scalar_force(replace(item.on_load_side(machine), name=name), rule)
+                learned, _ = reading.part(listed, whole)
+            except CdtoolError:
+                continue
+            part = part.between(learned.start, learned.end)
+        parts[name] = part
+        if reading.scored and reading.scored(path):
+            scored.append(name)
+    return LearnedRanges.of(parts, scored)
 
 
 def _each_once(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:

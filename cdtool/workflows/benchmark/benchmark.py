@@ -22,7 +22,7 @@ from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut, LimitsUnchecked
 from cdtool.kernel_warm_up import compile_loaded
 from cdtool.operations import Operation
-from cdtool.plausible import PlausibleRanges
+from cdtool.plausible import LearnedRanges
 from cdtool.recording import FloatArray
 from cdtool.registry import plugin_packages
 from cdtool.thresholds.base import FittedThreshold
@@ -161,7 +161,7 @@ class _LogScoring:
     thresholds: ThresholdsByLog
     unusable: Mapping[str, str]
     factors: Mapping[str, FloatArray]
-    ranges: PlausibleRanges
+    ranges: LearnedRanges
     normals: NormalMotions
     runs: tuple[Operation, ...]
 

@@ -144,8 +144,23 @@ class BenchmarkFile:
         part = PartToLearnFrom(rules, self.learned_sections, self.guard)
         needed = self.guard is not None or self.learned_sections or self.labels
         return RunReading(
-            self.operations, onset=self.onset, base=self.path.parent, part=part if needed else None, jobs=jobs
+            self.operations,
+            onset=self.onset,
+            base=self.path.parent,
+            part=part if needed else None,
+            scored=self.is_scored_too if self.both else None,
+            jobs=jobs,
         )
+
+    def is_scored_too(self, learned: Path) -> bool:
+        """Return whether a log or run that is learned from is also scored, by what the others teach."""
+        if self.has_runs:
+            return any(_may_share_a_run(learned, log) for log in self.both)
+        return learned.resolve() in self._both_resolved
+
+    @cached_property
+    def _both_resolved(self) -> frozenset[Path]:
+        return frozenset(path.resolve() for path in self.both)
 
     def rules_of(self, group: str) -> ScoringRules:
         """Return the settings that determine the results of a log in that group, or in no group."""
@@ -207,6 +222,7 @@ def read_benchmark_file(
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
     impacts, sections = _groups(root, found, window, force)
+    learn = _under_scored_paths(learn, _scored(impacts, HOLDOUT))
     onset = root.table("onset")
     migrated = migrated_onset(onset)
     labels = labels_of(onset, found, _scored(impacts, HOLDOUT), tuple(learn))
@@ -379,6 +395,20 @@ def _mass_before_cell(force: Table) -> float:
 def _scored(groups: Mapping[str, ImpactGroup], *more: str) -> list[Path]:
     """Return the logs of all groups of impacts, and of the hold-out if it is among `more`."""
     return [path for name, group in groups.items() if name != HOLDOUT or name in more for path in group.logs]
+
+
+def _under_scored_paths(learn: Mapping[Path, LogSection], scored: Sequence[Path]) -> dict[Path, LogSection]:
+    """Return the logs to learn from under the paths of the scored ones where they are the same files.
+
+    A log is scored by what the others teach, and logs are distinguished by their names.
+    """
+    files = {file.resolve(): file for file, _ in map(split_run, scored)}
+    found: dict[Path, LogSection] = {}
+    for path, section in learn.items():
+        file, ids = split_run(path)
+        known = files.get(file.resolve(), file)
+        found[Path(f"{known}#{ids}") if ids else known] = section
+    return found
 
 
 def _names(machine_file: MachineFile, detectors: Sequence[str]) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.ingest.run_reading import split_run
 from cdtool.operations import Operation
 from cdtool.plain_text import counted
-from cdtool.plausible import PlausibleRanges
+from cdtool.plausible import LearnedRanges
 from cdtool.recording import Recording
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.base import is_per_run
@@ -42,7 +42,7 @@ class PreparedBenchmark:
     described: str
     learned: Mapping[str, str]
     run: Callable[[Path], tuple[Detect, list[RecordingFinding]]]
-    ranges: PlausibleRanges | None
+    ranges: LearnedRanges | None
     normals: NormalMotions
     notes: tuple[RecordingFinding, ...] = ()
     skipped: tuple[Skipped, ...] = ()
@@ -113,7 +113,7 @@ def prepare_benchmark(
             stored.described,
             learned,
             run,
-            stored.plausible,
+            LearnedRanges(stored.plausible) if stored.plausible else None,
             normals_of(stored),
             (*measured, *notes_on(stored)),
         )

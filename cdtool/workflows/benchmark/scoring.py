@@ -28,7 +28,7 @@ from cdtool.logged_recording import LoggedRecording
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
-from cdtool.plausible import PlausibleRanges
+from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
@@ -39,7 +39,7 @@ from cdtool.workflows.contacts.judged_operation import Judged, not_assessable
 from cdtool.workflows.contacts.matched_log import DetectedLog, MatchedLog, match_log
 from cdtool.workflows.contacts.true_contacts import any_contacts, true_contacts, unwanted_contacts
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.runs import absent_truth, lost, named_on_load_side, read_named, reported, unread
+from cdtool.workflows.runs import absent_truth, lost, named_on_load_side, read_named, reported, shown_path, unread
 
 _WHOLE = LogSection()
 
@@ -119,7 +119,7 @@ def score_log(
     path: Path,
     detect: Detect,
     factors: Mapping[str, FloatArray],
-    ranges: PlausibleRanges | None = None,
+    ranges: LearnedRanges | None = None,
 ) -> Scored:
     """Return the rows of a log; a log or detector that fails is left out and reported, and nothing is raised.
 
@@ -135,7 +135,7 @@ def score_runs(
     path: Path,
     detection_of: DetectionOf,
     factors: Mapping[str, FloatArray],
-    ranges: PlausibleRanges | None = None,
+    ranges: LearnedRanges | None = None,
 ) -> list[Scored]:
     """Return the same for each run of a log, if the benchmark cuts logs into runs; the first entry is about the log.
 
@@ -171,11 +171,12 @@ class _WholeLog:
 
     setup: BenchmarkFile
     path: Path
-    ranges: PlausibleRanges | None
+    ranges: LearnedRanges | None
 
     def __call__(self) -> Recording:
-        setup = self.setup
-        return read_named(self.path, setup.machine_file, setup.path.parent, self.ranges, setup.onset)
+        setup, base = self.setup, self.setup.path.parent
+        ranges = _of_others(self.ranges, shown_path(self.path, base))
+        return read_named(self.path, setup.machine_file, base, ranges, setup.onset)
 
 
 @dataclass(frozen=True)
@@ -185,13 +186,17 @@ class _OneRun:
     setup: BenchmarkFile
     path: Path
     logged: LoggedRecording
-    ranges: PlausibleRanges | None
+    ranges: LearnedRanges | None
 
     def __call__(self) -> Recording:
-        setup = self.setup
-        return named_on_load_side(
-            self.logged, self.path, setup.machine_file, setup.path.parent, self.ranges, setup.onset
-        )
+        setup, base = self.setup, self.setup.path.parent
+        ranges = _of_others(self.ranges, shown_path(self.path, base))
+        return named_on_load_side(self.logged, self.path, setup.machine_file, base, ranges, setup.onset)
+
+
+def _of_others(ranges: LearnedRanges | None, name: str) -> PlausibleRanges | None:
+    """Return the plausible ranges that a log is compared with; none if none are learned."""
+    return None if ranges is None else ranges.without(name)
 
 
 def _score(

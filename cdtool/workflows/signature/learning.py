@@ -156,7 +156,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
         first=thresholds,
         runs=tuple(learned_run(operation) for operation in fitted.used),
         operations=operations,
-        plausible=runs.ranges,
+        plausible=runs.ranges.all,
         normal=normal_motions(fitted.used),
         machine_parameters=machine_parameters(machine_file.machine),
     )

@@ -275,3 +275,64 @@ def test_a_log_without_ground_truth_or_with_too_little_before_the_contact_is_lef
     assert left_out and all(name.startswith("stiff") for name in left_out)
     assert all("s before the contact at" in reason and "at least 0.5 s" in reason for reason in left_out.values())
     assert {operation.name for operation in runs.operations} >= {"free/01.csv", "free/02.csv"}
+
+
+def changed(log, rows, factor, column="i_motor"):
+    """Multiply a column of a log in some of its rows."""
+    header, *lines = log.read_text(encoding="utf-8").splitlines()
+    at = header.split(",").index(column)
+    for i in rows:
+        cells = lines[i].split(",")
+        cells[at] = repr(float(cells[at]) * factor)
+        lines[i] = ",".join(cells)
+    log.write_text("\n".join([header, *lines]), encoding="utf-8")
+
+
+def test_plausible_ranges_are_those_of_what_is_before_the_contacts(gate):
+    plain, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
+    folder = gate.parent / "after"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    onsets = {
+        row.recording: row.onset_s for row in benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS)).results.contacts
+    }
+    for name, onset in onsets.items():
+        rows = len((folder / name).read_text(encoding="utf-8").splitlines()) - 1
+        changed(folder / name, range(int(onset * 1000.0), rows), 30.0)
+    after, _ = learned_of(setup_of(folder, HEAD, LEARN, ONSET, GROUPS))
+    assert after.ranges.all == plain.ranges.all
+
+
+def test_plausible_ranges_of_a_log_are_those_of_the_others(gate):
+    folder = gate.parent / "own"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    for name in ("01", "02"):
+        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 3.0)
+    own, _ = learned_of(setup_of(folder, HEAD, LEARN, ONSET, GROUPS))
+    alone, _ = learned_of(setup_of(folder, HEAD, LEARN.replace("stiff/*", "stiff/0[2-4]"), ONSET, GROUPS))
+    assert own.ranges.without("stiff/01.csv") == alone.ranges.all != own.ranges.all
+    assert own.ranges.without("free/01.csv") == own.ranges.all
+
+
+def test_a_value_far_from_those_of_the_other_logs_is_masked_whatever_its_own_log_has(gate):
+    """Two of six logs have fill values before their contacts; in the range of all, such values would be usual."""
+    folder = gate.parent / "fill"
+    shutil.copytree(gate, folder, dirs_exist_ok=True)
+    for name in ("01", "02"):
+        changed(folder / "stiff" / f"{name}.csv", range(500, 3000), 1e6)
+    parts = HEAD, LEARN.replace("soft/*", "soft/0[12]"), ONSET, GROUPS
+    found = [item.recording for item in benchmark(setup_of(folder, *parts)).results.findings if item.is_loss]
+    assert sorted(found) == ["stiff/01.csv", "stiff/02.csv"]
+
+
+@pytest.mark.parametrize("how", ["detour", "absolute", "link"])
+def test_no_log_judges_itself_whatever_its_path_is_written(gate, how):
+    folder = gate / "stiff"
+    if how == "link" and not (gate / "linked").exists():
+        (gate / "linked").symlink_to(folder, target_is_directory=True)
+    pattern = {"detour": "soft/../stiff/*.csv", "absolute": str(folder / "*.csv"), "link": "linked/*.csv"}[how]
+    setup = setup_of(gate, HEAD, LEARN.replace("stiff/*.csv", pattern), ONSET, GROUPS)
+    plain = setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
+    assert sorted(setup.learn) == sorted(plain.learn)
+    _, learned = learned_of(setup)
+    own, _ = ThresholdsByLog.of(setup, learned).without(folder / "01.csv")
+    assert own["momentum"] != learned.thresholds["momentum"]
