@@ -153,7 +153,7 @@ class BenchmarkFile:
         )
 
     def is_scored_too(self, learned: Path) -> bool:
-        """Return whether a log or run that is learned from is also scored, by what the others teach."""
+        """Return whether a log or run that is learned from is also scored, by what is learned from the others."""
         if self.has_runs:
             return any(_may_share_a_run(learned, log) for log in self.both)
         return learned.resolve() in self._both_resolved
@@ -400,7 +400,7 @@ def _scored(groups: Mapping[str, ImpactGroup], *more: str) -> list[Path]:
 def _under_scored_paths(learn: Mapping[Path, LogSection], scored: Sequence[Path]) -> dict[Path, LogSection]:
     """Return the logs to learn from under the paths of the scored ones where they are the same files.
 
-    A log is scored by what the others teach, and logs are distinguished by their names.
+    A log is scored by what is learned from the others, and logs are distinguished by their names.
     """
     files = {file.resolve(): file for file, _ in map(split_run, scored)}
     found: dict[Path, LogSection] = {}
