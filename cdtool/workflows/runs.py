@@ -192,8 +192,8 @@ class RunReading:
     """How impact-free logs are read: cut by `operations`, contacts refused by the `onset` rule, named below `base`.
 
     `part` returns the part of a log that is learned from and the contacts in it; None: the whole log. `scored` are the
-    logs and runs that are also scored, each by what is learned from the others. `jobs` logs are read in parallel; `progress` is
-    called after each.
+    logs and runs that are also scored, each by what is learned from the others. `jobs` logs are read in parallel;
+    `progress` is called after each.
     """
 
     operations: str
