@@ -38,9 +38,9 @@ _DATES = (
     *("%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y"),
     *("%d-%b-%Y", "%d/%b/%Y", "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%Y%m%d"),
 )
-_TIMES = ("%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M", "%I:%M:%S.%f %p", "%I:%M %p")
+_TIMES = ("%H:%M:%S.%f", "%H:%M:%S:%f", "%H:%M:%S;%f", "%H:%M", "%I:%M:%S.%f %p", "%I:%M %p")
 _MINUTES = "%M:%S.%f"
-_FRACTION = re.compile(r"(?P<before>.*[0-9]:[0-9]{2}:[0-9]{2}[.,:])(?P<digits>[0-9]+)(?P<after>.*)")
+_FRACTION = re.compile(r"(?P<before>.*[0-9]:[0-9]{2}:[0-9]{2}[.,:;])(?P<digits>[0-9]+)(?P<after>.*)")
 _LOOKED = 200
 NS = 1_000_000_000
 _MINUTE, _HOUR, _HALF_DAY, _DAY = 60 * NS, 3600 * NS, 43200 * NS, 86400 * NS

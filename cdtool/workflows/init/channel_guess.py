@@ -14,9 +14,12 @@ from cdtool.workflows.init.quantity_words import (
     is_actual,
     is_current,
     is_load_cell,
+    is_of_body,
+    is_of_one_axis,
     is_only_a_joint,
     is_reference,
     is_something_else,
+    without_kind,
     word_for,
     words,
 )
@@ -315,13 +318,16 @@ def _acceleration(channels: Channels) -> None:
         return
     speed = channels.found.get("speed")
     top = [item for item in named if item[0] == named[0][0]]
+    if speed is None and is_of_one_axis(label(top[0][2])):
+        return
     if speed is None:
         _take_named(channels, "acceleration", top[0], named)
         return
     fits = {id(item[2]): motion.derivative_fit(item[2], speed.stream).correlation for item in top}
     chosen = max(top, key=lambda item: abs(fits[id(item[2])]))
     correlation = fits[id(chosen[2])]
-    if chosen[0] < _SPEAKS and abs(correlation) < _DENIES:
+    # Of an accelerometer with three axes none may be the joint's.
+    if (chosen[0] < _SPEAKS or is_of_one_axis(label(chosen[2]))) and abs(correlation) < _DENIES:
         return
     told = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
     rivals = [item for item in top if abs(fits[id(item[2])]) > _FITS] if told else top
@@ -445,12 +451,19 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
         and not is_reference(stream.name)
         and not is_actual(stream.name)
         and others[0] >= own[0] > 0.0
+        and not _of_different_parts(stream, other)
     ):
         reason = "rougher than" if not text.startswith("is ahead") else "behind"
         why = f"{reason} '{stream.name}', which it follows with r = {correlation:.3f}"
         channels.take(quantity, other, why, _BY_COURSE)
         opposite = "smoother than" if reason == "rougher than" else "ahead of"
         channels.found[name] = Found(stream, f"{measured.why}; {opposite} '{other.name}'", _BY_COURSE)
+
+
+def _of_different_parts(one: Stream, other: Stream) -> bool:
+    """Whether each of two names has a word of its own that states no quantity: `HipAngle` and `ThighAngle`."""
+    first, second = without_kind(label(one)), without_kind(label(other))
+    return bool(first - second) and bool(second - first)
 
 
 def _says_more(quantity: str, stream: Stream) -> bool:
@@ -477,7 +490,11 @@ def _unnamed_for(channels: Channels, quantity: str) -> list[Stream]:
 
     A load cell is ground truth and must never become an input.
     """
-    return [stream for stream in channels.of_joints() if may_be(quantity, stream) and not _is_other(quantity, stream)]
+    return [
+        stream
+        for stream in channels.of_joints()
+        if may_be(quantity, stream) and not _is_other(quantity, stream) and not is_of_body(stream.name)
+    ]
 
 
 def _best(streams: Iterable[Stream], score: Callable[[Stream], float]) -> tuple[float, Stream] | None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from cdtool.formats.column_names import split_unit
 from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.quantity_words import is_actual, is_reference, is_something_else, word_for, words
 
-_TOKENS = re.compile(r"[^\W_]+|[\W_]+")
+# Words and what is between them; a word in mixed case consists of several: `LeftHipAngle`.
+_TOKENS = re.compile(r"[^\W_]+?(?:(?<=[a-z])(?=[A-Z][a-z])|(?![^\W_]))|[\W_]+")
 _NUMBER = re.compile(r"\d+")
 # The name of a joint consists of at most this many words, with what is between them.
 _LONGEST = 5
@@ -49,7 +50,7 @@ def families_by_name(names: Sequence[str]) -> Families:
     usable = [(slots, keys) for slots, keys in sets.items() if _are_joints(slots, keys)]
     if not usable:
         return {}
-    slots, keys = max(usable, key=lambda item: (len(item[0]) * len(item[1]), sum(map(len, item[0]))))
+    slots, keys = max(usable, key=lambda item: (_measured(*item), len(item[0]) * len(item[1]), sum(map(len, item[0]))))
     order = tuple(slot for slot in members[keys[0]] if slot in slots)
     joints = _joint_names(order, *keys[0])
     return {
@@ -57,6 +58,13 @@ def families_by_name(names: Sequence[str]) -> Families:
         for (before, after), parts in members.items()
         if slots <= parts.keys()
     }
+
+
+def _measured(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> int:
+    """Return how many columns have a measured quantity by what is not the joint's name: with `q_#` more than `q_#_hip`."""
+    return len(slots) * sum(
+        any(_indicates(quantity, f"{before} {after}") for quantity in _QUANTITIES) for before, after in keys
+    )
 
 
 def _slots(name: str) -> list[tuple[str, str, str]]:
@@ -76,14 +84,8 @@ def _joint_names(slots: Sequence[str], before: str, after: str) -> tuple[str, ..
 
     `joint_states/elbow` in `/joint_states/elbow_joint/effort` is `elbow_joint`.
     """
-    tokens = [_TOKENS.findall(slot) for slot in slots]
-    while min(map(len, tokens)) > 1 and len({part[0] for part in tokens}) == 1:
-        before += tokens[0][0]
-        tokens = [part[1:] for part in tokens]
-    while min(map(len, tokens)) > 1 and len({part[-1] for part in tokens}) == 1:
-        after = tokens[0][-1] + after
-        tokens = [part[:-1] for part in tokens]
-    cores = ["".join(part).strip("_ ./:-") for part in tokens]
+    common, cores, behind = _split(slots)
+    before, after = before + common, behind + after
     left, right = re.findall(r"\w*$", before)[0], re.findall(r"^\w*", after)[0]
     for prefix, suffix in ((left, right), (left, "")):
         names = tuple(f"{prefix}{core}{suffix}".strip("_") for core in cores)
@@ -92,9 +94,29 @@ def _joint_names(slots: Sequence[str], before: str, after: str) -> tuple[str, ..
     return tuple(cores)
 
 
+def _cores(slots: Iterable[str]) -> list[str]:
+    """Return the parts in which names differ: `gear` and `joint` of `field.gear` and `field.joint`."""
+    return _split(list(slots))[1]
+
+
+def _split(slots: Sequence[str]) -> tuple[str, list[str], str]:
+    """Return what names begin with, the part of each in which they differ, and what they end with."""
+    tokens = [_TOKENS.findall(slot) for slot in slots]
+    before = after = ""
+    while min(map(len, tokens)) > 1 and len({part[0] for part in tokens}) == 1:
+        before += tokens[0][0]
+        tokens = [part[1:] for part in tokens]
+    while min(map(len, tokens)) > 1 and len({part[-1] for part in tokens}) == 1:
+        after = tokens[0][-1] + after
+        tokens = [part[:-1] for part in tokens]
+    return before, ["".join(part).strip("_ ./:-") for part in tokens], after
+
+
 def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
-    if len({_NUMBER.sub("", slot) for slot in slots}) == 1 or any(_is_taken(slot) for slot in slots):
+    if len({_NUMBER.sub("", slot) for slot in slots}) == 1:
         return False  # names that differ only by a number are families of their own
+    if any(_is_taken(slot) for slot in (*slots, *_cores(slots))):
+        return False
     quantities = {
         quantity for before, after in keys for quantity in _QUANTITIES if _indicates(quantity, f"{before} {after}")
     }

@@ -16,7 +16,7 @@ def _listed(*lines: str) -> tuple[str, ...]:
 # Words that are sufficient alone, also inside a longer one: `motordrehzahl`.
 LONG: Mapping[str, tuple[str, ...]] = {
     "position": _listed(
-        "position angle travel displacement",
+        "position angle travel displacement extension elongation",
         "winkel stellung",
         "deplacement",
         "posizione angolo corsa spostamento",
@@ -34,7 +34,7 @@ LONG: Mapping[str, tuple[str, ...]] = {
     ),
     "acceleration": _listed("accel", "beschl", "acelerac", "加速"),
     "torque": _listed(
-        "torque moment effort current driveforce",
+        "torque moment effort current driveforce presentload",
         "drehmoment strom antriebskraft",
         "couple courant",
         "coppia corrente",
@@ -136,6 +136,8 @@ SIDES = _listed(
     "motor load link joint drive gear shaft raw filtered filt smooth smoothed mean min max in out input output",
     "real sim simulated model",
 )
+# Inertial sensors: of a trunk, a tool or a leg, rarely of a joint.
+INERTIAL = _listed("imu gyro gyr gyroscope")
 AXES = _listed("x y z a b c u v w rx ry rz roll pitch yaw")
 # What is in logs of machines without being a channel of a joint, and patterns of it in words joined by `_`.
 OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
@@ -157,7 +159,7 @@ OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
     (
         "a voltage",
         re.compile(
-            r"volt|spannung|tension|voltaj|电压|電圧|(?:^|_)u_?dc|(?:^|_)v?bus(?:_|$)|(?:^|_)u_?[qd](?:_|$)|(?:^|_)uz?k(?:_|$)"
+            r"volt|spannung|(?:^|_)tension|voltaj|电压|電圧|(?:^|_)u_?dc|(?:^|_)v?bus(?:_|$)|(?:^|_)u_?[qd](?:_|$)|(?:^|_)uz?k(?:_|$)"
         ),
     ),
     ("a power", re.compile(r"power|leistung|puissance|potenza|potencia|功率|電力")),

@@ -20,6 +20,8 @@ _CLEAR = 0.67
 _LONGEST_LEAD = 0.5
 # Inertia and friction of opposite signs, each above this share of the effort's spread, are not those of a drive.
 _CONTRADICTS = 0.2
+# Inertia and friction explain at least this share of what weight and springs leave of an effort.
+_OF_MOTION = 0.1
 # Share of the windows that may contain impacts.
 _IMPACTS = 0.25
 
@@ -135,7 +137,7 @@ def drive_fit(drive: Stream, speed: Stream, position: Stream | None = None) -> f
             continue
         acceleration = np.gradient(v, time)
         share = _explained(tau, v, acceleration, None)
-        if place is not None:
+        if place is not None and _depends_on_motion(tau, v, acceleration, place[:, j]):
             share = max(share, _explained(tau, v, acceleration, place[:, j]))
         shares.append(share)
     return float(np.median(shares)) if shares else 0.0
@@ -160,6 +162,18 @@ def _explained(tau: FloatArray, v: FloatArray, acceleration: FloatArray, place: 
     if not whole or contradict:
         return 0.0
     return 1.0 - float(np.var((tau - known @ values)[kept])) / whole
+
+
+def _depends_on_motion(tau: FloatArray, v: FloatArray, acceleration: FloatArray, place: FloatArray) -> bool:
+    """Whether speed and acceleration explain a part of what the place leaves: a tool's pose depends on places alone."""
+    middle = (place - np.mean(place)) / (np.ptp(place) or 1.0)
+    weight = np.column_stack([middle, middle**2, middle**3, np.ones_like(v)])
+    moving = np.sign(np.where(np.abs(v) > 0.02 * np.max(np.abs(v)), v, 0.0))
+    rest = [
+        float(np.var(tau - known @ np.linalg.lstsq(known, tau, rcond=None)[0]))
+        for known in (weight, np.column_stack([weight, acceleration, moving, v]))
+    ]
+    return rest[1] < (1.0 - _OF_MOTION) * rest[0]
 
 
 def roughness(stream: Stream) -> float:

@@ -83,6 +83,28 @@ def what_else(name: str) -> str:
     return next((reason for reason, pattern in lexicon.OTHERS if pattern.search(joined)), "")
 
 
+def is_of_body(name: str) -> bool:
+    """Whether the name is that of an inertial sensor: it turns and accelerates with a body, not with one joint."""
+    return any(part in lexicon.INERTIAL for part in words(name))
+
+
+def is_of_one_axis(name: str) -> bool:
+    """Whether the name ends with an axis of space: `AccX`, `imu_acc_z`."""
+    return words(name)[-1:] in (["x"], ["y"], ["z"]) and len(words(name)) > 1
+
+
+def without_kind(name: str) -> frozenset[str]:
+    """Return the words of a name that state neither a quantity nor whether it is measured: `hip` of `HipAngle`."""
+    return frozenset(
+        part
+        for part in words(name)
+        if not any(word_for(quantity, part)[0] for quantity in lexicon.LONG)
+        and not is_reference(part)
+        and not is_actual(part)
+        and part not in lexicon.SIDES
+    )
+
+
 def name_in_group(name: str) -> str:
     """Return the channel of a path of group and channel, `/'Forza [N]'/'Time'`; any other name as it is."""
     return _IN_GROUP.sub(r"\1", name)
