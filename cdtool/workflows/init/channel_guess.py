@@ -19,6 +19,7 @@ from cdtool.workflows.init.quantity_words import (
     is_only_a_joint,
     is_reference,
     is_something_else,
+    side_of_gear,
     without_kind,
     word_for,
     words,
@@ -417,7 +418,7 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
     candidates = [
         other
         for other in _unnamed_for(channels, quantity)
-        if not is_actual(other.name) and not _says_more(quantity, other)
+        if not is_actual(other.name) and not _says_more(quantity, other) and not _of_two_sides(stream, other)
     ]
     if quantity == "torque":
         candidates = [other for other in candidates if is_reference(other.name)]
@@ -458,6 +459,12 @@ def _follower(channels: Channels, name: str, quantity: str, measured: Found) -> 
         channels.take(quantity, other, why, _BY_COURSE)
         opposite = "smoother than" if reason == "rougher than" else "ahead of"
         channels.found[name] = Found(stream, f"{measured.why}; {opposite} '{other.name}'", _BY_COURSE)
+
+
+def _of_two_sides(one: Stream, other: Stream) -> bool:
+    """Whether two names are those of different sides of a gear: `motor_position` and `load_position`."""
+    first, second = side_of_gear(one.name), side_of_gear(other.name)
+    return bool(first) and bool(second) and first != second
 
 
 def _of_different_parts(one: Stream, other: Stream) -> bool:

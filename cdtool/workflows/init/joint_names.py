@@ -61,7 +61,7 @@ def families_by_name(names: Sequence[str]) -> Families:
 
 
 def _measured(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> int:
-    """Return how many columns have a measured quantity by what is not the joint's name: with `q_#` more than `q_#_hip`."""
+    """Return how many columns have a quantity by what is not the joint's name: with `q_#` more than with `q_#_hip`."""
     return len(slots) * sum(
         any(_indicates(quantity, f"{before} {after}") for quantity in _QUANTITIES) for before, after in keys
     )

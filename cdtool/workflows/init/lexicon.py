@@ -138,6 +138,17 @@ SIDES = _listed(
 )
 # Inertial sensors: of a trunk, a tool or a leg, rarely of a joint.
 INERTIAL = _listed("imu gyro gyr gyroscope")
+# Sides of a gear or a spring, of which each may have an encoder.
+GEAR_SIDES = _listed("motor load link joint drive gear shaft input output rotor")
+# Efforts of a rotation.
+TWISTS = _listed(
+    "torque moment",
+    "drehmoment",
+    "couple",
+    "coppia",
+    "转矩 轉矩 扭矩 力矩",
+    "トルク",
+)
 AXES = _listed("x y z a b c u v w rx ry rz roll pitch yaw")
 # What is in logs of machines without being a channel of a joint, and patterns of it in words joined by `_`.
 OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (

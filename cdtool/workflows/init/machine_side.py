@@ -8,7 +8,7 @@ import numpy as np
 
 from cdtool.units import find_unit
 from cdtool.workflows.init.quantity_words import words
-from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, stated, whole_numbers
+from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, seems_to_turn, stated, whole_numbers
 from cdtool.workflows.init.streams import Channels
 from cdtool.workflows.init.table_clock import TableClock
 
@@ -84,6 +84,8 @@ def _load_side(channels: Channels, ratio: Ratio | None, told: dict[str, str], me
         return Side("rotary_axis", "load", "one joint, in angles", _MOTOR_OF_LOAD)
     if told.get("torque") == "N m":
         return Side("rotary_axis", "load", "one joint, a torque without a travel", _MOTOR_OF_LOAD)
+    if seems_to_turn(channels):
+        return Side("rotary_axis", "load", "one joint, a torque by its name", _MOTOR_OF_LOAD)
     if ratio is not None and ratio.fitting and _is_angle(ratio.fitting[0].position):
         return Side("rotary_axis", "load", "one joint; angles fit its speed", _MOTOR_OF_LOAD)
     if messages_si:

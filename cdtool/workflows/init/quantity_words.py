@@ -88,6 +88,17 @@ def is_of_body(name: str) -> bool:
     return any(part in lexicon.INERTIAL for part in words(name))
 
 
+def side_of_gear(name: str) -> frozenset[str]:
+    """Return the words of a name for a side of a gear: `motor` of `motor_position`."""
+    return frozenset(words(name)).intersection(lexicon.GEAR_SIDES)
+
+
+def is_twist(name: str) -> bool:
+    """Whether the name is that of an effort of a rotation: `torque`, `Drehmoment`; not `effort`, `current`."""
+    found = word_for("torque", name)[1]
+    return found in lexicon.TWISTS or found in ("tau", "trq", "torq", "tq")
+
+
 def is_of_one_axis(name: str) -> bool:
     """Whether the name ends with an axis of space: `AccX`, `imu_acc_z`."""
     return words(name)[-1:] in (["x"], ["y"], ["z"]) and len(words(name)) > 1

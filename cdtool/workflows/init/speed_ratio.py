@@ -13,7 +13,7 @@ import numpy as np
 
 from cdtool.units import find_unit
 from cdtool.workflows.init import motion_evidence as motion
-from cdtool.workflows.init.quantity_words import motion_of, words
+from cdtool.workflows.init.quantity_words import is_twist, motion_of, words
 from cdtool.workflows.init.streams import Channels, Stream
 from cdtool.workflows.init.table_clock import TableClock, seconds
 from cdtool.workflows.init.units_in_names import label, own_name, unit_in_name
@@ -112,6 +112,21 @@ def motion_kind(channel: str, channels: Channels) -> str:
     return motion_of(label(stream))
 
 
+def seems_to_turn(channels: Channels) -> bool:
+    """Whether a single joint turns by the name of its torque: no more than two turns, no name or unit of a length."""
+    if channels.joints > 1 or "torque" not in channels.found:
+        return False
+    if (
+        not is_twist(label(channels.found["torque"].stream))
+        or stated("torque", channels.found["torque"].stream).si == "N"
+    ):
+        return False
+    if any(motion_kind(name, channels) for name in ("position", "speed")):
+        return False
+    position = channels.found.get("position")
+    return position is None or float(np.nanmax(np.abs(position.stream.values))) < 4.0 * math.pi
+
+
 def ratio_of(channels: Channels, clock: TableClock | None, messages_si: bool) -> Ratio | None:
     """Return position over speed and all units that fit; None if one is missing or does not follow the other.
 
@@ -194,7 +209,7 @@ def _combination(
     if kind == "length" and not pair[1].startswith(f"{pair[0]}/"):
         unlikely += 0.5  # m with mm/s
     # If no word indicates otherwise, one joint slides and several rotate.
-    unlikely += 0.5 * (kind != ("angle" if channels.joints > 1 else "length"))
+    unlikely += 0.5 * (kind != ("angle" if channels.joints > 1 or seems_to_turn(channels) else "length"))
     for channel, logged in zip(("position", "speed"), pair, strict=True):
         stream = channels.found[channel].stream
         told = stated(channel, stream)
