@@ -16,16 +16,16 @@ def _listed(*lines: str) -> tuple[str, ...]:
 # Words that are sufficient alone, also inside a longer one: `motordrehzahl`.
 LONG: Mapping[str, tuple[str, ...]] = {
     "position": _listed(
-        "position angle travel displacement extension elongation",
-        "winkel stellung",
-        "deplacement",
-        "posizione angolo corsa spostamento",
-        "posicion angulo desplazamiento carrera recorrido",
-        "位置 角度 转角 位移 行程",
-        "変位 エンコーダ",
+        "position angle travel displacement extension elongation stroke crosshead opening height azimuth",
+        "winkel stellung lageist offnung hohe",
+        "deplacement ouverture hauteur",
+        "posizione angolo corsa spostamento apertura altezza",
+        "posicion angulo desplazamiento carrera recorrido altura",
+        "位置 角度 转角 位移 行程 开度 高度",
+        "変位 エンコーダ ストローク 移動量",
     ),
     "speed": _listed(
-        "speed velocit omega",
+        "speed velocit omega qdot thetadot phidot angularrate jointrate yawrate",
         "geschw drehzahl",
         "vitesse regime",
         "velocidad",
@@ -34,9 +34,9 @@ LONG: Mapping[str, tuple[str, ...]] = {
     ),
     "acceleration": _listed("accel", "beschl", "acelerac", "加速"),
     "torque": _listed(
-        "torque moment effort current driveforce presentload",
-        "drehmoment strom antriebskraft",
-        "couple courant",
+        "torque moment effort current driveforce thrust presentload motorload driveload axisload spindleload servoload",
+        "drehmoment strom antriebskraft auslastung",
+        "couple courant intensite",
         "coppia corrente",
         "corriente esfuerzo",
         "扭力 转矩 轉矩 扭矩 力矩 电流 電流",
@@ -45,11 +45,11 @@ LONG: Mapping[str, tuple[str, ...]] = {
     "force": _listed(
         "loadcell force wrench dynamometer",
         "kraft messdose wagezelle waegezelle",
-        "capteurdeffort",
-        "forza celladicarico spinta",
-        "fuerza celdadecarga celuladecarga",
+        "capteurdeffort capteureffort effortcapteur",
+        "forza celladicarico cellacarico spinta",
+        "fuerza celdadecarga celuladecarga celdacarga",
         "力",
-        "荷重",
+        "荷重 ロードセル",
     ),
     "label": _listed(
         "label contact collision", "kontakt kollision", "contatto", "contacto colision", "碰撞 接触", "衝突"
@@ -59,11 +59,11 @@ LONG: Mapping[str, tuple[str, ...]] = {
 # Words that must be separate.
 SHORT: Mapping[str, tuple[str, ...]] = {
     "position": _listed(
-        "pos posn phi theta q qm qmsr x s p mp jp ip ang enc encoder", "weg lage hub geber drehgeber", "course"
+        "pos posn phi theta th q qm qmsr x s p mp jp ip ang enc encoder", "weg lage hub geber drehgeber", "course quota"
     ),
-    "speed": _listed("mv jv qd dq qp qdot dphi dtheta thetad thetadot w n v vx vel velo spd rpm", "giri"),
+    "speed": _listed("mv jv qd dq qp qdot dphi dtheta thetad thetadot w n v vx vel velo spd rpm vit", "giri"),
     "acceleration": _listed("acc acel qdd ddq qddot ddtheta ax ay az a"),
-    "torque": _listed("tau trq tor tq mt jt iq isq i m pwm duty u amps amp curr cur", "par"),
+    "torque": _listed("tau trq tor tq mt jt iq isq i m pwm duty u amps amp curr cur iist im", "par"),
     "force": _listed("cell f fx fy fz", "dms"),
     "label": (),
     "trigger": ("trig",),
@@ -82,26 +82,27 @@ LONGER: Mapping[str, tuple[str, ...]] = {
     "角速": ("角加速",),
     "moment": _listed("momentum momentan"),
     "couple": _listed("coupled coupler coupling"),
+    "vel": ("level",),
 }
 REFERENCE_LONG = _listed(
     "target desired command setpoint reference nominal planned ideal theoretic profile interpolat",
-    "soll",
+    "soll vorgabe fuhrungs",
     "consigne",
     "riferimento obiettivo impostat",
     "consigna desead referencia objetivo",
-    "指令 目标 给定 设定 参考",
+    "指令 目标 给定 设定 参考 期望 规划",
     "目標 設定",
 )
 REFERENCE_SHORT = _listed("ref des dest cmd sp ip goal qg set demand dem ipo cons traj trajectory")
 REFERENCE_STARTS = _listed("set cmd ref des tgt goal dem")
 ACTUAL_LONG = _listed(
     "actual measured feedback estimate",
-    "gemessen",
+    "gemessen ruckmeld",
     "mesure",
-    "misurat attuale effettiv",
+    "misurat attuale effettiv rilevat",
     "medid",
-    "实际 實際 反馈 测量",
-    "現在 実際",
+    "实际 實際 反馈 测量 实测 当前",
+    "現在 実際 実測",
 )
 ACTUAL_SHORT = _listed("act meas msr fb fbk present real reel reale")
 ACTUAL_STARTS = _listed("act meas fb ist")
@@ -109,10 +110,10 @@ LOAD_CELL = _listed(
     "loadcell forcesensor wrench dynamometer",
     "kraftmess kraftsensor messdose wagezelle waegezelle",
     "capteur",
-    "celladicarico",
-    "celdadecarga celuladecarga",
+    "celladicarico cellacarico",
+    "celdadecarga celuladecarga celdacarga",
     "接触力",
-    "荷重",
+    "荷重 ロードセル",
 )
 DRIVES = _listed("drive motor actuator", "antrieb", "moteur", "motore", "电机 電機", "モータ")
 FORCES = _listed("force kraft forza fuerza effort")
@@ -123,8 +124,8 @@ ANGLES = _listed("angle angular omega motor encoder", "winkel drehzahl", "angolo
 ANGLES_SHORT = _listed("phi theta rot ang enc n rpm w dphi dtheta deg rad joint rev turns")
 LENGTHS = _listed("travel displacement stroke linear deplacement spostamento corsa desplazamiento 行程")
 LENGTHS_SHORT = _listed("weg hub x s")
-CLOCKS = re.compile(r"time|zeit|stamp|clock|时间|時間|時刻|时刻|タイム")
-CLOCKS_SHORT = _listed("t ts ticks tick tempo temps tiempo duration tm sec seconds")
+CLOCKS = re.compile(r"time|zeit|stamp|clock|elapsed|epoch|时间|時間|時刻|时刻|タイム")
+CLOCKS_SHORT = _listed("t ts tps ticks tick tempo temps tiempo duration tm sec secs seconds millis micros utc")
 COUNTERS = _listed("tick count zahler zaehler sample index cycle zyklus seqno 序号 サンプル")
 # Nouns after `current` that make it an adjective: the present one.
 PRESENT = _listed("feed feedrate program line block state mode step tool time cycle pose value location target")
@@ -155,7 +156,7 @@ OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
     (
         "a tool or Cartesian value",
         re.compile(
-            r"tcp|tool|(?:^|_)(?:ee|eef|flange|cart|cartpos|rpy|quat|twist|cartesian)(?:_|$)"
+            r"tcp|tool|(?:^|_)(?:ee|eef|flange|cart|cartpos|rpy|quat|quaternion|twist|cartesian)(?:_|$)"
             r"|o_t_e|(?:^|_)[ok]_f(?:_|$)|orientation|pose(?:_|$)"
         ),
     ),
@@ -173,6 +174,7 @@ OTHERS: tuple[tuple[str, re.Pattern[str]], ...] = (
             r"volt|spannung|(?:^|_)tension|voltaj|电压|電圧|(?:^|_)u_?dc|(?:^|_)v?bus(?:_|$)|(?:^|_)u_?[qd](?:_|$)|(?:^|_)uz?k(?:_|$)"
         ),
     ),
+    ("a pressure", re.compile(r"(?:^|_)(?:pressure|druck|pression|pressione|presion)(?:_|$)")),
     ("a power", re.compile(r"power|leistung|puissance|potenza|potencia|功率|電力")),
     (
         "a modelled or external value",

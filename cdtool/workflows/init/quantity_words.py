@@ -182,7 +182,7 @@ def word_for(quantity: str, name: str) -> tuple[float, str]:
         if part in lexicon.SHORT[quantity] and not (part in _PRESENTS and _is_adjective(parts)):
             return (_WEAK if len(part) >= _LETTERS else _WEAK - 1.0), part
     for ending in lexicon.ENDINGS.get(quantity, ()):
-        if any(part.endswith(ending) and len(part) > len(ending) for part in parts):
+        if any(part.endswith(ending) and part != ending and not _is_part_of_another(ending, part) for part in parts):
             return _WEAK, ending
     return 0.0, ""
 
