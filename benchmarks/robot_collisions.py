@@ -21,7 +21,8 @@ import cdtool
 EXAMPLES = Path(__file__).resolve().parents[1] / "docs" / "examples"
 THRESHOLDS = {
     "limit, learned until the onset": "",
-    "baseline": 'threshold = { name = "baseline", safety_factor = 10, widen = true }',
+    "baseline": 'threshold = "baseline"',
+    "baseline that widens": 'threshold = { name = "baseline", widen = true }',
 }
 
 

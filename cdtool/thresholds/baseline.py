@@ -120,7 +120,8 @@ class Baseline:
         Number of spreads from the median to the limit; the spread is half the distance between the quantiles of
         15.9 % and 84.1 %, which is the standard deviation of normally distributed samples.
     warm_up : float
-        How long a joint has to move before its limits are known [s]. Until then it is not assessable.
+        How long a joint has to move before its limits are known [s]. Until then it is not assessable. At 30 to 60 Hz,
+        1 s has too few samples for the spread of noise that is correlated.
     sides : {"one", "two"}, optional
         "one" monitors the side on which an obstacle opposes the present motion; None: both.
     widen : bool
@@ -144,11 +145,11 @@ class Baseline:
     Examples
     --------
     >>> Baseline(warm_up=0.5).fit([])
-    FittedBaseline(warm_up=0.5, safety_factor=8.0, sides='two', widen=False)
+    FittedBaseline(warm_up=0.5, safety_factor=10.0, sides='two', widen=False)
     """
 
-    safety_factor: float = 8.0
-    warm_up: float = 1.0
+    safety_factor: float = 10.0
+    warm_up: float = 1.5
     sides: str | None = None
     widen: bool = False
 

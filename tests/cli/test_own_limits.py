@@ -37,7 +37,7 @@ def test_a_benchmark_needs_no_runs_to_learn_from_and_ignores_them_for_the_limits
     outcomes = [row["outcome"] for row in results["contacts"]]
     assert outcomes and set(outcomes) == {"detected"} and results["false_alarms"] == []
     assert results["provenance"]["threshold_rule"] == {
-        "safety_factor": 8.0,
+        "safety_factor": 10.0,
         "warm_up": 0.8,
         "sides": "one",
         "widen": False,

@@ -167,7 +167,7 @@ def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_po
             f"{why} Limits are learned from what is before the contacts,",
             "# and each log is scored with what was learned from the others.",
             'threshold = "limit"',
-            '# Or, without learning: threshold = { name = "baseline", safety_factor = 10, widen = true }',
+            '# Or, without learning: threshold = "baseline"',
             "",
             "[learn]",
             'until = "onset"',

@@ -15,7 +15,7 @@ from cdtool.workflows.init.quantity_words import (
     is_current,
     is_load_cell,
     is_of_body,
-    is_of_one_axis,
+    is_one_of_three_axes,
     is_only_a_joint,
     is_reference,
     is_something_else,
@@ -319,7 +319,9 @@ def _acceleration(channels: Channels) -> None:
         return
     speed = channels.found.get("speed")
     top = [item for item in named if item[0] == named[0][0]]
-    if speed is None and is_of_one_axis(label(top[0][2])):
+    # Of an accelerometer with three axes none may be the joint's.
+    names = [label(stream) for stream in channels.streams if stream.width == top[0][2].width]
+    if speed is None and is_one_of_three_axes(label(top[0][2]), names):
         return
     if speed is None:
         _take_named(channels, "acceleration", top[0], named)
@@ -327,8 +329,7 @@ def _acceleration(channels: Channels) -> None:
     fits = {id(item[2]): motion.derivative_fit(item[2], speed.stream).correlation for item in top}
     chosen = max(top, key=lambda item: abs(fits[id(item[2])]))
     correlation = fits[id(chosen[2])]
-    # Of an accelerometer with three axes none may be the joint's.
-    if (chosen[0] < _SPEAKS or is_of_one_axis(label(chosen[2]))) and abs(correlation) < _DENIES:
+    if abs(correlation) < _DENIES and (chosen[0] < _SPEAKS or is_one_of_three_axes(label(chosen[2]), names)):
         return
     told = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
     rivals = [item for item in top if abs(fits[id(item[2])]) > _FITS] if told else top

@@ -20,8 +20,9 @@ _CLEAR = 0.67
 _LONGEST_LEAD = 0.5
 # Inertia and friction of opposite signs, each above this share of the effort's spread, are not those of a drive.
 _CONTRADICTS = 0.2
-# Inertia and friction explain at least this share of what weight and springs leave of an effort.
-_OF_MOTION = 0.1
+# Inertia and friction explain at least this share of what weight and springs leave of an effort; of the coordinates of
+# a tool less than 0.35, by chance.
+_OF_MOTION = 0.4
 # Share of the windows that may contain impacts.
 _IMPACTS = 0.25
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable
 from functools import lru_cache
 
 from cdtool.workflows.init import lexicon
@@ -99,9 +100,12 @@ def is_twist(name: str) -> bool:
     return found in lexicon.TWISTS or found in ("tau", "trq", "torq", "tq")
 
 
-def is_of_one_axis(name: str) -> bool:
-    """Whether the name ends with an axis of space: `AccX`, `imu_acc_z`."""
-    return words(name)[-1:] in (["x"], ["y"], ["z"]) and len(words(name)) > 1
+def is_one_of_three_axes(name: str, names: Iterable[str]) -> bool:
+    """Whether the name ends with an axis of space, and others are those of the other two: `AccX`, `AccY`, `AccZ`."""
+    parts = _words(name)
+    if parts[-1:] not in (("x",), ("y",), ("z",)) or len(parts) < 2:
+        return False
+    return {other[-1] for other in map(_words, names) if other[:-1] == parts[:-1]} == {"x", "y", "z"}
 
 
 def without_kind(name: str) -> frozenset[str]:
@@ -109,7 +113,8 @@ def without_kind(name: str) -> frozenset[str]:
     return frozenset(
         part
         for part in words(name)
-        if not any(word_for(quantity, part)[0] for quantity in lexicon.LONG)
+        if len(part) > _LETTERS
+        and not any(word_for(quantity, part)[0] for quantity in lexicon.LONG)
         and not is_reference(part)
         and not is_actual(part)
         and part not in lexicon.SIDES

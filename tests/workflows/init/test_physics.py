@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.streams import Stream
 from tests.workflows.init.drafts import drafted_columns, stroke
+from tests.workflows.init.layouts.motion import arm_motion
 
 
 def stream(time, values, name="x"):
@@ -97,6 +98,45 @@ def test_the_measured_of_two_like_names_is_the_one_behind(tmp_path):
     draft = drafted_columns(tmp_path, {"t": run.time, "xa pos": run.travel, "xb pos": late})
     assert draft.channels["position"]["column"] == "xb pos" and draft.checked("position")
     assert draft.channels["reference_position"]["column"] == "xa pos" and draft.checked("reference_position")
+
+
+def test_positions_of_different_parts_are_no_set_values_of_each_other(tmp_path):
+    run = stroke()
+    late = np.interp(run.time - 0.02, run.time, run.travel)
+    draft = drafted_columns(tmp_path, {"t": run.time, "hip angle": run.travel, "thigh angle": late})
+    assert draft.channels["position"]["column"] == "hip angle" and "reference_position" not in draft.channels
+
+
+def test_the_other_side_of_a_gear_is_no_set_value(tmp_path):
+    run = stroke()
+    late = np.interp(run.time - 0.02, run.time, run.travel)
+    columns = {"t": run.time, "gear_position": late, "joint_position": run.travel, "joint_velocity": run.speed}
+    draft = drafted_columns(tmp_path, columns)
+    assert "reference_position" not in draft.channels
+
+
+def test_an_inertial_sensor_is_no_speed_by_its_values(tmp_path):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"t": run.time, "angle": run.travel, "trunk_imu_y": run.speed})
+    assert "speed" not in draft.channels
+
+
+@pytest.mark.parametrize(("others", "found"), [((), True), (("accy", "accz"), False)])
+def test_one_of_three_axes_of_an_accelerometer_is_the_joints_only_if_it_fits(tmp_path, others, found):
+    run, noise = stroke(), np.random.default_rng(2)
+    names = ("acc x", *(name.replace("acc", "acc ") for name in others))
+    columns = {name: 9.81 + noise.normal(0.0, 1.0, len(run.time)) for name in names}
+    draft = drafted_columns(tmp_path, {"t": run.time, "pos": run.travel, "vel": run.speed, **columns})
+    assert ("acceleration" in draft.channels) is found
+
+
+def test_what_depends_on_places_alone_is_no_effort():
+    m = arm_motion(np.random.default_rng(3), 3, duration=20.0)
+    q = m.position
+    reach = 0.4 * np.cos(q[:, 1]) + 0.3 * np.cos(q[:, 1] + q[:, 2])
+    pose = Stream("p", (), None, m.time, np.column_stack([reach * np.cos(q[:, 0]), reach * np.sin(q[:, 0]), reach]))
+    place, speed, effort = (Stream("x", (), None, m.time, values) for values in (q, m.speed, m.effort))
+    assert motion.drive_fit(pose, speed, place) < 0.6 < motion.drive_fit(effort, speed, place)
 
 
 def test_a_speed_that_the_position_does_not_follow_is_marked(tmp_path):

@@ -14,14 +14,13 @@ from tests.workflows.init.drafts import RPM, drafted, drafted_columns, stroke, w
 LEAD = 1.5e-3  # travel per motor angle [m/rad]
 
 
+@pytest.mark.parametrize(("effort", "units"), [("force_motor", ("m", "m/s")), ("torque", ("rad", "rad/s"))])
 @pytest.mark.parametrize("rate", [2500, 4000, 10000])
-def test_an_unstated_clock_unit_is_guessed_with_those_of_position_and_speed(tmp_path, rate):
+def test_an_unstated_clock_unit_is_guessed_with_those_of_position_and_speed(tmp_path, rate, effort, units):
     run = stroke(1.0 / rate)
-    draft = drafted_columns(
-        tmp_path, {"time": run.time * 1e3, "pos": run.travel, "vel": run.speed, "torque": run.torque}
-    )
+    draft = drafted_columns(tmp_path, {"time": run.time * 1e3, "pos": run.travel, "vel": run.speed, effort: run.torque})
     assert draft.channels["time"] == {"column": "time", "unit": "ms"}
-    assert (draft.unit("position"), draft.unit("speed")) == ("m", "m/s")
+    assert (draft.unit("position"), draft.unit("speed")) == units
     assert all(draft.checked(key) for key in ("time", "position", "speed"))
     assert "ms with mm, mm/s" in draft.said("time") and "s with m, mm/s fit as well" in draft.said("time")
 

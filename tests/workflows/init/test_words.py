@@ -26,12 +26,16 @@ def quantity_of(name):
     ("quantity", "names"),
     [
         ("position", ["Türwinkel", "déplacement", "Posizione", "posición", "实际位置", "現在位置"]),
-        ("position", ["ActPos", "standardhub", "actual.positions"]),
+        ("position", ["ActPos", "standardhub", "actual.positions", "Extension", "height"]),
+        ("position", ["Öffnungsweite", "ouverture", "ストローク"]),
         ("speed", ["joint_velocities", "actual.velocities"]),
         ("speed", ["Drehzahl", "vitesse", "Velocità", "velocidad", "电机转速", "回転数", "ActVelo", "dq_3"]),
         ("acceleration", ["Beschl.", "accélération", "accelerazione", "aceleración", "加速度", "qdd1"]),
         ("torque", ["Motorstrom", "couple moteur", "coppia", "par_motor", "力矩", "电流", "トルク", "tau_J"]),
-        ("force", ["Kraft", "Force capteur", "Cella di carico", "fuerza", "接触力", "荷重", "fz"]),
+        ("force", ["Kraft", "Force capteur", "Cella di carico", "fuerza", "接触力", "荷重", "fz", "ロードセル"]),
+        ("torque", ["present_load", "spindle load", "intensité moteur", "Auslastung", "thrust"]),
+        ("speed", ["q_dot", "theta_dot", "angular_rate"]),
+        ("", ["level", "id", "Druck"]),
     ],
 )  # fmt: skip
 def test_a_quantity_is_recognised_in_seven_languages(quantity, names):
@@ -105,15 +109,28 @@ def test_joints_are_found_by_the_part_of_the_names_that_differs():
     }
 
 
+def test_joints_are_found_in_names_in_mixed_case():
+    families = families_by_name(["LeftHipAngle", "RightHipAngle", "LeftHipTorque", "RightHipTorque"])
+    assert (("Left", "Right"), ("LeftHipAngle", "RightHipAngle")) in families.values()
+
+
+def test_the_joints_of_legs_are_not_the_legs():
+    legs = [f"{leg}_{part}" for leg in ("FL", "FR", "RL", "RR") for part in ("hip", "thigh", "calf")]
+    names = [f"{kind}_{joint}" for kind in ("q", "dq", "tau") for joint in legs]
+    families = families_by_name([*names, *(f"{leg}_force" for leg in ("FL", "FR", "RL", "RR"))])
+    assert families["q_#"][1] == tuple(f"q_{joint}" for joint in legs)
+
+
 @pytest.mark.parametrize(
     "names",
     [
         ["motor_position", "load_position", "motor_speed", "load_speed"],
+        ["field.gear_position", "field.joint_position", "field.gear_velocity", "field.joint_velocity"],
         ["pose_x", "pose_y", "velocity_x", "velocity_y", "position_x", "position_y"],
         ["actual_position", "target_position", "actual_speed", "target_speed"],
         ["position", "speed", "torque"],
     ],
-    ids=["two sides of a gear", "Cartesian axes", "set values", "one joint"],
+    ids=["two sides of a gear", "two sides in messages", "Cartesian axes", "set values", "one joint"],
 )
 def test_other_differences_are_no_joints(names):
     assert families_by_name(names) == {}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tests.workflows.init.layouts import axes, benches, robots, strangers
+from tests.workflows.init.layouts import axes, benches, loggers, robots, strangers
 from tests.workflows.init.layouts.layout import Layout, Truth
 
-LAYOUTS: tuple[Layout, ...] = (*robots.LAYOUTS, *axes.LAYOUTS, *benches.LAYOUTS, *strangers.LAYOUTS)
+LAYOUTS: tuple[Layout, ...] = (*robots.LAYOUTS, *axes.LAYOUTS, *benches.LAYOUTS, *strangers.LAYOUTS, *loggers.LAYOUTS)
 
 __all__ = ["LAYOUTS", "Layout", "Truth"]

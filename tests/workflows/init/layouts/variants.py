@@ -34,8 +34,13 @@ def without_names(layout: Layout) -> Layout:
 
 
 def is_table(layout: Layout) -> bool:
-    """Whether the layout is a text table with a line of names."""
-    return layout.suffix == ".csv" and not all(name.isdigit() for name in layout.truth)
+    """Whether the layout is a text table whose first line has the names, and each other line a cell for each."""
+    if layout.suffix != ".csv" or all(name.isdigit() for name in layout.truth):
+        return False
+    content = _written(layout, np.random.default_rng(7))
+    lines = content.splitlines()
+    separator = _separator(lines[0], list(layout.truth))
+    return bool(separator) and {line.count(separator) for line in lines} == {len(layout.truth) - 1}
 
 
 def _letters(number: int) -> str:
@@ -48,16 +53,11 @@ def _rewritten(layout: Layout, name: str, kept: Mapping[str, str]) -> Layout:
     columns = list(layout.truth)
 
     def write(path: Path, generator: Generator) -> None:
-        with TemporaryDirectory() as folder:
-            whole = Path(folder) / "whole.csv"
-            layout.write(whole, generator)
-            content = whole.read_bytes()
-        encoding = "utf-8" if _is_utf8(content) else "cp1252"
-        lines = content.decode(encoding).splitlines()
-        separator = next(mark for mark in "\t;, " if lines[0].split(mark) == columns)
+        lines = _written(layout, generator).splitlines()
+        separator = _separator(lines[0], columns)
         rows = [_taken(line.split(separator), columns, kept) for line in lines[1:]]
         text = "\n".join([separator.join(kept.values()), *(separator.join(row) for row in rows)])
-        path.write_text(text + "\n", encoding=encoding)
+        path.write_text(text + "\n", encoding="utf-8")
 
     truth = {new: layout.truth[old] for old, new in kept.items()}
     return replace(layout, name=name, write=write, truth=truth)
@@ -67,12 +67,19 @@ def _taken(cells: Sequence[str], columns: Sequence[str], kept: Mapping[str, str]
     return [cell for cell, column in zip(cells, columns, strict=True) if column in kept]
 
 
-def _is_utf8(content: bytes) -> bool:
+def _separator(header: str, columns: Sequence[str]) -> str:
+    return next((mark for mark in "\t;, " if header.split(mark) == list(columns)), "")
+
+
+def _written(layout: Layout, generator: Generator) -> str:
+    with TemporaryDirectory() as folder:
+        whole = Path(folder) / "whole.csv"
+        layout.write(whole, generator)
+        content = whole.read_bytes()
     try:
-        content.decode("utf-8")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return False
-    return True
+        return content.decode("cp1252")
 
 
 def written(layout: Layout, folder: Path) -> Path:
