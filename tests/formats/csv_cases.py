@@ -523,6 +523,7 @@ _timed("American date, day above 12", lambda ms: _at(ms, "%m/%d/%Y %H:%M:%S.%L")
 _timed("British date, day above 12", lambda ms: _at(ms, "%d/%m/%Y %H:%M:%S.%L"))
 _timed("month by name", lambda ms: _at(ms, "%d-%b-%Y %H:%M:%S.%L"))
 _timed("half days", lambda ms: _at(ms, "%m/%d/%Y %I:%M:%S.%L %p"))
+_timed("time of a trend of Studio 5000", lambda ms: _at(ms, "%Y/%m/%d,%H:%M:%S;%L"), ",", "Date,Time")
 _timed("date and time in two columns", lambda ms: _at(ms, "%d.%m.%Y;%H:%M:%S.%L"), ";", "date;time")
 _timed(
     "03/04/2025", lambda ms: _at(ms, "%m/%d/%Y %H:%M:%S.%L", "2025-04-03T23:59:58"), refused=True, words="2025-04-03"

@@ -110,3 +110,22 @@ def test_the_unit_labels_of_labview_are_the_units_of_its_columns(log):
     rows = "".join(f"{0.001 * i:.3f}\t{i}.5\t{i}\n" for i in range(40))
     source = Csv().columns(log(head + "X_Value\tTorque\tSpeed\tComment\n" + rows, "log.lvm"))
     assert [source.columns[name].unit for name in ("X_Value", "Torque", "Speed")] == [None, "N*m", "rpm"]
+
+
+@pytest.mark.parametrize(
+    ("comment", "units"),
+    [
+        ("# s,mm,mm/s", ["s", "mm", "mm/s"]),
+        ("#s,mm,mm/s,", ["s", "mm", "mm/s"]),
+        ("# rig 3,12,left", [None, None, None]),
+        ("# s,mm", [None, None, None]),
+        ("# s,mm,mm/s\n# rig 3", [None, None, None]),
+    ],
+    ids=["units", "a separator at the end", "words", "fewer cells", "not directly above"],
+)
+def test_units_in_a_comment_directly_above_the_names_are_read(log, comment, units):
+    end = "," if comment.endswith(",") else ""
+    rows = "".join(f"{0.01 * i:.2f},{i}.5,{i}{end}\n" for i in range(40))
+    path = log(f"{comment}\ntime,Position,Speed{end}\n{rows}", "log.csv")
+    source = choose_format(path).columns(path)
+    assert [source.columns[name].unit for name in ("time", "Position", "Speed")] == units

@@ -58,6 +58,7 @@ _MOST = 12
 # Dialects of previous tables, for files with an equal head and rows of the same shape.
 _KNOWN: dict[tuple[object, ...], Dialect] = {}
 _MOST_KNOWN = 64
+_TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
 _MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
@@ -91,7 +92,8 @@ def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal:
                 "correct or remove separator in [csv], or the line sep= of the file",
             )
         return split
-    splits = [_split(scored, separator) for separator in SEPARATORS]
+    in_times = _is_part_of_times(lines)
+    splits = [_split(scored, separator) for separator in SEPARATORS if not (in_times and separator == ";")]
     possible = [split for split in splits if split.width > 1 and split.numeric > 0.0]
     if not possible:
         return _split(scored, ",")
@@ -105,6 +107,12 @@ def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal:
         and split.numeric > best.numeric / 3.0
     ]
     return stronger[0] if stronger else best
+
+
+def _is_part_of_times(lines: Sequence[Line]) -> bool:
+    """Return whether every semicolon is in a time, `14:05:11;480`, and the line of the names has none."""
+    marked = [line.text for line in lines if ";" in line.text]
+    return 0 < len(marked) < len(lines) and all(";" not in _TIME.sub("", text) for text in marked)
 
 
 def _split(texts: Sequence[str], separator: str) -> Split:

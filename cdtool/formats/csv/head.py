@@ -107,7 +107,18 @@ class HeadFinder:
             units, types = (units, header) if is_types else (header, types)
             header, names = upper_row, upper
         self._refuse_row_as_names(header, cut[start])
-        return self._make_head(names, header, units or types, cut[start].line, above)
+        units = units or types or self._units_in_comment(header.line, comments)
+        return self._make_head(names, header, units, cut[start].line, above)
+
+    def _units_in_comment(self, header: Line, comments: Sequence[Line]) -> _SplitLine | None:
+        """Return the comment directly above the names if it has their units: `# s,mm,mm/s`."""
+        if self.pins.units is not None:
+            return None
+        over = [line for line in comments if line.number < header.number][-1:]
+        rows = [self._split(Line(line.number, line.text.lstrip().lstrip("#%/ \t"), line.start)) for line in over]
+        width = (self.width, self.width - 1) if self.kinds[-1] == "M" else (self.width,)
+        fitting = [row for row in rows if row.line.number == header.number - 1 and len(row.cells) in width]
+        return next((row for row in fitting if self._are_units(row)), None)
 
     def _make_head(
         self, names: list[str], header: _SplitLine, units: _SplitLine | None, first: Line, above: Sequence[_SplitLine]

@@ -19,6 +19,7 @@ from cdtool.workflows.init.quantity_words import (
     is_only_a_joint,
     is_reference,
     is_something_else,
+    is_twist,
     side_of_gear,
     without_kind,
     word_for,
@@ -374,7 +375,9 @@ def _ground_truth(channels: Channels) -> None:
         channels.take("force", chosen[2], _TOLD_UNIT if chosen[1] == _TOLD_UNIT else f"name ({chosen[1]})")
     elif "force" not in channels.found:
         for stream in singles:
-            if _is_other("force", stream) or channels.is_of_family(stream) or not motion.rests_and_peaks(stream):
+            if _is_other("force", stream) or side_of_gear(stream.name) or channels.is_of_family(stream):
+                continue
+            if not motion.rests_and_peaks(stream):
                 continue
             channels.take("force", stream, "constant level with short, high peaks", _BY_COURSE)
             break
@@ -400,7 +403,9 @@ def force_strength(stream: Stream) -> tuple[float, str]:
     if strength:
         return strength, word
     # An effort in N that is not the drive's is a force: `Effort fermeture (N)`.
-    taken = any(word_for(quantity, label(stream))[0] >= _SPEAKS for quantity in MEASURED if quantity != "torque")
+    taken = is_twist(label(stream)) or any(
+        word_for(quantity, label(stream))[0] >= _SPEAKS for quantity in MEASURED if quantity != "torque"
+    )
     return (_BY_UNIT, _TOLD_UNIT) if quantity_of_unit(stream) == "force" and not taken else (0.0, "")
 
 

@@ -16,6 +16,8 @@ _DRIVES = 0.6
 # A block directly behind the speeds is preferred unless another one is explained better by this much.
 _BETTER = 0.1
 _BEHIND = 0.2
+# Without a lag the measured one of two like blocks varies more from sample to sample by this factor.
+_ROUGHER = 1.5
 # A position is at most this share of its travel from its set value.
 _APART = 0.1
 
@@ -49,8 +51,11 @@ def find_blocks(streams: list[Stream]) -> Blocks | None:
     # A speed that has a derivative of its own is not a position.
     positions = [first for first in speeds_of if not any(pair[1] == first for pair in pairs)] or list(speeds_of)
     chosen = positions[0]
-    for first in positions[1:]:  # of two like blocks, the one behind is measured
-        if motion.lead(_block(streams, chosen, joints), _block(streams, first, joints)) < -_BEHIND:
+    for first in positions[1:]:  # of two like blocks, the one behind is measured; else the rougher one
+        one, other = _block(streams, chosen, joints), _block(streams, first, joints)
+        ahead = motion.lead(one, other)
+        rougher = motion.roughness(other) > _ROUGHER * motion.roughness(one) and _same_values(one, other)
+        if ahead < -_BEHIND or (ahead <= _BEHIND and rougher):
             chosen = first
     _, speed, correlation = speeds_of[chosen]
     found = {"position": _block(streams, chosen, joints), "speed": _block(streams, speed, joints)}

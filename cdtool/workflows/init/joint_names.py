@@ -45,16 +45,18 @@ def families_by_name(names: Sequence[str]) -> Families:
             members.setdefault((before, after), {})[slot] = name
     sets: dict[frozenset[str], list[tuple[str, str]]] = {}
     for key, parts in members.items():
-        if 2 <= len(parts) <= _MOST_JOINTS:
-            sets.setdefault(frozenset(parts), []).append(key)
+        # A set value or a spindle beside the axes is none of them: `pos_x`, `pos_y`, `pos_sp`.
+        joints = frozenset(part for part in parts if not _is_taken(part))
+        if 2 <= len(joints) <= _MOST_JOINTS:
+            sets.setdefault(joints, []).append(key)
     usable = [(slots, keys) for slots, keys in sets.items() if _are_joints(slots, keys)]
     if not usable:
         return {}
     slots, keys = max(usable, key=lambda item: (_measured(*item), len(item[0]) * len(item[1]), sum(map(len, item[0]))))
     order = tuple(slot for slot in members[keys[0]] if slot in slots)
-    joints = _joint_names(order, *keys[0])
+    names_of_joints = _joint_names(order, *keys[0])
     return {
-        f"{before}#{after}": (joints, tuple(parts[slot] for slot in order))
+        f"{before}#{after}": (names_of_joints, tuple(parts[slot] for slot in order))
         for (before, after), parts in members.items()
         if slots <= parts.keys()
     }

@@ -63,7 +63,7 @@ SHORT: Mapping[str, tuple[str, ...]] = {
     ),
     "speed": _listed("mv jv qd dq qp qdot dphi dtheta thetad thetadot w n v vx vel velo spd rpm vit", "giri"),
     "acceleration": _listed("acc acel qdd ddq qddot ddtheta ax ay az a"),
-    "torque": _listed("tau trq tor tq mt jt iq isq i m pwm duty u amps amp curr cur iist im", "par"),
+    "torque": _listed("tau trq tor tq eff mt jt iq isq i m pwm duty u amps amp curr cur iist im", "par"),
     "force": _listed("cell f fx fy fz", "dms"),
     "label": (),
     "trigger": ("trig",),

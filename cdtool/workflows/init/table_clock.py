@@ -25,14 +25,17 @@ _WRAPS, _NEAR_POWER = 2, 0.02
 # Above this share of steps of exactly 1 a column counts samples, whatever its name.
 _BY_ONE = 0.9
 _RARE = 2.0  # minutes are this much less likely than an unusual rate
+# Above this rate [Hz] samples are timed by hardware: a jitter of more than this share of the step is unlikely.
+_TIMED_BY_HARDWARE, _JITTERS, _JITTERY = 2e3, 0.02, 1.5
 
 
 @dataclass(frozen=True)
 class TableClock:
-    """A table's clock: the median `step` of its stamps, in its own unit, and the seconds assumed per unit.
+    """A table's clock: the median `step` of its stamps, in its own unit, its jitter, and the seconds assumed per unit.
 
-    `told` is the source of the unit; if empty, `unit` is guessed from the steps. `written`: this source is only a text,
-    the header or the column's name, which the motion may contradict.
+    `jitter` is the median deviation of a step, as a share of the median one. `told` is the source of the unit; if it is
+    empty, `unit` is guessed from the steps. `written`: this source is only a text, the header or the column's name,
+    which the motion may contradict.
     """
 
     column: str
@@ -42,6 +45,7 @@ class TableClock:
     told: str
     counts: bool = False
     written: bool = False
+    jitter: float = 0.0
 
     def units(self) -> tuple[str, ...]:
         """Return the possible units of its stamps; empty for a counter."""
@@ -52,7 +56,7 @@ class TableClock:
     def unlikely(self, unit: str) -> float:
         """Return 0 if the unit gives a usual sampling rate, more otherwise."""
         rate = 1.0 / (self.step * seconds(unit))
-        rare = _RARE if unit == "min" else 0.0
+        rare = _RARE if unit == "min" else _JITTERY if rate > _TIMED_BY_HARDWARE and self.jitter > _JITTERS else 0.0
         if _USUAL[0] <= rate <= _USUAL[1]:
             return rare
         return 1.0 + rare if _POSSIBLE[0] <= rate <= _POSSIBLE[1] else 2 * _RARE
@@ -65,10 +69,12 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
         return None
     column = source.columns[found.column]
     values = column.values[np.isfinite(column.values)]
-    step = float(np.median(np.diff(values)))
+    steps = np.diff(values)
+    step = float(np.median(steps))
+    jitter = float(np.median(np.abs(steps - step))) / abs(step) if step else 0.0
     assumed, taken_off = _assumed(column, found)
     unit = min(_UNITS, key=lambda name: abs(np.log(assumed / seconds(name))))
-    clock = TableClock(found.column, step, assumed, unit, "", is_counter(found.column))
+    clock = TableClock(found.column, step, assumed, unit, "", is_counter(found.column), jitter=jitter)
     stated = find_unit(column.unit) if column.unit else None
     against = ""
     if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):

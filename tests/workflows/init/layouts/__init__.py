@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from tests.workflows.init.layouts import axes, benches, loggers, robots, strangers
+from tests.workflows.init.layouts import axes, benches, loggers, robots, strangers, student_rigs
 from tests.workflows.init.layouts.layout import Layout, Truth
 
-LAYOUTS: tuple[Layout, ...] = (*robots.LAYOUTS, *axes.LAYOUTS, *benches.LAYOUTS, *strangers.LAYOUTS, *loggers.LAYOUTS)
+LAYOUTS: tuple[Layout, ...] = (
+    *robots.LAYOUTS,
+    *axes.LAYOUTS,
+    *benches.LAYOUTS,
+    *strangers.LAYOUTS,
+    *loggers.LAYOUTS,
+    *student_rigs.LAYOUTS,
+)
 
 __all__ = ["LAYOUTS", "Layout", "Truth"]
