@@ -129,3 +129,12 @@ def test_units_in_a_comment_directly_above_the_names_are_read(log, comment, unit
     path = log(f"{comment}\ntime,Position,Speed{end}\n{rows}", "log.csv")
     source = choose_format(path).columns(path)
     assert [source.columns[name].unit for name in ("time", "Position", "Speed")] == units
+
+
+@pytest.mark.parametrize("cell", ["null", "NULL", "None", "<NA>"])
+def test_what_programs_write_for_no_value_is_a_missing_sample(log, machine, cell):
+    path = log("t;x;y\n" + "".join(f"{i};{cell if i in (0, 4) else i};{cell}\n" for i in range(40)))
+    source = Csv().columns(path)
+    assert np.flatnonzero(np.isnan(source.columns["x"].values)).tolist() == [0, 4]
+    assert not findings_of(source, "loss")
+    assert len(read_recording(path, machine(SECONDS))["speed"].values) == 40

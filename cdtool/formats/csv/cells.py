@@ -8,6 +8,8 @@ import re
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "pipe", ",": "comma", " ": "blanks"}
 MISSING = ("", "nan", "NaN", "NAN")
+# What programs write for a value that does not exist: JSON and SQL, Python, pandas.
+NULLS = ("null", "NULL", "None", "<NA>")
 MINUS_SIGN = "\u2212"
 # Non-breaking spaces, which French and Swiss tables use as thousands separators.
 NARROW_BLANKS = ("\u00a0", "\u202f")
@@ -53,7 +55,7 @@ def kind(cell: str) -> str:
     """Return the kind of a cell: N number in any notation or NaN, T time stamp, M missing (empty), X words."""
     if _QUICK.fullmatch(cell):
         return "N"
-    if not cell:
+    if not cell or cell in NULLS:
         return "M"
     text = cell.replace(MINUS_SIGN, "-")
     if _NUMBER_LIKE.fullmatch(text) and not (text.count(".") > 1 and text.count(",") > 1):

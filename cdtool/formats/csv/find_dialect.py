@@ -32,7 +32,7 @@ from cdtool.formats.csv.ambiguous_marks import (
     resolve_marks,
 )
 from cdtool.formats.csv.blank_lines import are_missing_samples, strip_blank_end
-from cdtool.formats.csv.cells import MISSING, SEPARATORS, kind, split_line
+from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
@@ -276,7 +276,7 @@ def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect
         marks=marks,
         comment=lines.mark,
         commented=pins.comment is not None or _has_comments(lines, grid),
-        missing=pins.missing,
+        missing=(*pins.missing, *NULLS),
         header=tuple(_unique(names)) if names is not None else None,
         header_line=head.header_line,
         units=head.units,
@@ -323,7 +323,7 @@ def _stamped_columns(grid: CellGrid, pins: TablePins) -> dict[int, StampLayouts]
     layout = pins.time_format if "%" in pins.time_format else ""
     stamped: dict[int, StampLayouts] = {}
     for i in grid.not_numbers:
-        layouts = _find_layouts([cells[i] for _, cells in grid.data if cells[i] not in pins.missing], layout)
+        layouts = _find_layouts([cells[i] for _, cells in grid.data if cells[i] not in (*pins.missing, *NULLS)], layout)
         if layouts.layouts:
             stamped[i] = layouts
     days = [i for i, layouts in stamped.items() if layouts.layouts[0].dated]
