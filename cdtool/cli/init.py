@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import shlex
+import tomllib
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -31,6 +32,14 @@ def init(
         typer.Option("--machine", "-m", help="With a folder: use this machine file, draft only the benchmark."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
+    csv: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--csv",
+            help="A key of [csv] in the machine file, for a table that is not read without: header=false, decimal=,",
+            metavar="KEY=VALUE",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Draft a machine file from a log, or with a folder as output also a benchmark file from several logs.
@@ -42,12 +51,15 @@ def init(
     from cdtool.workflows.init.drafting import init as draft
     from cdtool.workflows.init.drafting import init_study
 
+    settings = _settings(csv or [])
+    if settings and machine is not None:
+        raise UsageError("--csv and --machine: both state how tables are read", "write [csv] into the machine file")
     if output.suffix == ".toml":
         if len(logs) > 1 or machine is not None:
             what = "--machine" if machine is not None else f"{len(logs)} logs"
             raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
         with late_progress("analysing the log"):
-            drafted = draft(logs[0], output, force=force)
+            drafted = draft(logs[0], output, force=force, csv=settings)
         if as_json:
             print_json(with_findings(drafted))
         else:
@@ -59,7 +71,7 @@ def init(
         leave_with(drafted.findings)
         return
     with late_progress("analysing the logs"):
-        study = init_study(logs, output, machine=machine, force=force)
+        study = init_study(logs, output, machine=machine, force=force, csv=settings)
     if as_json:
         print_json(asdict(study))
     else:
@@ -68,6 +80,20 @@ def init(
         _warn(study.machine)
     print_skipped(study.skipped)
     leave(study.skipped)
+
+
+def _settings(given: list[str]) -> dict[str, Any]:
+    """Return KEY=VALUE as values of TOML; what is not one is a text."""
+    values: dict[str, Any] = {}
+    for text in given:
+        key, mark, value = text.partition("=")
+        if not mark or not key.strip():
+            raise UsageError(f"--csv {text}: is no KEY=VALUE", "for example --csv header=false")
+        try:
+            values[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            values[key.strip()] = value
+    return values
 
 
 def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:

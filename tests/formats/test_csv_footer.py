@@ -160,3 +160,22 @@ def test_any_footer_and_nothing_else_is_removed(tmp_path_factory, count, labels,
     source = Csv().columns(path)
     check(source, count)
     assert len(footers_of(source)) == 1
+
+
+def test_below_a_blank_line_a_footer_has_lines_of_any_width(log, machine):
+    """Settings of an axis, as a French acquisition program writes them below its measurements."""
+    table = "t;x;y;z\n" + "".join(f"{i};{i}.5;0;1\n" for i in range(30))
+    settings_below = "Paramètre;CoMax\nPID;KP;KI;KD\nPosition :;2420;8340\nSécurité\n"
+    source = Csv().columns(log(table + "\n" + settings_below))
+    assert footers_of(source) == [FooterSkipped((33, 34, 35, 36), "Paramètre;CoMax")]
+    assert len(source.columns["x"].values) == 30
+    channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n'
+    with pytest.raises(RecordingError, match="line 32 has 2 cells"):
+        read_recording(log(table + settings_below), machine(channels))
+
+
+def test_a_row_that_is_cut_off_below_a_blank_line_is_not_a_footer(log, machine):
+    table = "t;x;y;z\n" + "".join(f"{i};{i}.5;0;1\n" for i in range(30)) + "\n30;1.5\n"
+    channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n'
+    with pytest.raises(RecordingError, match="line 33 has 2 cells"):
+        read_recording(log(table), machine(channels))

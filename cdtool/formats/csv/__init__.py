@@ -59,6 +59,10 @@ class Csv:
         dialect = _dialect(path, TablePins() if wanted is None else wanted.pins)
         return _read_all(path, dialect) if wanted is None else _read_wanted(path, dialect, wanted)
 
+    def columns_by(self, path: Path, pins: TablePins) -> Source:
+        """Return all numeric columns of a table with pins; raises RecordingError with the line."""
+        return _read_all(path, _dialect(path, pins))
+
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
         from cdtool.formats.csv.several_clocks import Clocks

@@ -412,7 +412,8 @@ def find_footer(dialect: Dialect) -> Footer | None:
 
     The lines of a footer may be as wide as rows but are not samples: `Sum;7.5`, `Mean;0.3`, `End of file;`. Such a line
     starts with a word where each row starts with a number or a time. A word that also occurs in rows above, that is
-    repeated, or that marks a missing value does not start a footer: the column has words, or a row is damaged.
+    repeated, or that marks a missing value does not start a footer: the column has words, or a row is damaged. Below a
+    blank line its lines may have any number of cells: `PID axis;KP;KI`.
     """
     if dialect.kinds[0] not in "NT" or dialect.text.padding:  # a file that ends with a power failure has no footer
         return None
@@ -427,10 +428,13 @@ def find_footer(dialect: Dialect) -> Footer | None:
             break
         if cells:
             words.insert(0, (i, cells))
-    labels = [cells[0].lower() for _, cells in words if len(cells) == dialect.width]
+    first = words[0][0] if words else 0
+    apart = first > 0 and not raw[first - 1].strip()
+    if not apart and not all(len(cells) in (1, dialect.width) for _, cells in words):
+        return None
+    labels = [cells[0].lower() for _, cells in words if len(cells) == dialect.width or (apart and len(cells) > 1)]
     if not 0 < len(labels) == len(set(labels)) <= _MOST or not set(labels).isdisjoint(_missing_words(dialect)):
         return None
-    first = words[0][0]
     above = [cells for line in raw[:first] if len(cells := _cells(dialect, line)) == dialect.width]
     if not above or any(kind(cells[0]) == "X" for cells in above):
         return None
@@ -449,8 +453,8 @@ def _cells(dialect: Dialect, line: bytes) -> list[str]:
 
 
 def _is_words(dialect: Dialect, cells: list[str]) -> bool:
-    """Return whether a line starts with a label, and has one cell or as many as the rows."""
-    return len(cells) in (1, dialect.width) and _LABEL.fullmatch(cells[0]) is not None and kind(cells[0]) == "X"
+    """Return whether a line starts with a label, and has no more cells than the rows."""
+    return len(cells) <= dialect.width and _LABEL.fullmatch(cells[0]) is not None and kind(cells[0]) == "X"
 
 
 def _missing_words(dialect: Dialect) -> set[str]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,7 @@ class Draft:
     evidence: Evidence
     unmapped: tuple[Unmapped, ...] = ()
     low_pass: LowPass | None = None
+    csv: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def units(self) -> dict[str, Logged]:
@@ -67,6 +69,7 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
         *_commented(f"coordinates = {_text(side.coordinates)}", _coordinates_why(side)),
         *_placeholders(side, len(draft.joints)),
         "",
+        *_pinned(draft.csv),
         "[channels.mcap]" if draft.topics else "[channels]",
         *([] if draft.topics else _time(draft.clock)),
     ]
@@ -86,6 +89,18 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
         lines.append(f"# CHECK: found no {', no '.join(absent)}: cdtool info lists the content of the log")
     lines += _unmapped(draft)
     return "\n".join(lines) + "\n"
+
+
+def _pinned(csv: Mapping[str, Any]) -> list[str]:
+    """Return `[csv]` with the settings that were given."""
+    return ["[csv]", *(f"{key} = {_value(value)}" for key, value in csv.items()), ""] if csv else []
+
+
+def _value(value: object) -> str:
+    """Return a text, number, truth value or list of texts as TOML."""
+    if isinstance(value, list):
+        return _list([_value(item) for item in value])
+    return _text(value) if isinstance(value, str) else json.dumps(value)
 
 
 def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list[str]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.evaluation.results import Skipped
@@ -13,8 +14,12 @@ from cdtool.files import write_text
 from cdtool.findings import Finding
 from cdtool.findings.clocks import ClockUnitAssumed
 from cdtool.findings.motion import AccelerometerTurned
+from cdtool.formats.csv import Csv
+from cdtool.formats.csv.pins import read_pins
+from cdtool.formats.source import Format, Source
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
+from cdtool.tables import Table
 from cdtool.workflows.information import info
 from cdtool.workflows.init.benchmark_draft import draft_benchmark
 from cdtool.workflows.init.channel_guess import guess_channels
@@ -44,7 +49,13 @@ class Drafted:
     unmapped: tuple[Unmapped, ...] = ()
 
 
-def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = False) -> Drafted:
+def init(
+    log: str | Path,
+    output: str | Path = "machine.toml",
+    *,
+    force: bool = False,
+    csv: Mapping[str, Any] | None = None,
+) -> Drafted:
     """Write a draft of a machine file for a log.
 
     Parameters
@@ -55,6 +66,8 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
         The file to write.
     force : bool, optional
         Replace an existing file.
+    csv : mapping, optional
+        Keys of `[csv]` for a table that cannot be read without them, as {"header": False}; they are part of the draft.
 
     Returns
     -------
@@ -69,6 +82,8 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
         The file already exists.
     RecordingError
         The log cannot be read.
+    ConfigurationError
+        `csv` has a wrong key or value.
 
     Examples
     --------
@@ -79,7 +94,7 @@ def init(log: str | Path, output: str | Path = "machine.toml", *, force: bool = 
     """
     target = Path(output)
     _refuse_existing(force, target)
-    drafted = replace(_settled(Path(log), _drafted(Path(log))), path=str(target))
+    drafted = replace(_settled(Path(log), _drafted(Path(log), csv or {})), path=str(target))
     write_text(target, drafted.text)
     return drafted
 
@@ -100,7 +115,12 @@ class DraftedStudy:
 
 
 def init_study(
-    logs: Sequence[str | Path], folder: str | Path, *, machine: str | Path | None = None, force: bool = False
+    logs: Sequence[str | Path],
+    folder: str | Path,
+    *,
+    machine: str | Path | None = None,
+    force: bool = False,
+    csv: Mapping[str, Any] | None = None,
 ) -> DraftedStudy:
     """Write drafts of a machine file and of a benchmark file for some logs into a folder.
 
@@ -114,6 +134,8 @@ def init_study(
         A machine file to use in place of a draft; it is named in the benchmark file.
     force : bool, optional
         Replace existing files.
+    csv : mapping, optional
+        Keys of `[csv]` of the drafted machine file, for tables that cannot be read without them.
 
     Returns
     -------
@@ -140,7 +162,7 @@ def init_study(
     file = target / "benchmark.toml"
     _refuse_existing(force, file, *([target / "machine.toml"] if machine is None else []))
     target.mkdir(parents=True, exist_ok=True)
-    drafted = None if machine is not None else init(paths[0], target / "machine.toml", force=force)
+    drafted = None if machine is not None else init(paths[0], target / "machine.toml", force=force, csv=csv)
     machine_path = Path(machine) if machine is not None else target / "machine.toml"
     made = draft_benchmark(paths, read_machine_file(machine_path), target)
     _refuse_existing(force, *(target / name for name in made.beside))
@@ -183,10 +205,23 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             turned = True
 
 
-def _drafted(log: Path) -> Draft:
+def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
+    """Return all columns of a log; a table that cannot be read without settings names the option for them."""
+    is_table = found.name == Csv.name
+    if csv and not is_table:
+        raise UsageError(f"{path}: is {found.name}, not a text table", "remove --csv")
+    try:
+        return Csv().columns_by(path, read_pins(Table(csv, "--csv"))) if csv else found.columns(path)
+    except RecordingError as fault:
+        if not is_table or csv:
+            raise
+        raise RecordingError(fault.message, f"{fault.hint}; keys of [csv] here: --csv header=false") from fault
+
+
+def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     path = log_parts(log)[0]
     found = choose_format(path)
-    source = found.columns(path)
+    source = _surveyed(path, found, csv)
     topics = has_topics(found)
     clock, times = (None if topics else table_clock(source)) or (None, None)
     streams = streams_of(source, times.time if times else None, times.column if times else None, topics)
@@ -208,7 +243,7 @@ def _drafted(log: Path) -> Draft:
     time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
     left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
-    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass)
+    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv)
 
 
 def _in_seconds(time: Clock, clock: TableClock | None, own: bool) -> float:

@@ -31,7 +31,8 @@ def families_by_name(names: Sequence[str]) -> Families:
     -------
     dict
         By the name with ``#`` in place of the joint: the joints, in the order of the table, and the columns of each.
-        Empty if the names do not show several joints with at least two measured quantities each.
+        Empty if the names do not show several joints with at least two measured quantities each, or with one if they
+        are joints of a body: `theta_hip`, `theta_knee`.
 
     Examples
     --------
@@ -124,7 +125,9 @@ def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
     }
     if {slot.lower() for slot in slots} <= set(lexicon.AXES) and "torque" not in quantities:
         return False
-    return len(quantities) >= 2
+    # Of one quantity alone only names of joints are sure.
+    known = all(word in lexicon.LIMBS for core in _cores(slots) for word in words(core))
+    return len(quantities) >= 2 or (len(quantities) == 1 and known)
 
 
 def _indicates(quantity: str, name: str) -> bool:

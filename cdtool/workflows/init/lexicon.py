@@ -93,7 +93,7 @@ REFERENCE_LONG = _listed(
     "指令 目标 给定 设定 参考 期望 规划",
     "目標 設定",
 )
-REFERENCE_SHORT = _listed("ref des dest cmd sp ip goal qg set demand dem ipo cons traj trajectory")
+REFERENCE_SHORT = _listed("ref des dest cmd sp ip goal qg set demand dem ipo cons traj trajectory action")
 REFERENCE_STARTS = _listed("set cmd ref des tgt goal dem")
 ACTUAL_LONG = _listed(
     "actual measured feedback estimate",
@@ -132,6 +132,13 @@ PRESENT = _listed("feed feedrate program line block state mode step tool time cy
 PRESENT_EFFORTS = _listed("torque effort force q angle")
 # Names of joints without a quantity: `J1`, `Achse 3`.
 JOINTS = _listed("j jnt joint joints axis achse a axe asse eje 轴 軸")
+# Joints of arms, legs and hands.
+LIMBS = frozenset(
+    _listed(
+        "hip knee ankle toe foot thigh shank calf leg trunk waist torso neck head shoulder elbow forearm wrist hand",
+        "finger thumb index base lift pan tilt gripper roll pitch yaw left right front rear",
+    )
+)
 # Sides and versions of one joint, which are not joints, and the axes of space.
 SIDES = _listed(
     "motor load link joint drive gear shaft raw filtered filt smooth smoothed mean min max in out input output",

@@ -36,7 +36,14 @@ _TAILS = {
     "rad_sec": "rad/s", "deg_sec": "deg/s", "mm_min": "mm/min", "count": "count", "cnt": "count",
     "cnts": "count", "inc": "count", "ticks": "count",
     "meters": "m", "metres": "m", "meters_per_sec": "m/s", "meters_per_second": "m/s",
+    "millimeters": "mm", "radians": "rad", "radians_per_sec": "rad/s", "radians_per_second": "rad/s",
+    "rad_per_sec": "rad/s", "degrees": "deg", "degrees_per_sec": "deg/s", "degrees_per_second": "deg/s",
+    "deg_per_sec": "deg/s", "rotations": "rev", "rotations_per_sec": "rev/s", "amps": "A", "amperes": "A", "volts": "V",
+    "newtons": "N", "newton_meters": "N m", "seconds": "s", "milliseconds": "ms", "microseconds": "us",
+    "nanoseconds": "ns",
 }  # fmt: skip
+# A unit that begins with a capital letter, without a separator, is written out: so many letters at least.
+_CAMEL, _WRITTEN_OUT = re.compile(r"(?<=[a-z])(?=[A-Z])"), 4
 _SEPARATOR = re.compile(r"[\W_]+")
 # Units of other quantities: temperature, power, frequency, pressure, resistance, energy.
 _FOREIGN = frozenset(
@@ -127,7 +134,15 @@ def _measures(quantity: str, unit: str) -> bool:
 def _split(name: str) -> tuple[str, str, str]:
     """Return (the name before the ending, the ending, its unit); empty texts without such an ending."""
     parts = [part for part in _SEPARATOR.split(name) if part]
-    return _tail(parts, 3) or _tail(parts, 2) or _after_slash(name) or _tail(parts, 1) or (name, "", "")
+    found = _tail(parts, 3) or _tail(parts, 2) or _after_slash(name) or _tail(parts, 1)
+    return found or _written_out(name) or (name, "", "")
+
+
+def _written_out(name: str) -> tuple[str, str, str] | None:
+    """Return the split of a name in mixed case whose last words are a unit: `VelocityMetersPerSec`."""
+    parts = [part for part in _SEPARATOR.split(_CAMEL.sub("_", name)) if part]
+    tails = (_tail(parts, count) for count in (3, 2, 1))
+    return next((tail for tail in tails if tail and len(tail[1]) >= _WRITTEN_OUT), None)
 
 
 def _tail(parts: list[str], count: int) -> tuple[str, str, str] | None:
