@@ -55,7 +55,7 @@ def test_a_wrong_setting_is_one_line(glued, tmp_path, given, words):
     assert done.status == 2 and words in one_line(done.err) and len(done.err.strip().splitlines()) <= 3
 
 
-def test_a_log_that_is_no_table_has_no_settings(tmp_path):
+def test_a_log_that_is_not_a_table_has_no_settings(tmp_path):
     log = next(iter(sorted(LOGS.rglob("*.mcap"))))
     with pytest.raises(UsageError, match="not a text table"):
         api.init(log, tmp_path / "m.toml", csv={"header": False})

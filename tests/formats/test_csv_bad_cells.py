@@ -138,3 +138,32 @@ def test_what_programs_write_for_no_value_is_a_missing_sample(log, machine, cell
     assert np.flatnonzero(np.isnan(source.columns["x"].values)).tolist() == [0, 4]
     assert not findings_of(source, "loss")
     assert len(read_recording(path, machine(SECONDS))["speed"].values) == 40
+
+
+def ending_early(first: str, others: str, count: int = 300) -> str:
+    rows = "".join(f"{0.01 * i:.2f},{i}.5{others}\n" for i in range(1, count))
+    return f"t,x,largest x,mean x\n0.00,0.5{first}\n{rows}"
+
+
+def test_columns_with_a_value_in_the_first_row_only_are_read(log, machine):
+    """The statistics of a measurement, which a program writes into its first row."""
+    path = log(ending_early(",299.5,150.0", ""), "log.csv")
+    source = choose_format(path).columns(path)
+    assert list(source.columns) == ["t", "x", "largest x", "mean x"]
+    np.testing.assert_array_equal(source.columns["x"].values, np.arange(300) + 0.5)
+    assert source.columns["largest x"].values[0] == 299.5
+    assert np.isnan(source.columns["largest x"].values[1:]).all()
+    assert len(read_recording(path, machine(SECONDS))["speed"].values) == 300
+
+
+@pytest.mark.parametrize(
+    ("first", "others"),
+    [(",299.5,150.0", ",1"), (",299.5", ""), (",a,b", "")],
+    ids=["fewer names than that", "a first row of another width", "words in the first row"],
+)
+def test_other_rows_of_two_widths_are_refused(log, first, others):
+    text = ending_early(first, others)
+    text = text.replace("\n0.05,", "\n0.05,7,") if others else text
+    path = log(text, "log.csv")
+    with pytest.raises(RecordingError, match="cells|names"):
+        choose_format(path).columns(path)

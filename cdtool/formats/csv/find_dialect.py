@@ -55,6 +55,8 @@ _SHOWN_ENCODINGS = {
 }
 _LOOKED = 200
 _MOST = 12
+# Rows end early if so many lines, with the names and the first row, show it.
+_ENDING_EARLY = 6
 # Dialects of previous tables, for files with an equal head and rows of the same shape.
 _KNOWN: dict[tuple[object, ...], Dialect] = {}
 _MOST_KNOWN = 64
@@ -181,7 +183,10 @@ def classify_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Sa
 
 @dataclass(frozen=True)
 class CellGrid:
-    """The sample's lines as cells: `rows` are all lines, `data` the lines of `width` cells below the `head`."""
+    """The sample's lines as cells: `rows` are all lines, `data` the lines of `width` cells below the `head`.
+
+    `short`: rows end early; they are completed here.
+    """
 
     separator: str
     width: int
@@ -189,6 +194,7 @@ class CellGrid:
     data: Sequence[tuple[Line, list[str]]]
     head: Head
     kinds: str
+    short: bool
 
     @property
     def not_numbers(self) -> list[int]:
@@ -202,13 +208,39 @@ def split_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
     without_rulers = [line for line in lines.table if not is_ruler(line.text)] or lines.table
     split = find_separator(path, without_rulers, pins.separator or named, pins.decimal)
     rows = [(line, split_line(line.text, split.separator)) for line in lines.table]
+    width = _full_width(rows, split.width)
+    if short := width > split.width:
+        rows = [_completed(line, cells, split.separator, width) for line, cells in rows]
+        split = replace(split, width=width)
+        lines = replace(lines, table=[line for line, _ in rows])
     wide = [(line, cells) for line, cells in rows if len(cells) == split.width]
     lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
     kinds = column_kinds([cells for _, cells in _sample_evenly(lower)], split.width)
     head = HeadFinder(path, split.separator, split.width, kinds, pins).find(lines.table, lines.comments)
     data = [(line, cells) for line, cells in wide if line.number >= head.first.number]
     kinds = column_kinds([cells for _, cells in _sample_evenly(data)], split.width)
-    return CellGrid(split.separator, split.width, rows, data, head, kinds)
+    return CellGrid(split.separator, split.width, rows, data, head, kinds, short)
+
+
+def _full_width(rows: Sequence[tuple[Line, list[str]]], width: int) -> int:
+    """Return the number of columns: more than most lines have if the names and the first row have more.
+
+    Then all other rows end early: their last columns, statistics for example, have a value in the first row only.
+    """
+    if len(rows) < _ENDING_EARLY or {len(cells) for _, cells in rows[2:]} != {width}:
+        return width
+    names, first = rows[0][1], rows[1][1]
+    if not len(names) == len(first) > width or not any(names[width:]):
+        return width
+    named = all(kind(cell) in "XM" for cell in names)
+    return len(names) if named and all(kind(cell) in "NTM" for cell in first) else width
+
+
+def _completed(line: Line, cells: list[str], separator: str, width: int) -> tuple[Line, list[str]]:
+    """Return a line that ends early with empty cells."""
+    missing = width - len(cells)
+    text = line.text.rstrip("\r\n") + separator * missing if missing > 0 and separator != " " else line.text
+    return replace(line, text=text), [*cells, *[""] * missing]
 
 
 def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
@@ -292,6 +324,7 @@ def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect
         trailing=trailing,
         blank_is_missing=are_missing_samples(lines.every, head.first.number, grid.width),
         stamped=_stamped_columns(grid, pins),
+        short_rows=grid.short,
         words={i: _first_words(grid.data, i) for i in grid.not_numbers},
         findings=tuple(_findings(text, lines, head)),
     )

@@ -42,7 +42,7 @@ _TAILS = {
     "newtons": "N", "newton_meters": "N m", "seconds": "s", "milliseconds": "ms", "microseconds": "us",
     "nanoseconds": "ns",
 }  # fmt: skip
-# A unit that begins with a capital letter, without a separator, is written out: so many letters at least.
+# A unit that begins with a capital letter, without a separator, is written out: it has at least this many letters.
 _CAMEL, _WRITTEN_OUT = re.compile(r"(?<=[a-z])(?=[A-Z])"), 4
 _SEPARATOR = re.compile(r"[\W_]+")
 # Units of other quantities: temperature, power, frequency, pressure, resistance, energy.
