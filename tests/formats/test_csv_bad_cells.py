@@ -165,5 +165,5 @@ def test_other_rows_of_two_widths_are_refused(log, first, others):
     text = ending_early(first, others)
     text = text.replace("\n0.05,", "\n0.05,7,") if others else text
     path = log(text, "log.csv")
-    with pytest.raises(RecordingError, match="cells|names"):
+    with pytest.raises(RecordingError, match=r"cells|names"):
         choose_format(path).columns(path)

@@ -12,7 +12,7 @@ from cdtool.formats.source import Source
 from cdtool.ingest.clock_guess import GuessedClock, guess_clock
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
-from cdtool.workflows.init.quantity_words import is_clock, is_counter, name_in_group, word_for
+from cdtool.workflows.init.quantity_words import is_clock, is_counter, name_in_group, word_for, words
 from cdtool.workflows.init.units_in_names import unit_in_name
 
 _UNITS = ("s", "ms", "us", "ns", "min")
@@ -98,18 +98,23 @@ def seconds(unit: str) -> float:
 
 
 def _named(source: Source) -> GuessedClock | None:
-    """Return the clock among columns with the name or unit of a time; a complete one, and no counter, if possible."""
+    """Return the clock among columns with the name or unit of a time.
+
+    If possible a complete one, not a counter, with a name, with a unit, and named as nothing but a time: `timestamp`
+    rather than `positionTimestamp`.
+    """
     names = [
         name
         for name, column in source.columns.items()
         if column.time is None and column.values.ndim == 1 and (_has_time_unit(column) or _has_clock_name(name))
     ]
 
-    def rank(name: str) -> tuple[bool, bool, bool]:
+    def rank(name: str) -> tuple[bool, ...]:
         column = source.columns[name]
         known = column.values[np.isfinite(column.values)]
         counts = is_counter(name) or bool(np.mean(np.diff(known) == 1.0) > _BY_ONE) if len(known) > 1 else True
-        return len(known) < len(column.values), counts, not _has_time_unit(column)
+        plain = all(is_clock(word) for word in words(name))
+        return len(known) < len(column.values), counts, name.isdigit(), not _has_time_unit(column), not plain
 
     for name in sorted(names, key=rank):
         found = guess_clock(replace(source, columns={name: source.columns[name]}))
