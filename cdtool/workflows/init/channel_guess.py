@@ -474,7 +474,7 @@ def _of_two_sides(one: Stream, other: Stream) -> bool:
 
 
 def _of_different_parts(one: Stream, other: Stream) -> bool:
-    """Whether each of two names has a word of its own that states no quantity: `HipAngle` and `ThighAngle`."""
+    """Whether each of two names has a word of its own that states no quantity: `leaf angle` and `handle angle`."""
     first, second = without_kind(label(one)), without_kind(label(other))
     return bool(first - second) and bool(second - first)
 

@@ -103,8 +103,8 @@ def test_the_measured_of_two_like_names_is_the_one_behind(tmp_path):
 def test_positions_of_different_parts_are_no_set_values_of_each_other(tmp_path):
     run = stroke()
     late = np.interp(run.time - 0.02, run.time, run.travel)
-    draft = drafted_columns(tmp_path, {"t": run.time, "hip angle": run.travel, "thigh angle": late})
-    assert draft.channels["position"]["column"] == "hip angle" and "reference_position" not in draft.channels
+    draft = drafted_columns(tmp_path, {"t": run.time, "leaf angle": run.travel, "handle angle": late})
+    assert draft.channels["position"]["column"] == "leaf angle" and "reference_position" not in draft.channels
 
 
 def test_the_other_side_of_a_gear_is_no_set_value(tmp_path):

@@ -14,6 +14,7 @@ from cdtool.workflows.init.quantity_words import (
     is_something_else,
     word_for,
 )
+from cdtool.workflows.init.units_in_names import unit_in_name
 
 
 def quantity_of(name):
@@ -134,3 +135,24 @@ def test_the_joints_of_legs_are_not_the_legs():
 )
 def test_other_differences_are_no_joints(names):
     assert families_by_name(names) == {}
+
+
+def test_joints_of_a_body_are_joints_by_one_quantity_alone():
+    families = families_by_name(["time_ms", "theta_toe", "theta_ankle", "theta_knee", "force"])
+    assert families["theta_#"][0] == ("toe", "ankle", "knee")
+    assert families_by_name(["angle_leaf", "angle_handle"]) == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("PositionMeters", "position", "m"),
+        ("VelocityMetersPerSec", "speed", "m/s"),
+        ("StatorCurrentAmps", "torque", "A"),
+        ("joint velocity radians_per_second", "speed", "rad/s"),
+        ("MotorA", "torque", ""),
+        ("positionM", "position", ""),
+    ],
+)
+def test_units_that_are_written_out_end_a_name_in_mixed_case(name, quantity, unit):
+    assert unit_in_name(quantity, name) == unit
