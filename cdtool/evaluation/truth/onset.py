@@ -7,6 +7,7 @@ the rule in every report: in soft impacts the cell responds to the contact tens 
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,8 @@ from cdtool.recording import Contact, Recording
 
 def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
     """Return the contacts of a recording, by the load cell, else by the label channel, else by events.
+
+    With a load cell and a label channel of several kinds, times and forces are the cell's, the kinds the label's.
 
     Parameters
     ----------
@@ -58,6 +61,7 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
             if isinstance(force, ForceMagnitude)
             else load_cell_contacts(force, rule, steps)
         )
+        found = _with_kinds(found, recording, rule)
         return [_widened(contact, recording.truth_clock) for contact in found] if recording.truth_clock else found
     if "label" in recording:
         return _from_label(recording)
@@ -67,6 +71,23 @@ def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> 
         f"{recording.name}: no ground truth: none of 'force', 'label', 'event' is mapped",
         "map the load cell in [channels], name a label file, or use cdtool detect",
     )
+
+
+def _with_kinds(contacts: list[Contact], recording: Recording, rule: OnsetRule) -> list[Contact]:
+    """Return the load cell's contacts with the kinds of a label channel: of the label that lasts longest during each.
+
+    A label that begins or ends up to `rule.separation` [s] from a contact counts if none is during it.
+    """
+    if not recording.label_kinds or "label" not in recording:
+        return contacts
+    labels = _from_label(recording)
+
+    def kind_of(contact: Contact) -> str:
+        shared = [(min(item.end, contact.end) - max(item.start, contact.start), item.kind) for item in labels]
+        longest, kind = max(shared, key=lambda pair: pair[0], default=(-math.inf, ""))
+        return kind if longest >= -rule.separation else ""
+
+    return [replace(contact, kind=kind_of(contact)) for contact in contacts]
 
 
 def _widened(contact: Contact, clock: float) -> Contact:

@@ -161,3 +161,24 @@ def test_a_label_with_kinds_may_begin_and_end_in_a_contact_and_lose_samples():
 
 def test_a_label_whose_values_are_all_no_contact_has_none():
     assert kinds_of(np.full(len(TIME), 7.0)) == [] == kinds_of(np.full(len(TIME), np.nan))
+
+
+@pytest.mark.parametrize(
+    ("label", "kinds"),
+    [
+        ([(0.9, 1.3, 1.0), (2.9, 3.3, 2.5)], ["hard", "soft"]),
+        ([(1.4, 1.6, 1.0), (2.9, 3.3, 2.5)], ["hard", "soft"]),
+        ([(1.0, 1.05, 2.5), (1.05, 1.3, 1.0)], ["hard", ""]),
+        ([], ["", ""]),
+    ],
+    ids=["during the contacts", "beside a contact", "the longer one", "no label"],
+)
+def test_the_contacts_of_a_load_cell_have_the_kinds_of_a_label_channel(label, kinds):
+    force = ramp(1.0, 1000.0, end=1.2) + ramp(3.0, 1000.0, end=3.2)
+    values = sum((number * ((TIME >= first) & (TIME < last)) for first, last, number in label), np.zeros(len(TIME)))
+    both = recording(force)
+    both = replace(both, channels={**both.channels, "label": Series(TIME, values, "1")})
+    plain = find_contacts(both, GATE_RULE)
+    named = find_contacts(replace(both, label_kinds=((1.0, "hard"), (2.5, "soft"))), GATE_RULE)
+    assert [item.kind for item in named] == kinds
+    assert [replace(item, kind="") for item in named] == plain
