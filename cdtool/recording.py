@@ -225,9 +225,9 @@ class Contact:
 
     `kind` is its name in a label file or by a label channel. From a load cell: `rest`, the reading at rest just before
     the onset [N], `drift` of that level [N/s], its shift since the log began [N], and the resolution of the onset,
-    `resolution` [s]: from clock, noise, drift and slope. `hole` [s]: how long load-cell samples are missing where the contact may have begun;
-    0: never longer than a force meter would allow. A contact that is `in_progress` at the start of the recording has no
-    onset: `start` is the first sample.
+    `resolution` [s]: from clock, noise, drift and slope. `hole` [s]: how long load-cell samples are missing where the
+    contact may have begun; 0: never longer than a force meter would allow. A contact that is `in_progress` at the start
+    of the recording has no onset: `start` is the first sample.
     """
 
     start: float

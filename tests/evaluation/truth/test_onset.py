@@ -175,7 +175,7 @@ def test_a_label_whose_values_are_all_no_contact_has_none():
 )
 def test_the_contacts_of_a_load_cell_have_the_kinds_of_a_label_channel(label, kinds):
     force = ramp(1.0, 1000.0, end=1.2) + ramp(3.0, 1000.0, end=3.2)
-    values = sum((number * ((TIME >= first) & (TIME < last)) for first, last, number in label), np.zeros(len(TIME)))
+    values = sum((number * ((first <= TIME) & (last > TIME)) for first, last, number in label), np.zeros(len(TIME)))
     both = recording(force)
     both = replace(both, channels={**both.channels, "label": Series(TIME, values, "1")})
     plain = find_contacts(both, GATE_RULE)
