@@ -8,9 +8,10 @@ from collections.abc import Iterable, Sequence
 from cdtool.formats.column_names import split_unit
 from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.quantity_words import is_actual, is_reference, is_something_else, word_for, words
+from cdtool.workflows.init.units_in_names import unit_in_name
 
 # Words and what is between them; a word in mixed case consists of several: `LeftHipAngle`.
-_TOKENS = re.compile(r"[^\W_]+?(?:(?<=[a-z])(?=[A-Z][a-z])|(?![^\W_]))|[\W_]+")
+_TOKENS = re.compile(r"[^\W_]+?(?:(?<=[a-z])(?=[A-Z][a-z])|(?<=[A-Z]{2})(?=[A-Z][a-z])|(?![^\W_]))|[\W_]+")
 _NUMBER = re.compile(r"\d+")
 # The name of a joint consists of at most this many words, with what is between them.
 _LONGEST = 5
@@ -131,9 +132,16 @@ def _are_joints(slots: frozenset[str], keys: Sequence[tuple[str, str]]) -> bool:
 
 
 def _indicates(quantity: str, name: str) -> bool:
-    """Whether the name of a column without its joint indicates a quantity; a letter must stand alone: `hip.q`."""
-    strength = 0.0 if is_something_else(name) else word_for(quantity, name)[0]
-    return strength >= 2.0 or (strength > 0.0 and len(words(name)) == 1)
+    """Whether the name of a column without its joint indicates a quantity, by a word or its unit: `hipAct_rad_s`.
+
+    A letter must stand alone: `hip.q`.
+    """
+    if is_something_else(name):
+        return False
+    strengths = {item: word_for(item, name)[0] for item in _QUANTITIES}
+    if any(strengths.values()):
+        return strengths[quantity] >= 2.0 or (strengths[quantity] > 0.0 and len(words(name)) == 1)
+    return len(unit_in_name(quantity, name)) > 1
 
 
 def _is_taken(slot: str) -> bool:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from cdtool.formats.column_names import split_unit
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
 from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
-from cdtool.workflows.init.streams import Stream
+
+if TYPE_CHECKING:
+    from cdtool.workflows.init.streams import Stream
 
 _QUANTITIES = (*MEASURED, "force")
 # Possible logged units of a quantity on any machine: SI units, and those that a scale converts.
