@@ -64,3 +64,28 @@ def test_a_log_that_is_not_a_table_has_no_settings(tmp_path):
 def test_a_wrong_key_is_refused_in_python_too(glued, tmp_path):
     with pytest.raises(ConfigurationError, match="unknown key"):
         api.init(glued, tmp_path / "m.toml", csv={"heder": False})
+
+
+def words_in(tmp_path, words):
+    rows = [f"{0.01 * i:.2f},{0.1 * i:.1f},{i % 7}.5" for i in range(200)]
+    for number, word in enumerate(words):
+        rows[20 + 10 * number] = f"{0.01 * (20 + 10 * number):.2f},{word},0.5"
+    path = tmp_path / "words.csv"
+    path.write_text("t [s],Position [mm],Current [A]\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def test_a_word_in_a_column_of_numbers_is_drafted_as_missing_with_a_mark(tmp_path):
+    log = words_in(tmp_path, ["ERROR", "ERROR"])
+    done = cdtool("init", log, "-o", tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text(encoding="utf-8")
+    assert done.status in (0, 3) and tomllib.loads(text)["csv"] == {"missing": ["ERROR"]}
+    assert '"ERROR" in line 22, column Position' in one_line(text) and "CHECK: do they stand for" in one_line(text)
+    seen = cdtool("info", log, "-m", tmp_path / "m.toml")
+    assert "2 of 200 values are missing" in one_line(seen.out)
+
+
+def test_given_words_stay_and_another_one_is_added(tmp_path):
+    log = words_in(tmp_path, ["OVL", "ERROR"])
+    api.init(log, tmp_path / "m.toml", csv={"missing": ["OVL"]})
+    assert tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"] == {"missing": ["OVL", "ERROR"]}

@@ -33,8 +33,20 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class UnreadWord:
+    """A word in a column of numbers, and where it is first."""
+
+    text: str
+    column: str
+    line: int
+
+
+@dataclass(frozen=True)
 class Draft:
-    """The content to write: kind of machine, joints, clock, and channels with units."""
+    """The content to write: kind of machine, joints, clock, and channels with units.
+
+    `csv` are given settings of `[csv]`; `words` are in columns of numbers, perhaps for missing values.
+    """
 
     name: str
     log: str
@@ -48,6 +60,7 @@ class Draft:
     unmapped: tuple[Unmapped, ...] = ()
     low_pass: LowPass | None = None
     csv: Mapping[str, Any] = field(default_factory=dict)
+    words: tuple[UnreadWord, ...] = ()
 
     @property
     def units(self) -> dict[str, Logged]:
@@ -69,7 +82,7 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
         *_commented(f"coordinates = {_text(side.coordinates)}", _coordinates_why(side)),
         *_placeholders(side, len(draft.joints)),
         "",
-        *_pinned(draft.csv),
+        *_pinned(draft),
         "[channels.mcap]" if draft.topics else "[channels]",
         *([] if draft.topics else _time(draft.clock)),
     ]
@@ -91,9 +104,18 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
     return "\n".join(lines) + "\n"
 
 
-def _pinned(csv: Mapping[str, Any]) -> list[str]:
-    """Return `[csv]` with the settings that were given."""
-    return ["[csv]", *(f"{key} = {_value(value)}" for key, value in csv.items()), ""] if csv else []
+def _pinned(draft: Draft) -> list[str]:
+    """Return `[csv]` with the settings that were given, and with words that may stand for missing values."""
+    if not draft.csv and not draft.words:
+        return []
+    lines = [f"{key} = {_value(value)}" for key, value in draft.csv.items() if key != "missing" or not draft.words]
+    if draft.words:
+        told = "; ".join(f"{_value(word.text)} in line {word.line}, column {word.column}" for word in draft.words)
+        given = draft.csv.get("missing", [])
+        known = [*(given if isinstance(given, list) else [given]), *(word.text for word in draft.words)]
+        check = "do they stand for missing values? Where the drive or a sensor failed, the samples are no motion"
+        lines += _commented(f"missing = {_value(known)}", _marked(f"guessed: not numbers: {told}", check))
+    return ["[csv]", *lines, ""]
 
 
 def _value(value: object) -> str:

@@ -14,6 +14,7 @@ from cdtool.files import write_text
 from cdtool.findings import Finding
 from cdtool.findings.clocks import ClockUnitAssumed
 from cdtool.findings.motion import AccelerometerTurned
+from cdtool.findings.tables import UnreadCells
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.source import Format, Source
@@ -24,7 +25,7 @@ from cdtool.workflows.information import info
 from cdtool.workflows.init.benchmark_draft import draft_benchmark
 from cdtool.workflows.init.channel_guess import guess_channels
 from cdtool.workflows.init.derived_speed import propose_low_pass
-from cdtool.workflows.init.draft_text import Clock, Draft, draft_text
+from cdtool.workflows.init.draft_text import Clock, Draft, UnreadWord, draft_text
 from cdtool.workflows.init.machine_side import side_of
 from cdtool.workflows.init.speed_ratio import Ratio, ratio_of
 from cdtool.workflows.init.streams import Channels, streams_of
@@ -35,6 +36,8 @@ from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
 
 # Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
 _SLOWEST = 2.0
+# So many words in columns of numbers may stand for missing values.
+_MOST_WORDS = 4
 
 
 @dataclass(frozen=True)
@@ -242,8 +245,18 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     assumed = next((item.fact.sentence() for item in source.findings if isinstance(item.fact, ClockUnitAssumed)), "")
     time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
+    words = _words(source.findings) if found.name == Csv.name else ()
     left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
-    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv)
+    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words)
+
+
+def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:
+    """Return the words in columns of numbers, each once; none if there are too many to be a value that is missing."""
+    found: dict[str, UnreadWord] = {}
+    for item in findings:
+        if isinstance(item.fact, UnreadCells) and item.fact.advice.looks_like == "word":
+            found.setdefault(item.fact.cell, UnreadWord(item.fact.cell, item.channel, item.fact.first[0]))
+    return tuple(found.values()) if len(found) <= _MOST_WORDS else ()
 
 
 def _in_seconds(time: Clock, clock: TableClock | None, own: bool) -> float:
