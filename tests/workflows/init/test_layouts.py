@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdtool.workflows.init.drafting import init
-from tests.workflows.init.layouts import LAYOUTS, Truth, sealed, sealed_second, sealed_third
+from tests.workflows.init.layouts import LAYOUTS, Truth, sealed, sealed_fourth, sealed_second, sealed_third
 from tests.workflows.init.layouts.layout import Table, table_layout
 from tests.workflows.init.layouts.score import score
 from tests.workflows.init.layouts.variants import is_table, without_each_channel, without_names, written
@@ -43,7 +43,9 @@ def test_nine_of_ten_channels_of_all_layouts_are_mapped_and_nothing_wrong_is_unm
     assert right >= 0.9 * expected
 
 
-@pytest.mark.parametrize("layouts", [sealed.LAYOUTS, sealed_second.LAYOUTS, sealed_third.LAYOUTS])
+@pytest.mark.parametrize(
+    "layouts", [sealed.LAYOUTS, sealed_second.LAYOUTS, sealed_third.LAYOUTS, sealed_fourth.LAYOUTS]
+)
 def test_the_same_holds_for_layouts_by_somebody_who_had_not_seen_the_guesser(tmp_path, layouts):
     scores = [score(layout, tmp_path) for layout in layouts]
     assert not [text for item in scores for text in item.unmarked]

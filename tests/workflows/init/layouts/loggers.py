@@ -910,10 +910,10 @@ def _servo(rng: Rng) -> Cells:
 LAYOUTS: tuple[Layout, ...] = (
     _layout(
         "panda friction models csv",
-        "A GitHub C++ program with libfranka that writes test_data_yuan_YZ_with_friction_models.csv; header "
-        "lines in Chinese comments. Exact: header (64 names, order), default precision of 6 digits, 'ddq' is "
-        "ddq_d of the robot, 'tau_measured_compensate' is tau_J minus gravity minus its first value, rows skipped "
-        "by a printing thread (1 to 3 ms). Made up: the values (a Cartesian circle as the source drives).",
+        "A GitHub C++ program with libfranka that writes test_data_yuan_YZ_with_friction_models.csv; header lines "
+        "in Chinese comments. Exact: header (64 names, order), default precision of 6 digits, 'ddq' is ddq_d of "
+        "the robot, 'tau_measured_compensate' is tau_J minus gravity minus its first value, rows skipped by a "
+        "printing thread (1 to 3 ms). Made up: the values (a Cartesian circle as the source drives).",
         ".csv",
         "robot",
         _PANDA,
@@ -922,8 +922,8 @@ LAYOUTS: tuple[Layout, ...] = (
     _layout(
         "nist ur5 flat csv",
         "NIST 'Degradation Measurement of Robot Arm Position Accuracy' (UR5), as flattened by normalize.py: the "
-        "73 names are UR5_COLUMNS of a GitHub loader, positions in rad. Exact: names, order. Made up: values, "
-        "the 8 ms period, the digits.",
+        "73 names are UR5_COLUMNS of a GitHub loader, positions in rad. Exact: names, order. Made up: values, the "
+        "8 ms period, the digits.",
         ".csv",
         "robot",
         _NIST,
@@ -1093,9 +1093,9 @@ LAYOUTS: tuple[Layout, ...] = (
     ),
     _layout(
         "chinese servo oscilloscope",
-        "Composed from Chinese terms of drives in GitHub sources (速度指令, 速度反馈, 转矩指令, 转矩反馈, 位置反馈) as "
-        "an oscilloscope of a servo tool would export them. Exact: these terms; the form of the "
-        "file, preamble, 1 ms, 23 bit encoder and values are made up.",
+        "Composed from Chinese terms of drives in GitHub sources (速度指令, 速度反馈, 转矩指令, 转矩反馈, 位置反馈) "
+        "as an oscilloscope of a servo tool would export them. Exact: these terms; the form of "
+        "the file, preamble, 1 ms, 23 bit encoder and values are made up.",
         ".csv",
         "rotary axis",
         _SERVO,

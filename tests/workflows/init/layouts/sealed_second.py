@@ -1020,8 +1020,8 @@ def _write_module(path: Path, rng: Rng) -> None:
 
 module = Layout(
     "ball screw module, Chinese drive software",
-    "Composed: channel names of Chinese servo manuals (位置指令, 位置反馈, 速度反馈, 转矩反馈, 位置偏差, "
-    "母线电压, 负载率), no such file is public; UTF-8 with a byte order mark. Position in mm of the load, speed in "
+    "Composed: channel names of Chinese servo manuals (位置指令, 位置反馈, 速度反馈, 转矩反馈, 位置偏差, 母线电压, 负载率), "
+    "no such file is public; UTF-8 with a byte order mark. Position in mm of the load, speed in "
     "rpm of the motor (lead 10 mm). Made up: preamble, values; one run into an obstacle.",
     ".csv",
     "linear axis",

@@ -391,9 +391,8 @@ def _hexapod(path: Path, rng: Rng) -> None:
 
 HEX_LAYOUT = Layout(
     "hexapod-leg-logger",
-    "data_logger.py of a ROS 2 hexapod and its guide (found by find_string joint_hip_target_vel): header and "
-    "order of the leg file, 50 Hz, rad, csv line ends exact; gait, lag, stamps (simulated clock) and noise made "
-    "up.",
+    "data_logger.py of a ROS 2 hexapod and its guide: header and order of the leg file, 50 Hz, rad, csv line ends "
+    "exact; gait, lag, stamps (simulated clock) and noise made up.",
     ".csv",
     "robot",
     _hexapod,
@@ -542,9 +541,9 @@ def _franka(path: Path, rng: Rng) -> None:
 
 FRANKA_LAYOUT = Layout(
     "franka-load-cell-logger",
-    "FrankaSensorLogger of a ROS node of IIT Gandhinagar (find_string class FrankaSensorLogger; read whole): "
-    "header, order, epoch seconds, constants of the trial, load cell and encoder from a serial line beside joint "
-    "states and F_ext exact; motion, pushes, 100 Hz, 12 Hz of the serial values and all numbers made up.",
+    "FrankaSensorLogger of a ROS node of IIT Gandhinagar: header, order, epoch seconds, constants of the trial, "
+    "load cell and encoder from a serial line beside joint states and F_ext exact; motion, pushes, 100 Hz, 12 Hz "
+    "of the serial values and all numbers made up.",
     ".csv",
     "robot",
     _franka,
@@ -597,10 +596,9 @@ def _arm_support(path: Path, rng: Rng) -> None:
 
 ARM_SUPPORT_LAYOUT = Layout(
     "arm-support-serial",
-    "UtilityFunctions.cpp of Erick Nunez' arm support robot (find_string 'Fx, Fy, Fz, q1, q2, q4, q1Dot'): the "
-    "packet reference [time, F, q, qDot, xyz, uvw, Q, QDot, dT], tabs, no header, CR LF, two decimals of "
-    "Serial.print exact (the versions of the code print subsets of it); milliseconds, 8 ms, motion and admittance "
-    "made up.",
+    "UtilityFunctions.cpp of Erick Nunez' arm support robot: the packet reference [time, F, q, qDot, xyz, uvw, Q, "
+    "QDot, dT], tabs, no header, CR LF, two decimals of Serial.print exact (the versions of the code print "
+    "subsets of it); milliseconds, 8 ms, motion and admittance made up.",
     ".txt",
     "robot",
     _arm_support,
@@ -715,9 +713,9 @@ def _vifcon(path: Path, rng: Rng) -> None:
 
 VIFCON_LAYOUT = Layout(
     "vifcon-nemo-hubachse",
-    "VIFCON of the IKZ Berlin, nemoAchseLin.py (find_string 'Nemo-Achse Lineare Bewegungs Gerät'): the line of "
-    "units with #, the German header with its trailing comma, the order of the values exact; the form of "
-    "time_abs, the trailing comma of the rows, 0.15 s interval, moves and noise made up.",
+    "VIFCON of the IKZ Berlin, nemoAchseLin.py: the line of units with #, the German header with its trailing "
+    "comma, the order of the values exact; the form of time_abs, the trailing comma of the rows, 0.15 s interval, "
+    "moves and noise made up.",
     ".csv",
     "linear axis",
     _vifcon,
@@ -1055,10 +1053,10 @@ def _oscillator(path: Path, rng: Rng) -> None:
 
 OSCILLATOR_LAYOUT = Layout(
     "arduino-oscillator-sd",
-    "Sketch that writes Test_Log_05Hz_256pts_OSC_<n>.txt to an SD card, and its MATLAB reader (find_string "
-    "'motorCurrent (raw)'): header with the gains behind the last name (two names more than values), blanks after "
-    "commas, types of the values, 0.5 Hz, 256 counts, range 5000-25000 of the control signal exact; 10 ms, "
-    "amplitudes, pauses, a block, offset 512 of the current made up.",
+    "Sketch that writes Test_Log_05Hz_256pts_OSC_<n>.txt to an SD card, and its MATLAB reader: header with the "
+    "gains behind the last name (two names more than values), blanks after commas, types of the values, 0.5 Hz, "
+    "256 counts, range 5000-25000 of the control signal exact; 10 ms, amplitudes, pauses, a block, offset 512 of "
+    "the current made up.",
     ".txt",
     "rotary axis",
     _oscillator,
