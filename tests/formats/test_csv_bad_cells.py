@@ -167,3 +167,37 @@ def test_other_rows_of_two_widths_are_refused(log, first, others):
     path = log(text, "log.csv")
     with pytest.raises(RecordingError, match=r"cells|names"):
         choose_format(path).columns(path)
+
+
+@pytest.mark.parametrize("cut", ["500.00", "500.00,50000.5,9.0"], ids=["one cell", "a further cell"])
+def test_among_rows_that_end_early_a_row_of_another_width_is_an_error(log, machine, cut):
+    text = ending_early(",299.5,150.0", "", 60000).replace("\n500.00,50000.5\n", f"\n{cut}\n")
+    with pytest.raises(RecordingError, match="line 50002 has"):
+        read_recording(log(text, "log.csv"), machine(SECONDS))
+
+
+def test_between_blanks_rows_with_fewer_cells_are_refused(log):
+    """The set value is logged once: where it is missing, the other cells would be in the wrong columns."""
+    rows = "".join(f"{0.01 * i:.2f} {i}.5 {i}\n" for i in range(1, 300))
+    with pytest.raises(RecordingError, match="cells"):
+        path = log(f"t set pos vel\n0.00 5.0 0.5 0\n{rows}", "log.txt")
+        choose_format(path).columns(path)
+
+
+@pytest.mark.parametrize(
+    "end", ["", "14:05:59;4", "14:05:59;", "14:05:5"], ids=["complete", "cut", "cut at ;", "cut before ;"]
+)
+def test_a_semicolon_in_times_does_not_separate_cells_even_if_the_last_line_is_cut_off(log, end):
+    rows = "".join(f"14:05:{i // 10:02d};{100 * (i % 10):03d},{i}.5,1.5\n" for i in range(300))
+    path = log(f"Trend:,gate\nStart:,14:05:00;000\n\nTime,pos,vel\n{rows}{end}", "log.csv")
+    source = choose_format(path).columns(path)
+    np.testing.assert_array_equal(source.columns["pos"].values, np.arange(300) + 0.5)
+
+
+@pytest.mark.parametrize("above", ["", "Gate 3\n", "Time;Force\n", "Time Force\n"])
+def test_a_semicolon_between_a_time_and_a_number_separates_them(log, above):
+    rows = "".join(f"14:{i // 60:02d}:{i % 60:02d};{100 + i}\n" for i in range(300))
+    path = log(above + rows, "log.csv")
+    first, second = choose_format(path).columns(path).columns.values()
+    np.testing.assert_array_equal(second.values, np.arange(300) + 100.0)
+    assert first.values[1] - first.values[0] == 1.0

@@ -20,7 +20,7 @@ class Dialect:
     row ends with a separator, which is not followed by another cell. `stamped` and `words` describe the columns T and
     X, by number. `commented`: the sample has comments other than commented rows; `sampled` is the number of its rows;
     `preamble` are the lines above them. `blank_is_missing`: a blank line is a row whose only cell is empty.
-    `short_rows`: rows may end early, and their other cells are empty.
+    `short_rows`: rows may end early, and their other cells are empty; if `short_width` is not 0, after as many cells.
     """
 
     text: Text
@@ -48,6 +48,7 @@ class Dialect:
     stamped: dict[int, StampLayouts] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     short_rows: bool = False
+    short_width: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:

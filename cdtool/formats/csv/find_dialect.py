@@ -112,9 +112,19 @@ def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal:
 
 
 def _is_part_of_times(lines: Sequence[Line]) -> bool:
-    """Return whether every semicolon is in a time, `14:05:11;480`, and the line of the names has none."""
-    marked = [line.text for line in lines if ";" in line.text]
-    return 0 < len(marked) < len(lines) and all(";" not in _TIME.sub("", text) for text in marked)
+    """Return whether every semicolon is in a time, `14:05:11;480`, and another mark separates names and rows alike.
+
+    The last line may be cut off.
+    """
+    texts = [line.text for line in lines[:-1]]
+    marked = [text for text in texts if ";" in text]
+    if not 0 < len(marked) < len(texts) or any(";" in _TIME.sub("", text) for text in marked):
+        return False
+    # Lines above the names may have such times too: the lower half are rows.
+    rows = marked[len(marked) // 2 :]
+    above = [text for text in texts[: texts.index(rows[0])] if ";" not in text]
+    alike = [*above[-1:], *rows]
+    return any(len({text.count(mark) for text in alike} | {0}) == 2 and mark in alike[0] for mark in ",\t|")
 
 
 def _split(texts: Sequence[str], separator: str) -> Split:
@@ -185,7 +195,7 @@ def classify_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Sa
 class CellGrid:
     """The sample's lines as cells: `rows` are all lines, `data` the lines of `width` cells below the `head`.
 
-    `short`: rows end early; they are completed here.
+    `short`: how many cells rows have that end early; they are completed here. 0: all rows have all cells.
     """
 
     separator: str
@@ -194,7 +204,7 @@ class CellGrid:
     data: Sequence[tuple[Line, list[str]]]
     head: Head
     kinds: str
-    short: bool
+    short: int
 
     @property
     def not_numbers(self) -> list[int]:
@@ -208,8 +218,10 @@ def split_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
     without_rulers = [line for line in lines.table if not is_ruler(line.text)] or lines.table
     split = find_separator(path, without_rulers, pins.separator or named, pins.decimal)
     rows = [(line, split_line(line.text, split.separator)) for line in lines.table]
-    width = _full_width(rows, split.width)
-    if short := width > split.width:
+    # Between blanks, an empty cell cannot be seen: rows may be without any of their cells.
+    width = _full_width(rows, split.width) if split.separator != " " else split.width
+    short = split.width if width > split.width else 0
+    if short:
         rows = [_completed(line, cells, split.separator, width) for line, cells in rows]
         split = replace(split, width=width)
         lines = replace(lines, table=[line for line, _ in rows])
@@ -239,7 +251,7 @@ def _full_width(rows: Sequence[tuple[Line, list[str]]], width: int) -> int:
 def _completed(line: Line, cells: list[str], separator: str, width: int) -> tuple[Line, list[str]]:
     """Return a line that ends early with empty cells."""
     missing = width - len(cells)
-    text = line.text.rstrip("\r\n") + separator * missing if missing > 0 and separator != " " else line.text
+    text = line.text.rstrip("\r\n") + separator * missing if missing > 0 else line.text
     return replace(line, text=text), [*cells, *[""] * missing]
 
 
@@ -324,7 +336,8 @@ def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect
         trailing=trailing,
         blank_is_missing=are_missing_samples(lines.every, head.first.number, grid.width),
         stamped=_stamped_columns(grid, pins),
-        short_rows=grid.short,
+        short_rows=grid.short > 0,
+        short_width=grid.short,
         words={i: _first_words(grid.data, i) for i in grid.not_numbers},
         findings=tuple(_findings(text, lines, head)),
     )

@@ -23,7 +23,8 @@ _EMPTY = {" ": b" nan"}
 def complete_blocks(blocks: Iterable[tuple[bytearray, int]], dialect: Dialect) -> Iterator[tuple[bytearray, int]]:
     """Yield `Text.blocks` with all cells in each line that has at least two; a block may become several.
 
-    A last line without a line end is left as it is: it may be cut off.
+    With `Dialect.short_width` only lines with exactly so many cells are completed: any other is damaged. A last line
+    without a line end is left as it is: it may be cut off.
     """
     cell = _EMPTY.get(dialect.separator, dialect.separator.encode())
     mark, end = ord(dialect.separator), dialect.text.line_end[0]
@@ -36,17 +37,20 @@ def complete_blocks(blocks: Iterable[tuple[bytearray, int]], dialect: Dialect) -
         for first in range(0, max(len(ends), 1), most):
             last = min(first + most, len(ends))
             begin, stop = int(starts[first]), size if last == len(ends) else int(starts[last])
-            lines = _complete(data[begin:stop], ends[first:last] - begin, marks - begin, dialect.width, cell)
+            widths = dialect.width, dialect.short_width
+            lines = _complete(data[begin:stop], ends[first:last] - begin, marks - begin, widths, cell)
             yield bytearray(lines.tobytes() + bytes((end,)) * AFTER), len(lines)
 
 
-def _complete(data: Bytes, ends: Integers, marks: Integers, width: int, cell: bytes) -> Bytes:
+def _complete(data: Bytes, ends: Integers, marks: Integers, widths: tuple[int, int], cell: bytes) -> Bytes:
     """Return the lines that end at `ends` with all cells: `cell` with its separator for each that is missing.
 
-    `marks` are the separators in the lines.
+    `marks` are the separators in the lines; `widths` are the cells of a whole line, and of the short ones (0: any).
     """
+    width, short = widths
     counts = np.diff(np.searchsorted(marks, np.concatenate(([0], ends))))
-    missing = np.where(counts > 0, np.maximum(width - 1 - counts, 0), 0)
+    ends_early = counts == short - 1 if short else counts > 0
+    missing = np.where(ends_early, np.maximum(width - 1 - counts, 0), 0)
     if not missing.any():
         return data
     # A carriage return belongs to the line end.
