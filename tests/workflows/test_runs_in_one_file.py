@@ -6,11 +6,15 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cdtool
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.results_file import to_json
+from cdtool.ingest.run_reading import read_runs
+from cdtool.machine_file import read_machine_file
+from cdtool.operations import RunCut
 from cdtool.workflows.runs import find_logs
 from tests.command import cdtool as command
 from tests.command import one_line
@@ -376,3 +380,19 @@ def test_a_label_may_be_about_a_run_of_a_file_that_is_only_learned_from(folder):
     )
     done = cdtool.benchmark(path).results
     assert [item.recording for item in done.skipped if "shows a contact" in item.reason] == ["learned.csv#free_03"]
+
+
+@pytest.mark.parametrize("word", ["None", "null", "free"])
+def test_a_word_for_no_value_is_a_label_like_any_other(tmp_path, word):
+    rows = [f"{0.01 * i:.2f},{np.sin(0.05 * i):.5f},{word if (i // 100) % 2 == 0 else 'stroke'}" for i in range(600)]
+    log = tmp_path / "labelled.csv"
+    log.write_text("t,v,phase\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    machine = tmp_path / "m.toml"
+    machine.write_text(
+        '[machine]\ntype = "rotary_axis"\nname = "a"\ncoordinates = "load"\nload_inertia = 1.0\n'
+        '[channels]\ntime = { column = "t", unit = "s" }\n'
+        'speed = { column = "v", unit = "rad/s" }\n',
+        encoding="utf-8",
+    )
+    found = read_runs(log, read_machine_file(machine), RunCut.of("label:phase"))
+    assert len(found.runs) + len(found.left_out) == 6

@@ -18,6 +18,9 @@ from cdtool.evaluation.truth.load_cell import load_cell_contacts
 from cdtool.evaluation.truth.onset_rule import OnsetRule as OnsetRule
 from cdtool.recording import Contact, Recording
 
+# Where a label has no value between contacts, more missing samples than this are no contact.
+_HOLE = 5
+
 
 def find_contacts(recording: Recording, rule: OnsetRule, steps: float = 0.0) -> list[Contact]:
     """Return the contacts of a recording, by the load cell, else by the label channel, else by events.
@@ -97,7 +100,7 @@ def _widened(contact: Contact, clock: float) -> Contact:
 
 def _from_label(recording: Recording) -> list[Contact]:
     series = recording["label"]
-    present = np.isfinite(series.values[:, 0])  # a missing sample does not end a contact
+    present = np.flatnonzero(np.isfinite(series.values[:, 0]))
     time, values = series.time[present], series.values[present, 0]
     # The number of its kind, from 1; 0 where there is no contact. A change of kind is another contact.
     kinds = np.zeros(len(time), dtype=int)
@@ -106,18 +109,22 @@ def _from_label(recording: Recording) -> list[Contact]:
             kinds[values == code] = number
     else:
         kinds[values > 0.5] = 1
-    firsts = np.flatnonzero(np.diff(kinds, prepend=0))
+    # A missing sample does not end a contact, unless the log has no other samples without one.
+    behind_hole = (np.diff(present, prepend=-1) > _HOLE) & bool(np.all(kinds > 0))
+    firsts = np.flatnonzero((np.diff(kinds, prepend=0) != 0) | behind_hole)
     ends = np.append(firsts[1:], len(time))[: len(firsts)]
     period = series.period if len(series) > 1 else 0.0
+    before = np.concatenate((series.time[:1], time))[: len(time)]
+    hole = np.where(behind_hole, time - before, 0.0)
     return [
         Contact(
             start=float(time[first]),
             end=float(time[end - 1]),
-            uncertainty=0.5 * period if first else 0.0,
+            uncertainty=max(0.5 * period if first else 0.0, float(hole[first])),
             found_by="label",
             kind=recording.label_kinds[kinds[first] - 1][1] if recording.label_kinds else "",
-            resolution=period,
-            in_progress=bool(first == 0),
+            resolution=max(period, float(hole[first])),
+            in_progress=bool(first == 0 and not behind_hole[0]),
         )
         for first, end in zip(firsts, ends, strict=True)
         if kinds[first]

@@ -23,7 +23,7 @@ from cdtool.findings.tables import (
     UnreadCells,
     WordsBelowRows,
 )
-from cdtool.formats.csv.cells import STAMP_LIKE, has_numbers, kind, number, split_line
+from cdtool.formats.csv.cells import NULLS, STAMP_LIKE, has_numbers, kind, number, split_line
 from cdtool.formats.csv.dialect import Dialect, quoted
 from cdtool.formats.csv.lines import begins_comment, is_ruler
 from cdtool.formats.csv.row_arrays import Rows
@@ -243,8 +243,8 @@ class IrregularLines:
         return number(cell, self.dialect.marks.decimal, self.dialect.marks.thousands)
 
     def _category(self, column: int, cell: str) -> float:
-        """Return a number as it is, NaN for an empty cell or a mark of a missing value, else the text's code."""
-        value = self._number(cell)
+        """Return a number as it is, NaN for an empty cell or a pinned mark of a missing value, else the text's code."""
+        value = None if cell in NULLS and cell not in self.dialect.pins.missing else self._number(cell)
         return self.categories[column].code(cell) if value is None else value
 
     def _stamp(self, column: int, cell: str) -> int | None:

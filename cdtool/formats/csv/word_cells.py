@@ -40,12 +40,15 @@ class WordCells:
         return before + known
 
     def _replacement(self, column: int, categories: Categories, raw: bytes) -> bytes:
-        """Return the code of a text; a number, a missing value or the column's own name stays as it is."""
+        """Return the code of a text; a number, a pinned missing value or the column's own name stays as it is.
+
+        `None` is a text here: in a column of labels it is what no contact is called.
+        """
         dialect = self._dialect
         text = raw.decode(self._encoding, "replace").strip(" \t")
         text = text[1:-1].strip(" \t") if text.startswith('"') else text
         is_number = number(text, dialect.marks.decimal, dialect.marks.thousands) is not None
-        if is_number or text in dialect.missing or text in (dialect.names[column], dialect.names[column].strip()):
+        if is_number or text in dialect.pins.missing or text in (dialect.names[column], dialect.names[column].strip()):
             return raw
         return b"%d" % categories.code(text)
 

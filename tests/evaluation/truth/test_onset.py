@@ -182,3 +182,19 @@ def test_the_contacts_of_a_load_cell_have_the_kinds_of_a_label_channel(label, ki
     named = find_contacts(replace(both, label_kinds=((1.0, "hard"), (2.5, "soft"))), GATE_RULE)
     assert [item.kind for item in named] == kinds
     assert [replace(item, kind="") for item in named] == plain
+
+
+def test_behind_many_missing_labels_another_contact_may_have_begun_at_any_time():
+    """A program writes nothing while there is no contact."""
+    values = np.where(((TIME >= 1.0) & (TIME < 1.3)) | ((TIME >= 2.0) & (TIME < 2.3)), 1.0, np.nan)
+    first, second = find_contacts(recording(values, "label"), GATE_RULE)
+    assert (first.start, first.end, second.start) == pytest.approx((1.0, 1.299, 2.0))
+    assert first.uncertainty == pytest.approx(1.0) and second.uncertainty == pytest.approx(0.701)
+    assert not first.in_progress
+
+
+def test_missing_labels_do_not_end_a_contact_in_a_log_with_others():
+    values = ((TIME >= 1.0) & (TIME < 1.3)).astype(float)
+    values[1100:1150] = np.nan
+    (contact,) = find_contacts(recording(values, "label"), GATE_RULE)
+    assert (contact.start, contact.end) == pytest.approx((1.0, 1.299)) and contact.uncertainty < 0.001
