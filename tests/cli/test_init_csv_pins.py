@@ -85,6 +85,14 @@ def test_a_word_in_a_column_of_numbers_is_drafted_as_missing_with_a_mark(tmp_pat
     assert "2 of 200 values are missing" in one_line(seen.out)
 
 
+def test_all_words_of_a_column_are_drafted_unless_they_are_many(tmp_path):
+    api.init(words_in(tmp_path, ["OVL", "ERROR", "off"]), tmp_path / "m.toml")
+    csv = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["csv"]
+    assert csv == {"missing": ["OVL", "ERROR", "off"]}
+    done = cdtool("init", words_in(tmp_path, ["a", "b", "c", "d", "e"]), "-o", tmp_path / "n.toml")
+    assert done.status == 2 and "is not a number" in one_line(done.err)
+
+
 def test_given_words_stay_and_another_one_is_added(tmp_path):
     log = words_in(tmp_path, ["OVL", "ERROR"])
     api.init(log, tmp_path / "m.toml", csv={"missing": ["OVL"]})

@@ -221,10 +221,25 @@ def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
         raise RecordingError(fault.message, f"{fault.hint}; keys of [csv] here: --csv header=false") from fault
 
 
+def _with_words(path: Path, found: Format, csv: Mapping[str, Any]) -> tuple[Source, tuple[UnreadWord, ...]]:
+    """Return all columns of a log, and the words among their numbers, which are read as missing."""
+    source = first = _surveyed(path, found, csv)
+    words: tuple[UnreadWord, ...] = ()
+    given = csv.get("missing", [])
+    given = given if isinstance(given, list) else [given]
+    # A finding names one word of a column: behind it there may be others.
+    while found.name == Csv.name and (more := _words(source.findings)):
+        words += more
+        if len(words) > _MOST_WORDS:
+            return first, ()
+        source = _surveyed(path, found, {**csv, "missing": [*given, *(word.text for word in words)]})
+    return source, words
+
+
 def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     path = log_parts(log)[0]
     found = choose_format(path)
-    source = _surveyed(path, found, csv)
+    source, words = _with_words(path, found, csv)
     topics = has_topics(found)
     clock, times = (None if topics else table_clock(source)) or (None, None)
     streams = streams_of(source, times.time if times else None, times.column if times else None, topics)
@@ -245,18 +260,17 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     assumed = next((item.fact.sentence() for item in source.findings if isinstance(item.fact, ClockUnitAssumed)), "")
     time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
-    words = _words(source.findings) if found.name == Csv.name else ()
     left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
     return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words)
 
 
 def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:
-    """Return the words in columns of numbers, each once; none if there are too many to be a value that is missing."""
+    """Return the words that findings name in columns of numbers, each once."""
     found: dict[str, UnreadWord] = {}
     for item in findings:
         if isinstance(item.fact, UnreadCells) and item.fact.advice.looks_like == "word":
             found.setdefault(item.fact.cell, UnreadWord(item.fact.cell, item.channel, item.fact.first[0]))
-    return tuple(found.values()) if len(found) <= _MOST_WORDS else ()
+    return tuple(found.values())
 
 
 def _in_seconds(time: Clock, clock: TableClock | None, own: bool) -> float:
