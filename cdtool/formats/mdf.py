@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from traceback import clear_frames
@@ -53,7 +54,7 @@ class Mdf(PiecewiseFormat):
             return file.read(8) in _MAGICS
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        asammdf = library("asammdf", "mdf", path)
+        asammdf = _library(path)
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its problems are reported as errors or findings
         if not self.sniff(path):
             raise RecordingError(f"{path}: is not an MDF file", "see cdtool list formats")
@@ -83,6 +84,19 @@ class Mdf(PiecewiseFormat):
         headers = {column.name: header_of(column) for column in columns}
         origin = float(stated[1]) if stated else 0.0
         return Source(path, self.name, headers, origin, tuple(dict.fromkeys(findings)), details, tuple(channels))
+
+
+def _library(path: Path) -> Any:
+    """Return asammdf; raises RecordingError if it is not installed.
+
+    A log that is interrupted while it is made is closed by its destructor, which needs an attribute that it does not
+    have yet: it is closed until it is open.
+    """
+    asammdf = library("asammdf", "mdf", path)
+    for module, name in (("asammdf.blocks.mdf_v4", "MDF4"), ("asammdf.blocks.mdf_v3", "MDF3")):
+        version = getattr(import_module(module), name)
+        version._closed = getattr(version, "_closed", True)
+    return asammdf
 
 
 def _opened(asammdf: Any, path: Path) -> Any:
@@ -172,7 +186,7 @@ def _time_factor(log: Any, group: int) -> float | None:
 
 def write_mdf(path: Path, groups: Sequence[Group], parts: Parts, provenance: Mapping[str, str]) -> WrittenNames:
     """Write MDF 4.10: one channel per column with its unit, one group per clock; provenance as the file's comment."""
-    asammdf = library("asammdf", "mdf", path)
+    asammdf = _library(path)
     require_clocks(path, groups)
     shared = Counter(part.name for group in groups for part in chain(*group.flat))
     with asammdf.MDF(version="4.10") as log:

@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import gc
+from importlib import import_module
+
 import numpy as np
 import pytest
 
 from cdtool.errors import RecordingError
 from cdtool.findings.containers import ColumnLeftOut
-from cdtool.formats.mdf import Mdf
+from cdtool.formats.mdf import Mdf, _library
 from cdtool.ingest.reading import survey
 
 asammdf = pytest.importorskip("asammdf")
@@ -85,3 +88,16 @@ def test_damaged_files_are_one_line_without_output_from_the_library(saved, capfd
         except RecordingError as fault:
             assert "\n" not in str(fault)
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("module", "name"), [("mdf_v4", "MDF4"), ("mdf_v3", "MDF3")])
+def test_a_log_that_is_interrupted_while_it_is_made_prints_nothing(monkeypatch, tmp_path, module, name):
+    """SIGTERM in the constructor: the destructor of a log without its attributes."""
+    _library(tmp_path / "log.mf4")
+    version = getattr(import_module(f"asammdf.blocks.{module}"), name)
+    seen = []
+    monkeypatch.setattr("sys.unraisablehook", seen.append)
+    half_made = version.__new__(version)
+    del half_made
+    gc.collect()
+    assert seen == []
