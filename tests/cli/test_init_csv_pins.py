@@ -47,6 +47,7 @@ def test_lists_and_numbers_are_written_as_toml(glued, tmp_path):
         (("--csv", "header"), "--csv header: is no KEY=VALUE"),
         (("--csv", "heder=false"), "--csv: heder: unknown key (did you mean header?"),
         (("--csv", "decimal=x"), "--csv: decimal: is 'x'"),
+        (("--csv", "encoding=idna"), "--csv: encoding: is 'idna'"),
         (("--csv", "header=false", "--machine", "m.toml"), "--csv and --machine: both state how tables are read"),
     ],
 )

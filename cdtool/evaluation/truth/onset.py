@@ -18,7 +18,7 @@ from cdtool.evaluation.truth.load_cell import load_cell_contacts
 from cdtool.evaluation.truth.onset_rule import OnsetRule as OnsetRule
 from cdtool.recording import Contact, Recording
 
-# Where a label has no value between contacts, more missing samples than this are no contact.
+# Where a label has no value between contacts, more missing samples than this, by its usual step, are no contact.
 _HOLE = 5
 
 
@@ -110,7 +110,8 @@ def _from_label(recording: Recording) -> list[Contact]:
     else:
         kinds[values > 0.5] = 1
     # A missing sample does not end a contact, unless the log has no other samples without one.
-    behind_hole = (np.diff(present, prepend=-1) > _HOLE) & bool(np.all(kinds > 0))
+    usual = float(np.median(np.diff(present))) if len(present) > 1 else 1.0
+    behind_hole = (np.diff(present, prepend=-1) > _HOLE * usual) & bool(np.all(kinds > 0))
     firsts = np.flatnonzero((np.diff(kinds, prepend=0) != 0) | behind_hole)
     ends = np.append(firsts[1:], len(time))[: len(firsts)]
     period = series.period if len(series) > 1 else 0.0
@@ -125,6 +126,7 @@ def _from_label(recording: Recording) -> list[Contact]:
             kind=recording.label_kinds[kinds[first] - 1][1] if recording.label_kinds else "",
             resolution=max(period, float(hole[first])),
             in_progress=bool(first == 0 and not behind_hole[0]),
+            hole=float(hole[first]),
         )
         for first, end in zip(firsts, ends, strict=True)
         if kinds[first]

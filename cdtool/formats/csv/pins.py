@@ -69,7 +69,8 @@ def _encoding(table: Table) -> str:
         return ""
     try:
         known = codecs.lookup(name).name
-        narrow = "1,2\n".encode(known) == b"1,2\n"
+        # Also the codec of host names agrees with ASCII, but it cannot replace what it cannot decode.
+        narrow = "1,2\n".encode(known) == b"1,2\n" == b"1,2\n".decode(known, "replace").encode()
     except (LookupError, UnicodeError, AssertionError):
         raise table.fault("encoding", f"is '{name}'", "utf-8, utf-16-le, utf-16-be, latin-1 or cp1252") from None
     # Numbers are read byte by byte: their bytes must be ASCII, or the encoding must be one that is recoded to UTF-8.

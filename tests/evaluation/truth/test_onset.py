@@ -190,7 +190,13 @@ def test_behind_many_missing_labels_another_contact_may_have_begun_at_any_time()
     first, second = find_contacts(recording(values, "label"), GATE_RULE)
     assert (first.start, first.end, second.start) == pytest.approx((1.0, 1.299, 2.0))
     assert first.uncertainty == pytest.approx(1.0) and second.uncertainty == pytest.approx(0.701)
-    assert not first.in_progress
+    assert not first.in_progress and (first.hole, second.hole) == pytest.approx((1.0, 0.701))
+
+
+def test_a_label_that_is_logged_less_often_than_the_rest_has_the_same_contacts():
+    values = np.where(((TIME >= 1.0) & (TIME < 1.3)) | ((TIME >= 2.0) & (TIME < 2.3)), 1.0, np.nan)
+    values[np.arange(len(TIME)) % 10 > 0] = np.nan
+    assert [item.start for item in find_contacts(recording(values, "label"), GATE_RULE)] == pytest.approx([1.0, 2.0])
 
 
 def test_missing_labels_do_not_end_a_contact_in_a_log_with_others():
