@@ -2,8 +2,8 @@
 
 Each event has its own standard error; what they scatter more than that is a variance between events, the same for all
 (random effects). Offset and drift follow by regression on time, weighted by both, with Huber's bound on the influence
-of an event: one whose standard error is much too small neither moves the line nor makes the soft contacts count as much
-as the stiff ones.
+of an event: one whose standard error is much too small moves the line little, and does not make the soft contacts count
+as much as the stiff ones.
 """
 
 from __future__ import annotations
