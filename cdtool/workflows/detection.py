@@ -304,7 +304,7 @@ def _detect_prepared(log: Path, benchmark: PreparedBenchmark) -> DetectedRuns:
     for scored in every:
         detected = _detected(scored, log, benchmark)
         if detected is None:
-            skipped += scored.skipped or [Skipped(str(log), "no operation is assessable")]
+            skipped += scored.left_out or [Skipped(str(log), "no operation is assessable")]
         else:
             found.append(detected)
     if not found:

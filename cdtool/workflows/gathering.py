@@ -18,7 +18,7 @@ from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
-from cdtool.workflows.benchmark.log_outcome import LogOutcome, OperationOutcome, WantedTraces
+from cdtool.workflows.benchmark.log_outcome import LogOutcome, OfOperation, WantedTraces, slowest_of, striking_of
 from cdtool.workflows.contacts.impact_free import unchecked
 from cdtool.workflows.workers import Progress, in_order
 
@@ -111,31 +111,32 @@ class Gathering:
         self.detecting += outcome.detecting
         self.skipped += outcome.skipped
         self.findings += outcome.findings
-        self._unchecked += outcome.unchecked
+        self._unchecked += outcome.rows.unchecked
         if outcome.recording is None:
             return
         self._refuse_learned(outcome.recording)
-        for operation in outcome.operations:
-            for item in operation.detectors:
-                self.units.setdefault(item.detector, item.unit)
-                if (exposure := self._exposure.get((group, item.detector))) is None:
-                    exposure = self._exposure[group, item.detector] = Exposure()
+        for number in range(outcome.operations):
+            of_operation = tuple(outcome.of_operation(number))
+            for name, item in of_operation:
+                self.units.setdefault(name, item.unit)
+                if (exposure := self._exposure.get((group, name))) is None:
+                    exposure = self._exposure[group, name] = Exposure()
                 exposure.add(item)
-                self._sweep.add(group, item)
-            self._offer(log, group, operation)
-        for name in {item.detector for operation in outcome.operations for item in operation.detectors}:
-            self._exposure[group, name].recordings += 1
+                self._sweep.add(group, name, item)
+            self._offer(log, group, of_operation, outcome.traces[number])
+        for detector in outcome.detectors:
+            if any(item is not None for item in detector.operations):
+                self._exposure[group, detector.detector].recordings += 1
         if outcome.recording.point:
-            self._tests.setdefault((group, outcome.recording.point), []).extend(outcome.verdicts)
-        self.outcomes.append(replace(outcome, operations=(), verdicts=()))
+            self._tests.setdefault((group, outcome.recording.point), []).extend(outcome.rows.verdicts)
+        self.outcomes.append(outcome)
 
-    def _offer(self, log: int, group: str, operation: OperationOutcome) -> None:
-        panels = len(operation.detectors)
-        number = self._choice.offer(log, group, panels, operation.striking, operation.slowest)
+    def _offer(self, log: int, group: str, outcomes: OfOperation, trace: Trace | None) -> None:
+        number = self._choice.offer(log, group, len(outcomes), striking_of(outcomes), slowest_of(outcomes))
         if number is not None:
-            assert operation.trace is not None, "a trace that is kept was wanted"
+            assert trace is not None, "a trace that is kept was wanted"
             kept = self._choice.kept()
-            self._traces = {n: trace for n, trace in self._traces.items() if n in kept} | {number: operation.trace}
+            self._traces = {n: trace for n, trace in self._traces.items() if n in kept} | {number: trace}
 
     @property
     def traces(self) -> tuple[Trace, ...]:
@@ -156,7 +157,7 @@ class Gathering:
             f"{item.recording.recording}, {name}": digest
             for item in self.outcomes
             if item.recording
-            for name, digest in item.beside
+            for name, digest in item.rows.beside
         }
         profiles = {name: group.force for name, group in self.setup.impacts.items()}
         return Results(
@@ -167,7 +168,7 @@ class Gathering:
             contacts=tuple(row for item in self.outcomes for row in item.contacts),
             false_alarms=tuple(row for item in self.outcomes for row in item.false_alarms),
             exposure=tuple(item.result(group, name) for (group, name), item in self._exposure.items()),
-            forces=tuple(row for item in self.outcomes for row in item.forces),
+            forces=tuple(row for item in self.outcomes for row in item.rows.forces),
             points=tuple(point_rows(self._tests, profiles)),
             sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
             calibration=tuple(calibration),

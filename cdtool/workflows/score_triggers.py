@@ -133,7 +133,7 @@ class _TriggerScoring:
     listed_only: bool
 
     def __call__(self, group: str, path: Path, wanted: WantedTraces) -> list[LogOutcome]:
-        found = score_runs(self.setup, group, path, lambda _: (self._detect, []), {})
+        found = score_runs(self.setup, group, path, lambda _: (self._detect, {}), {})
         if self.setup.has_runs:
             found = self._listed_runs(found)
         for scored in found:
@@ -153,8 +153,10 @@ class _TriggerScoring:
     def _is_listed(self, run: RecordingResult) -> bool:
         return any(run.recording in by_name for by_name in self.said.values())
 
-    def _detect(self, operations: Sequence[Operation], _: Scored) -> list[list[Detection]]:
-        return [self._of_operation(operation) for operation in operations]
+    def _detect(self, operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
+        found = [self._of_operation(operation) for operation in operations]
+        scored.detectors = list(dict.fromkeys(item.detector for detections in found for item in detections))
+        return found
 
     def _of_operation(self, operation: Operation) -> list[Detection]:
         log = operation.whole.name

@@ -175,9 +175,9 @@ class _LogScoring:
             return self.normals
         return NormalsWithout(self.runs, scored.log.name, self.setup.rule)
 
-    def _detection_of(self, log: Path) -> tuple[Detect, list[RecordingFinding]]:
-        thresholds, findings = self.thresholds.without(log)
-        return detect_with(self.setup, self.detectors, thresholds, self.unusable), findings
+    def _detection_of(self, log: Path) -> tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]:
+        thresholds, untaught = self.thresholds.without(log)
+        return detect_with(self.setup, self.detectors, thresholds, self.unusable), untaught
 
 
 def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[Skipped]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from cdtool.evaluation.results import ExposureResult, SweepResult
 from cdtool.recording import FloatArray
-from cdtool.workflows.benchmark.log_outcome import DetectorOutcome
+from cdtool.workflows.benchmark.log_outcome import OperationOutcome
 
 
 @dataclass
@@ -25,7 +25,7 @@ class Exposure:
     samples: int = 0
     by_reason: Counter[str] = field(default_factory=Counter)
 
-    def add(self, outcome: DetectorOutcome) -> None:
+    def add(self, outcome: OperationOutcome) -> None:
         """Add one operation."""
         self.operations += 1
         self.seconds += outcome.seconds
@@ -52,9 +52,9 @@ class SweepRows:
     _latency: dict[tuple[str, str], list[FloatArray]] = field(default_factory=dict)
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
 
-    def add(self, group: str, outcome: DetectorOutcome) -> None:
-        """Add one operation of one detector."""
-        name, swept = outcome.detector, outcome.swept
+    def add(self, group: str, name: str, outcome: OperationOutcome) -> None:
+        """Add one operation of the detector `name`."""
+        swept = outcome.swept
         if swept is None:
             return
         if group == self.impact_free:

@@ -122,12 +122,14 @@ class ThresholdsByLog:
         """Return the thresholds; the runs are kept only if they are needed again."""
         return cls(setup, learned.thresholds, learned.pairs if setup.both else {})
 
-    def without(self, log: Path) -> tuple[Mapping[str, tuple[FittedThreshold, ...]], list[RecordingFinding]]:
+    def without(
+        self, log: Path
+    ) -> tuple[Mapping[str, tuple[FittedThreshold, ...]], Mapping[str, list[RecordingFinding]]]:
         """Return the thresholds for a log, which it did not teach, by detector, and why some are missing."""
         if not self.setup.both:
-            return self.all_runs, []
+            return self.all_runs, {}
         name = shown_path(log, self.setup.path.parent)
-        thresholds, findings = dict(self.all_runs), []
+        thresholds, findings = dict(self.all_runs), dict[str, list[RecordingFinding]]()
         for detector, pairs in self.pairs.items():
             others = [pair for pair in pairs if pair[0].whole.name != name]
             if len(others) == len(pairs):
@@ -137,7 +139,7 @@ class ThresholdsByLog:
             except (SignatureError, UsageError) as fault:
                 thresholds[detector] = ()
                 reason = Finding(NothingLearnedWithout(detector, fault.message))
-                findings.append(RecordingFinding.of(name, reason))
+                findings[detector] = [RecordingFinding.of(name, reason)]
         return thresholds, findings
 
 

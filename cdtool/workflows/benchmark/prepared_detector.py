@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -22,7 +22,7 @@ from cdtool.thresholds.base import is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
-from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
+from cdtool.workflows.benchmark.scoring import Detect, DetectionOf, Scored, detect_with, score_runs
 from cdtool.workflows.runs import load_runs
 from cdtool.workflows.signature.normal_runs import normals_for, normals_of, notes_on
 
@@ -41,7 +41,7 @@ class PreparedBenchmark:
     detector: str
     described: str
     learned: Mapping[str, str]
-    run: Callable[[Path], tuple[Detect, list[RecordingFinding]]]
+    run: DetectionOf
     ranges: LearnedRanges | None
     normals: NormalMotions
     notes: tuple[RecordingFinding, ...] = ()
@@ -145,12 +145,10 @@ def prepare_benchmark(
     )
 
 
-def _running(
-    thresholds: ThresholdsByLog, detector: Any, unusable: Mapping[str, str]
-) -> Callable[[Path], tuple[Detect, list[RecordingFinding]]]:
+def _running(thresholds: ThresholdsByLog, detector: Any, unusable: Mapping[str, str]) -> DetectionOf:
     """Return how a log is detected: with thresholds that it did not teach."""
 
-    def detection_of(log: Path) -> tuple[Detect, list[RecordingFinding]]:
+    def detection_of(log: Path) -> tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]:
         own, findings = thresholds.without(log)
         return detect_with(thresholds.setup, [detector], own, unusable), findings
 

@@ -12,8 +12,6 @@ from cdtool.errors import CdtoolError, RecordingError
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.verdict import ForceVerdict, assess_force
 from cdtool.evaluation.results import (
-    ContactResult,
-    FalseAlarmResult,
     ForceResult,
     RecordingFinding,
     RecordingResult,
@@ -46,12 +44,17 @@ _WHOLE = LogSection()
 
 @dataclass
 class Scored:
-    """The results of one log."""
+    """The results of one log.
+
+    `detectors` are those that were run; `failed` are the operations on which one failed, by detector. `untaught`: why
+    nothing could be learned for this log, by detector.
+    """
 
     recording: RecordingResult | None = None
     judged: list[Judged] = field(default_factory=list)
-    contacts: list[ContactResult] = field(default_factory=list)
-    false_alarms: list[FalseAlarmResult] = field(default_factory=list)
+    detectors: list[str] = field(default_factory=list)
+    failed: dict[str, list[Skipped]] = field(default_factory=dict)
+    untaught: Mapping[str, Sequence[RecordingFinding]] = field(default_factory=dict)
     forces: list[ForceResult] = field(default_factory=list)
     verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
@@ -66,11 +69,19 @@ class Scored:
     reading: float = 0.0
     detecting: float = 0.0
 
+    @property
+    def left_out(self) -> list[Skipped]:
+        """Return everything that was left out; what all detectors left out for the same reason is listed once."""
+        combined = LeftOut()
+        for name in self.detectors:
+            combined.add(name, self.failed.get(name, ()))
+        return [*self.skipped, *combined.combined()]
+
 
 # Returns the detections of each operation of a log; failures are reported in the log's `Scored`.
 Detect = Callable[[Sequence[Operation], Scored], list[list[Detection]]]
-# Returns how a log, given by its path, is detected, and the findings about that.
-DetectionOf = Callable[[Path], tuple[Detect, list[RecordingFinding]]]
+# Returns how a log, given by its path, is detected, and the findings about that by detector.
+DetectionOf = Callable[[Path], tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]]
 
 
 def detect_with(
@@ -89,7 +100,7 @@ def detect_with(
 
     def detect(operations: Sequence[Operation], scored: Scored) -> list[list[Detection]]:
         found: list[list[Detection]] = [[] for _ in operations]
-        left_out = LeftOut()
+        scored.detectors = [detector.name for detector in detectors]
         for detector in detectors:
             failed: list[Skipped] = []
             if detector.name in unusable:
@@ -104,10 +115,9 @@ def detect_with(
                 except CdtoolError as fault:
                     failed = [Skipped(item.name, str(fault)) for item in operations]
                     made = []
-            left_out.add(detector.name, failed)
+            scored.failed[detector.name] = failed
             for of_operation, detection in zip(found, made, strict=not failed):
                 of_operation.append(detection)
-        scored.skipped += left_out.combined()
         return found
 
     return detect
@@ -143,9 +153,9 @@ def score_runs(
     """
     cut = RunCut.of(setup.operations)
     if cut is None:
-        detect, findings = detection_of(path)
+        detect, untaught = detection_of(path)
         whole_log = score_log(setup, group, path, detect, factors, ranges)
-        whole_log.findings += findings
+        whole_log.untaught = untaught
         return [whole_log]
     about_log, begin = Scored(), perf_counter()
     try:
@@ -159,9 +169,9 @@ def score_runs(
     scored = [about_log]
     for logged in runs.runs:
         run = Path(logged.recording.source)
-        detect, findings = detection_of(run)
+        detect, untaught = detection_of(run)
         scored.append(_score(setup, group, path, detect, factors, _OneRun(setup, run, logged, ranges)))
-        scored[-1].findings += findings
+        scored[-1].untaught = untaught
     return scored
 
 
@@ -246,7 +256,7 @@ def _score(
     detected = DetectedLog(recording, operations, setup.operations, contacts, found)
     matched = match_log(detected, group, rules, setup.activation.wait)
     scored.skipped += matched.not_scored
-    scored.findings += matched.findings
+    scored.findings += matched.about_log
     scored.matched, curves = matched, matched.curves
     profile = setup.impacts[group].force if group in setup.impacts else None
     if profile:
@@ -259,8 +269,6 @@ def _score(
             text = f"{', '.join(unseen)}: no load-cell force to compare with {profile.name}"
             scored.skipped.append(Skipped(recording.name, text))
     scored.judged = [_swept(item, setup, rules.window, factors) for item in matched.judged]
-    scored.contacts = [row for rows in matched.contacts for row in rows]
-    scored.false_alarms = list(matched.false_alarms)
     scored.detecting = perf_counter() - begin - scored.reading
     return scored
 

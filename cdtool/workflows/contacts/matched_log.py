@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,16 +31,44 @@ _JUDGED = 0.5
 class MatchedLog:
     """The outcome of a log's contacts and alarms.
 
-    `judged` has one entry and `contacts` a list of rows per operation. `curves` is the force by the contact's number.
-    `not_scored` lists contacts that have no onset or are outside all operations; `findings` concern the log itself.
+    `judged`, `contacts` and `false_alarms` have one entry per operation, the latter two its rows. `curves` is the force
+    by the contact's number.
+    `not_scored` lists contacts that have no onset or are outside all operations; `about_log` are the findings that do
+    not depend on the detectors. `uncut`: the strokes in one operation, and those that each detector cannot assess.
     """
 
     judged: tuple[Judged, ...]
     contacts: tuple[tuple[ContactResult, ...], ...]
-    false_alarms: tuple[FalseAlarmResult, ...]
+    false_alarms: tuple[tuple[FalseAlarmResult, ...], ...]
     curves: dict[int, ForceTimeCurve]
     not_scored: tuple[Skipped, ...]
-    findings: tuple[RecordingFinding, ...]
+    about_log: tuple[RecordingFinding, ...]
+    uncut: UncutStrokes
+
+    @property
+    def findings(self) -> tuple[RecordingFinding, ...]:
+        """Return the findings about the log itself."""
+        return (*self.about_log, *self.uncut.findings)
+
+
+@dataclass(frozen=True)
+class UncutStrokes:
+    """The strokes of a log that is one operation: their number, and by detector those that it cannot assess.
+
+    The first stroke is never among these: a detector that cannot assess it has other reasons.
+    """
+
+    recording: str
+    strokes: int = 0
+    not_assessable: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+    @property
+    def findings(self) -> list[RecordingFinding]:
+        """Return a warning with the strokes that any of the detectors cannot assess, if there are such strokes."""
+        numbers = sorted({number for numbers in self.not_assessable.values() for number in numbers})
+        if not numbers:
+            return []
+        return [RecordingFinding.of(self.recording, Finding(LogNotCut(self.strokes, tuple(numbers))))]
 
 
 @dataclass(frozen=True)
@@ -62,7 +90,6 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
     warned = log_warnings(recording, contacts, rules.onset)
     findings = [
         *_unseen_onsets(contacts, rules.window),
-        *_uncut_log(recording, found, log.cut_by),
         *_unseen_forces(contacts, curves),
         *doubts,
     ]
@@ -85,10 +112,11 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
     return MatchedLog(
         tuple(judged),
         tuple(tuple(contact_rows(item, recording, contacts, curves, rules.synchronisation)) for item in judged),
-        tuple(row for item in judged for row in false_alarm_rows(item)),
+        tuple(tuple(false_alarm_rows(item)) for item in judged),
         curves,
         tuple(_not_scored(recording, contacts, inside, log.cut_by)),
         (*warned, *(RecordingFinding.of(recording.name, item) for item in findings)),
+        _uncut_strokes(recording, found, log.cut_by),
     )
 
 
@@ -176,21 +204,24 @@ def _curves(
     return found, missing
 
 
-def _uncut_log(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> list[Finding]:
-    """Return a warning if the first stroke of an uncut log is assessable and a later one is not.
+def _uncut_strokes(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> UncutStrokes:
+    """Return by detector the strokes of an uncut log that are not assessable although the first one is.
 
     `found` are the detections of its operations, `cut_by` how the log is divided into them.
     """
-    detections = [item for of_operation in found for item in of_operation]
-    if cut_by != "whole" or all(np.all(item.statistic.valid) for item in detections):
-        return []
+    detections = [item for of_operation in found for item in of_operation if not np.all(item.statistic.valid)]
+    if cut_by != "whole" or not detections:
+        return UncutStrokes(recording.name)
     strokes = _strokes(recording)
-    unassessable = [
-        number
-        for number, stroke in enumerate(strokes[1:], 2)
-        if any(_mostly_judged(item, *strokes[0]) and not _mostly_judged(item, *stroke) for item in detections)
-    ]
-    return [Finding(LogNotCut(len(strokes), tuple(unassessable)))] if unassessable else []
+    unassessable = {
+        item.detector: tuple(
+            number for number, stroke in enumerate(strokes[1:], 2) if not _mostly_judged(item, *stroke)
+        )
+        for item in detections
+        if strokes and _mostly_judged(item, *strokes[0])
+    }
+    known = {detector: numbers for detector, numbers in unassessable.items() if numbers}
+    return UncutStrokes(recording.name, len(strokes), known)
 
 
 def _strokes(recording: Recording) -> list[tuple[float, float]]:

@@ -111,7 +111,8 @@ def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate):
     prepared = prepare_benchmark(setup.path)
     for log in sorted(gate.glob("s*/*.csv")):
         (scored,) = prepared.score(log)
-        (row,) = scored.contacts
+        assert scored.matched is not None
+        ((row,),) = scored.matched.contacts
         assert row.latency_ms == rows[row.recording]
         assert not cdtool.detect(log, benchmark=prepared).learned, "scored with what was learned from the others"
 
