@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cdtool.evaluation.results import RecordingFinding, Skipped
     from cdtool.findings import Finding
     from cdtool.workflows.detection import Detected
-    from cdtool.workflows.workers import Progress
+    from cdtool.workflows.execution.workers import Progress
 
 _SHOWN = 10
 _ERROR, _SHORTEST_HINT = "error: ", 140
@@ -206,7 +206,7 @@ def progress(what: str, *, pulses: bool = False) -> Iterator[Progress | None]:
     """Show a progress bar on stderr; yield None and draw nothing if stderr is not a terminal.
 
     `pulses`: it moves while the total is unknown, drawn by a thread. Otherwise it is drawn only as the work advances:
-    with another thread in this process, the processes of --jobs could not be forked (workflows/workers.py).
+    with another thread in this process, the processes of --jobs could not be forked (workflows/execution/processes.py).
     """
     if not sys.stderr.isatty():
         yield None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from cdtool.cli.console import progress
 
 if TYPE_CHECKING:
-    from cdtool.workflows.workers import Progress
+    from cdtool.workflows.execution.workers import Progress
 
 # Shorter waits do not need a bar [s].
 _AFTER = 1.0

@@ -18,40 +18,45 @@ from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
-from cdtool.workflows.benchmark.log_outcome import LogOutcome, OfOperation, WantedTraces, slowest_of, striking_of
+from cdtool.workflows.benchmark.log_outcome import (
+    LogOutcome,
+    LogRows,
+    OfOperation,
+    WantedTraces,
+    slowest_of,
+    striking_of,
+)
 from cdtool.workflows.contacts.impact_free import unchecked
-from cdtool.workflows.workers import Progress, in_order
+from cdtool.workflows.execution.workers import Progress, Workers, in_order
+from cdtool.workflows.runs import shown_path
 
 # The name of its group and the path of each log.
 Logs = Sequence[tuple[str, Path]]
 # Returns the outcome of the log of a group, or of each of its runs.
 ScoreLog = Callable[[str, Path, WantedTraces], list[LogOutcome]]
 
-# A process receives several logs at once: sending one costs as much as a twentieth of scoring it. At the beginning and
-# the end they are few, so that no process waits for the others.
-_MOST_TOGETHER = 8
-_SHARES = 4  # of what is left, per process
+# The most logs that a worker receives at once.
+_TOGETHER = 8
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """Consecutive logs from number `first` on, and the choice of traces as far as it is known."""
+    """One log, by its number, and the choice of traces as far as it is known."""
 
-    first: int
-    logs: Logs
+    log: int
+    group: str
+    path: Path
     choice: TraceChoice
 
 
 @dataclass(frozen=True)
 class _PieceScoring:
-    """Scores the logs of a piece one after the other."""
+    """Scores one log."""
 
     score: ScoreLog
 
-    def __call__(self, piece: _Piece) -> list[list[LogOutcome]]:
-        choice = piece.choice
-        numbered = enumerate(piece.logs, piece.first)
-        return [self.score(group, path, WantedTraces(log, choice)) for log, (group, path) in numbered]
+    def __call__(self, piece: _Piece) -> list[LogOutcome]:
+        return self.score(piece.group, piece.path, WantedTraces(piece.log, piece.choice.copy()))
 
 
 class Gathering:
@@ -86,25 +91,37 @@ class Gathering:
         # Time that all logs took [s].
         self.reading = self.detecting = 0.0
 
-    def score(self, score: ScoreLog, logs: Logs, jobs: int = 1, progress: Progress | None = None) -> None:
-        """Score the logs in `jobs` processes, and add their rows.
+    def score(
+        self, score: ScoreLog, logs: Logs, workers: Workers | None = None, progress: Progress | None = None
+    ) -> None:
+        """Score the logs, and add their rows; a log that ends its workers is left out with the reason.
 
         Raises ConfigurationError if the same log, under any name, was learned from or given twice.
         """
-        sizes = list(_sizes(len(logs), jobs))
-        pieces = in_order(_PieceScoring(score), self._pieces(logs, sizes), len(sizes), jobs)
-        for log, outcomes in enumerate(of_log for piece in pieces for of_log in piece):
+        scored = in_order(
+            _PieceScoring(score),
+            self._pieces(logs),
+            len(logs),
+            workers,
+            progress=progress,
+            of_lost=self._lost,
+            together=_TOGETHER,
+        )
+        for log, outcomes in enumerate(scored):
             for outcome in outcomes:
                 self._add(log, logs[log][0], outcome)
-            if progress:
-                progress(log + 1, len(logs))
 
-    def _pieces(self, logs: Logs, sizes: Sequence[int]) -> Iterator[_Piece]:
-        first = 0
-        for size in sizes:
-            # Known now: more traces are made than are kept at the logs' turn, never fewer.
-            yield _Piece(first, logs[first : first + size], self._choice.copy())
-            first += size
+    def _pieces(self, logs: Logs) -> Iterator[_Piece]:
+        # Known now: more traces are made than are kept at the logs' turn, never fewer. Those of a batch share a choice.
+        choice = self._choice.copy()
+        for log, (group, path) in enumerate(logs):
+            if choice.offered != self._choice.offered:
+                choice = self._choice.copy()
+            yield _Piece(log, group, path, choice)
+
+    def _lost(self, piece: _Piece, reason: str) -> list[LogOutcome]:
+        left_out = Skipped(shown_path(piece.path, self.setup.path.parent), reason)
+        return [LogOutcome(LogRows(None, skipped=(left_out,)))]
 
     def _add(self, log: int, group: str, outcome: LogOutcome) -> None:
         self.reading += outcome.reading
@@ -206,12 +223,3 @@ class Gathering:
                 "which is used for learning",
                 "use a recording either in [learn] or for scoring",
             )
-
-
-def _sizes(count: int, jobs: int) -> Iterator[int]:
-    """Yield the numbers of logs of the pieces in which `count` logs are scored."""
-    done = 0
-    while done < count:
-        size = max(1, min(_MOST_TOGETHER, min(done, count - done) // (_SHARES * jobs))) if jobs > 1 else 1
-        yield size
-        done += size

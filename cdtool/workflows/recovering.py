@@ -15,7 +15,7 @@ from cdtool.findings import Finding
 if TYPE_CHECKING:
     from cdtool.formats.mcap.container.clean_file import CleanFile
     from cdtool.formats.mcap.container.log import Log
-    from cdtool.workflows.workers import Progress
+    from cdtool.workflows.execution.workers import Progress
 
 _PIECE = 1 << 20
 _RECORD = "cdtool.recovered"

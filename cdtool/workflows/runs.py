@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
 
 from cdtool.dynamics import Machine
@@ -21,8 +21,8 @@ from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
+from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.log_checks.log_findings import log_warnings
-from cdtool.workflows.workers import Progress, in_order
 
 
 @dataclass(frozen=True)
@@ -176,6 +176,11 @@ class _AsLogged:
             return fault
 
 
+def _not_read(path: Path, reason: str) -> RecordingError:
+    """Return the error of a log that ended its workers."""
+    return RecordingError(f"{path}: {reason}")
+
+
 def _with_channels(path: Path, recording: Recording) -> Recording:
     if not recording.channels:
         raise RecordingError(f"{path}: no channel is mapped", "add [channels] to the machine file")
@@ -192,7 +197,7 @@ class RunReading:
     """How impact-free logs are read: cut by `operations`, contacts refused by the `onset` rule, named below `base`.
 
     `part` returns the part of a log that is learned from and the contacts in it; None: the whole log. `scored` are the
-    logs and runs that are also scored, each by what is learned from the others. `jobs` logs are read in parallel;
+    logs and runs that are also scored, each by what is learned from the others. `workers` read the logs;
     `progress` is called after each.
     """
 
@@ -202,7 +207,7 @@ class RunReading:
     base: Path | None = None
     part: PartOfLog | None = None
     scored: Callable[[Path], bool] | None = None
-    jobs: int = 1
+    workers: Workers = field(default_factory=Workers)
     progress: Progress | None = None
 
 
@@ -215,7 +220,7 @@ def load_runs(
     shows a contact. Values that no sensor can measure are masked: those outside the plausible `ranges`, which are
     learned from all these logs if none are given.
     """
-    rule, base, jobs = reading.onset or OnsetRule(), reading.base, reading.jobs
+    rule, base = reading.onset or OnsetRule(), reading.base
     paths, repeated = _each_once(paths)
     operations: list[Operation] = []
     skipped = [Skipped(shown_path(path, base), "given more than once, used once") for path in repeated]
@@ -224,7 +229,8 @@ def load_runs(
     without: list[tuple[str, Finding]] = []
 
     cut = RunCut.of(reading.operations)
-    logs = list(in_order(_AsLogged(machine_file, cut), paths, len(paths), jobs, reading.progress))
+    read = _AsLogged(machine_file, cut)
+    logs = list(in_order(read, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_not_read))
     logged: list[tuple[Path, Path, LoggedRecording | CdtoolError]] = []  # as listed, the log or its run
     for path, log in zip(paths, logs, strict=True):
         if isinstance(log, CdtoolError):

@@ -29,9 +29,9 @@ from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchm
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Scored, score_runs
+from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import shown_path
-from cdtool.workflows.workers import Progress
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
@@ -97,10 +97,10 @@ def score(
     >>> [(row.group, row.detected, row.missed, row.false_alarms) for row in scored.evaluated.summaries]
     [('stiff', 4, 0, 0), ('soft', 2, 1, 0), ('holdout', 0, 0, 1)]
     """
-    given = read_triggers(Path(triggers))
+    given, workers = read_triggers(Path(triggers)), Workers(jobs)
     names = tuple(given.rows)
     setup = read_benchmark_file(benchmark, learning=False, also_known=names)
-    setup, measured = with_synchronisation(setup, jobs)
+    setup, measured = with_synchronisation(setup, workers)
     base = setup.path.parent
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     runs = setup.has_runs
@@ -114,7 +114,7 @@ def score(
         if listed_only:
             work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
     scoring = _TriggerScoring(setup, given.path, said, clock, listed_only)
-    gathered.score(scoring, work, jobs, progress)
+    gathered.score(scoring, work, workers, progress)
     if runs:
         gathered.skipped += _without_run(said, known, gathered.scored)
     results = gathered.results(_provenance(setup, given, clock))

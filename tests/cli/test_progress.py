@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from cdtool.cli.console import progress
-from cdtool.workflows.workers import in_order
+from cdtool.workflows.execution.workers import Workers, in_order
 from tests.cli.test_late_progress import terminal
 
 REMEMBERED: list[str] = []
@@ -39,6 +39,6 @@ def test_processes_are_forked_on_a_terminal_too(monkeypatch):
     with progress("benchmark") as advance:
         assert threading.active_count() == threads
         monkeypatch.setattr(sys.modules[__name__], "REMEMBERED", ["by a fork of this process"])
-        seen = list(in_order(remembered, range(6), 6, 2, advance))
+        seen = list(in_order(remembered, range(6), 6, Workers(2), progress=advance))
     assert seen == [["by a fork of this process"]] * 6
     assert "6/6" in stderr.text

@@ -65,6 +65,11 @@ class TraceChoice:
         why |= dict.fromkeys(self._sampled, "evenly sampled from all") | self._striking
         return dict(sorted(why.items()))
 
+    @property
+    def offered(self) -> int:
+        """Return how many operations were offered."""
+        return self._taken
+
     def copy(self) -> TraceChoice:
         """Return a choice that continues alone."""
         return replace(

@@ -39,11 +39,11 @@ from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
+from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.signature.normal_runs import NormalsWithout, normals_for
 from cdtool.workflows.signature.threshold_settings import set_by_hand
-from cdtool.workflows.workers import Progress
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ def benchmark(
     detectors: Sequence[str] = (),
     false_alarm_budget: str | None = None,
     jobs: int = 1,
+    workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Benchmark:
     """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
@@ -82,6 +83,8 @@ def benchmark(
         As "1/1000op" or "0.1/h": sets each detector's safety factor on the runs learned from.
     jobs : int, optional
         Number of logs processed at a time; the results do not depend on it.
+    workers : Workers, optional
+        In place of `jobs`: also the longest time for a log, and how often one that ended its worker is tried again.
     progress : callable, optional
         Called after each log with the number done and the total.
 
@@ -110,7 +113,7 @@ def benchmark(
     [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
-    limits = len(setup.limits)
+    limits, workers = len(setup.limits), workers or Workers(jobs)
     setup = with_detectors(setup, detectors) if detectors else setup
     setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget is not None else setup
     refuse_limits_by_hand(setup)
@@ -118,8 +121,8 @@ def benchmark(
     used = [machine_file.detector(name) for name in setup.detectors]
     compile_loaded()
     begin = perf_counter()
-    setup, measured = with_synchronisation(setup, jobs)
-    learn = load_runs(setup.learn, machine_file, setup.run_reading(jobs))
+    setup, measured = with_synchronisation(setup, workers)
+    learn = load_runs(setup.learn, machine_file, setup.run_reading(workers))
     seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
     left_out: list[RecordingFinding] = []
     if list(detectors) == ["all"]:
@@ -143,7 +146,7 @@ def benchmark(
     thresholds = ThresholdsByLog.of(setup, learned)
     runs = learn.operations if setup.both else ()
     scoring = _LogScoring(setup, tuple(used), thresholds, learned.unusable, factors, learn.ranges, normals, runs)
-    gathered.score(scoring, work, jobs, progress)
+    gathered.score(scoring, work, workers, progress)
     seconds = {"reading": seconds["reading"] + gathered.reading, "detecting": seconds["detecting"] + gathered.detecting}
     gathered.skipped += _labels_without_run(setup, gathered.scored)
     provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))

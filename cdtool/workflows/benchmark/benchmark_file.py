@@ -30,6 +30,7 @@ from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.named_logs import LogsOf, labels_of, named_logs
 from cdtool.workflows.runs import RunReading, shown_path
 from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
@@ -138,7 +139,7 @@ class BenchmarkFile:
     def _in_words(self, sections: Mapping[Path, LogSection]) -> dict[str, str]:
         return {shown_path(path, self.path.parent): str(section) for path, section in sections.items()}
 
-    def run_reading(self, jobs: int = 1) -> RunReading:
+    def run_reading(self, workers: Workers | None = None) -> RunReading:
         """Return how the logs to learn from are read."""
         rules = ScoringRules(self.onset, self.window, self.labels, self.synchronisation, self.mass_before_cell)
         part = PartToLearnFrom(rules, self.learned_sections, self.guard)
@@ -149,7 +150,7 @@ class BenchmarkFile:
             base=self.path.parent,
             part=part if needed else None,
             scored=self.is_scored_too if self.both else None,
-            jobs=jobs,
+            workers=workers or Workers(),
         )
 
     def is_scored_too(self, learned: Path) -> bool:

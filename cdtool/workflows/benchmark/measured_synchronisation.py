@@ -19,8 +19,8 @@ from cdtool.operations import RunCut
 from cdtool.plain_text import counted
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.contacts.true_contacts import any_contacts
+from cdtool.workflows.execution.workers import Workers, in_order
 from cdtool.workflows.runs import named_on_load_side, runs_of
-from cdtool.workflows.workers import in_order
 
 if TYPE_CHECKING:
     from cdtool.evaluation.synchronisation.latency import ChannelLatency
@@ -66,7 +66,9 @@ class _LogAudit:
         return audited
 
 
-def with_synchronisation(setup: BenchmarkFile, jobs: int = 1) -> tuple[BenchmarkFile, list[RecordingFinding]]:
+def with_synchronisation(
+    setup: BenchmarkFile, workers: Workers | None = None
+) -> tuple[BenchmarkFile, list[RecordingFinding]]:
     """Return the benchmark with the measured synchronisation, and the finding that says so; unchanged if it is stated.
 
     The synchronisation is the largest offset that the load cell may have in any contact: the measured one at the
@@ -77,7 +79,8 @@ def with_synchronisation(setup: BenchmarkFile, jobs: int = 1) -> tuple[Benchmark
     from cdtool.workflows.log_checks.synchronisation import latency_findings
 
     work = [(group, path) for group, item in setup.impacts.items() if group != HOLDOUT for path in item.logs]
-    audited = [item for log in in_order(_LogAudit(setup), work, len(work), jobs) for item in log]
+    audits = in_order(_LogAudit(setup), work, len(work), workers, of_lost=_not_audited)
+    audited = [item for log in audits for item in log]
     found = _of_all(audited)
     if found is None or not found.assessable:
         why = found.reason if found else f"none of {counted(len(work), 'log')} has a contact that its load cell shows"
@@ -93,6 +96,11 @@ def with_synchronisation(setup: BenchmarkFile, jobs: int = 1) -> tuple[Benchmark
     fact = MeasuredSynchronisation(most, shown.fact.sentence())
     finding = RecordingFinding.of(str(setup.path), Finding(fact, "force", "note"))
     return replace(setup, synchronisation=most), [finding]
+
+
+def _not_audited(*_: object) -> list[_Audited]:
+    """Return the audit of a log that ended its workers: it is left out with the reason when it is scored."""
+    return []
 
 
 def _of_all(audited: Sequence[_Audited]) -> ChannelLatency | None:

@@ -30,7 +30,7 @@ from cdtool.workflows.convert.section_rows import Rows, SectionRows
 from cdtool.workflows.log_rows import LogRows
 
 if TYPE_CHECKING:
-    from cdtool.workflows.workers import Progress
+    from cdtool.workflows.execution.workers import Progress
 
 _WRITERS = {
     ".csv": "cdtool.formats.csv_writing:write_csv_table",

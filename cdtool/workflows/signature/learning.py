@@ -20,13 +20,13 @@ from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import PartOfLog, RunReading, check_joints, load_runs
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.signature.normal_runs import normal_motions
 from cdtool.workflows.signature.threshold_settings import set_by_hand
-from cdtool.workflows.workers import Progress
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,9 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     instance = machine_file.detector(options.detector)
     paths = [Path(log) for log in logs]
     part = _part(paths, options)
-    reading = RunReading(operations, onset=options.onset, part=part, jobs=options.jobs, progress=options.progress)
+    reading = RunReading(
+        operations, onset=options.onset, part=part, workers=Workers(options.jobs), progress=options.progress
+    )
     runs = load_runs(paths, machine_file, reading)
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
     fit = fitting(wanted)

@@ -26,12 +26,12 @@ from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
 from cdtool.thresholds.signature import Signature
+from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import RunReading, Runs, load_runs
 from cdtool.workflows.signature.fitting import Pair, signals_of
 from cdtool.workflows.signature.learning import learned_run
 from cdtool.workflows.signature.normal_runs import with_operation
-from cdtool.workflows.workers import Progress
 
 # False-alarm probability per operation that the runs must demonstrate, and the smallest one that can be required.
 TARGET, LEAST_TARGET = 1e-3, 1e-9
@@ -127,7 +127,7 @@ class SeasonOptions:
     def runs(self, file: SignatureFile, machine_file: MachineFile) -> Runs:
         """Read the logs for a signature file; SignatureError if they are cut differently than for learning."""
         operations = _cut(file, self.operations)
-        reading = RunReading(operations, onset=self.onset, jobs=self.jobs, progress=self.progress)
+        reading = RunReading(operations, onset=self.onset, workers=Workers(self.jobs), progress=self.progress)
         return load_runs([Path(log) for log in self.logs], machine_file, reading, file.plausible)
 
 

@@ -5,15 +5,13 @@ import threading
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import cdtool
 from cdtool.evaluation.results_file import to_json
 from cdtool.evaluation.traces.file import encode_traces
 from cdtool.thresholds import THRESHOLDS
 from cdtool.workflows import gathering, runs
-from cdtool.workflows.workers import in_order
+from cdtool.workflows.execution.workers import Workers, in_order
 
 FILE = """machine = "machine.toml"
 threshold = "{threshold}"
@@ -56,7 +54,7 @@ def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, threshold, mon
     alone = run(gate, threshold)
     sent = []
 
-    def by_pickles(work, items, total, jobs=1, progress=None):
+    def by_pickles(work, items, *_, **__):
         work = pickle.loads(pickle.dumps(work))
         for item in items:
             result = pickle.dumps(work(pickle.loads(pickle.dumps(item))))
@@ -67,20 +65,6 @@ def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, threshold, mon
     monkeypatch.setattr(runs, "in_order", by_pickles)
     assert run(gate, threshold) == alone
     assert len(sent) == 20
-    monkeypatch.setattr(gathering, "_sizes", lambda count, _: [1, 3, 2, count - 6])
-    assert run(gate, threshold) == alone
-    assert len(sent) == 20 + 11 + 4
-
-
-@given(st.integers(0, 3000), st.integers(1, 64))
-def test_the_pieces_of_the_work_are_small_at_its_beginning_and_its_end(count, jobs):
-    sizes = list(gathering._sizes(count, jobs))
-    assert sum(sizes) == count and all(1 <= size <= 8 for size in sizes)
-    assert max(sizes, default=1) == 1 or count >= 16 * jobs > 16
-    done = 0
-    for size in sizes:
-        assert size == 1 or size * 4 * jobs <= min(done, count - done), "other processes have as much to do"
-        done += size
 
 
 def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
@@ -136,6 +120,6 @@ def test_workers_that_read_at_the_same_time_read_the_same_bits(tmp_path, file_fo
     assert len(set(alone)) == 4
     for _ in range(3):
         differing = [
-            log for log, one, many in zip(logs, alone, in_order(bits, logs, 72, 4), strict=True) if one != many
+            log for log, one, many in zip(logs, alone, in_order(bits, logs, 72, Workers(4)), strict=True) if one != many
         ]
         assert not differing

@@ -18,9 +18,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool import errors
-from cdtool.errors import CdtoolError, RecordingError, WorkerError
+from cdtool.errors import CdtoolError, RecordingError
 from cdtool.recording import Recording, Series
-from cdtool.workflows.workers import in_order
+from cdtool.workflows.execution.workers import Workers, in_order
 
 
 def doubled(number):
@@ -38,23 +38,19 @@ def refused(number):
     return number
 
 
-def killed(number):
-    if number == 3:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number
-
-
 @pytest.mark.parametrize("jobs", [1, 2, 3, 20])
 def test_results_come_in_the_order_of_the_items_whatever_the_number_of_jobs(jobs):
     shown = []
-    made = list(in_order(doubled, range(13), 13, jobs, lambda done, total: shown.append((done, total))))
+    made = list(
+        in_order(doubled, range(13), 13, Workers(jobs), progress=lambda done, total: shown.append((done, total)))
+    )
     assert made == [2 * number for number in range(13)]
     assert shown == [(number, 13) for number in range(1, 14)]
 
 
 def test_no_items_need_no_process():
-    assert list(in_order(own_process, [], 0, 4)) == []
-    assert list(in_order(own_process, [1, 2], 2, 4)) == [os.getpid(), os.getpid()]
+    assert list(in_order(own_process, [], 0, Workers(4))) == []
+    assert list(in_order(own_process, [1, 2], 2, Workers(4))) == [os.getpid(), os.getpid()]
 
 
 @pytest.mark.parametrize("beside", [0, 1])
@@ -64,11 +60,10 @@ def test_work_is_done_in_other_processes_with_and_without_threads_in_this_one(be
     for thread in threads:
         thread.start()
     try:
-        first, *others = in_order(own_process, range(12), 12, 2)
+        made = list(in_order(own_process, range(12), 12, Workers(2)))
     finally:
         stop.set()
-    assert first == os.getpid(), "it imports and compiles what the others then share"
-    assert os.getpid() not in others and 1 <= len(set(others)) <= 2
+    assert os.getpid() not in made and 1 <= len(set(made)) <= 2
 
 
 def frozen_objects(_):
@@ -78,7 +73,7 @@ def frozen_objects(_):
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.skipif(sys.platform != "linux", reason="fork"))])
 def test_objects_made_before_the_work_are_not_searched_for_garbage_during_it(jobs):
     assert gc.get_freeze_count() == 0
-    assert all(count > 10_000 for count in in_order(frozen_objects, range(6), 6, jobs))
+    assert all(count > 10_000 for count in in_order(frozen_objects, range(6), 6, Workers(jobs)))
     assert gc.get_freeze_count() == 0
     results = in_order(frozen_objects, range(6), 6)
     next(results)
@@ -98,7 +93,7 @@ def test_objects_that_the_caller_has_left_out_of_garbage_collection_stay_left_ou
 
 def test_items_are_taken_when_their_work_begins_not_all_at_once():
     taken = []
-    results = in_order(doubled, (taken.append(number) or number for number in range(100)), 100, 2)
+    results = in_order(doubled, (taken.append(number) or number for number in range(100)), 100, Workers(2))
     for number in range(10):
         assert next(results) == 2 * number
     assert len(taken) <= 10 + 2 * 2
@@ -106,7 +101,7 @@ def test_items_are_taken_when_their_work_begins_not_all_at_once():
 
 
 def test_an_error_of_the_work_arrives_as_it_was_raised():
-    results = in_order(refused, range(100), 100, 2)
+    results = in_order(refused, range(100), 100, Workers(2))
     assert [next(results) for _ in range(5)] == [0, 1, 2, 3, 4]
     with pytest.raises(RecordingError) as raised:
         next(results)
@@ -115,21 +110,6 @@ def test_an_error_of_the_work_arrives_as_it_was_raised():
         "check the file",
         "torque",
     )
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-def test_a_killed_process_is_an_error_with_a_hint_at_memory():
-    with pytest.raises(WorkerError) as raised:
-        list(in_order(killed, range(8), 8, 2))
-    assert "--jobs" in raised.value.hint
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-def test_a_process_killed_while_results_are_used_is_the_same_error():
-    results = in_order(killed, range(20), 20, 2)
-    with pytest.raises(WorkerError):
-        for _ in results:
-            time.sleep(0.1)  # the pool learns of the end before the next item is submitted
 
 
 def public_errors():
@@ -162,16 +142,14 @@ ENDLESS = r"""
 import os, signal, sys, time
 sys.path.insert(0, sys.argv[1])
 signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored by programs that a shell starts in the background
-from cdtool.workflows.workers import in_order
+from cdtool.workflows.execution.workers import Workers, in_order
 
 def work(number):
-    if not number:
-        return
     os.write(1, b"%d\n" % os.getpid())
     time.sleep(60.0)
 
 if __name__ == "__main__":
-    list(in_order(work, range(4), 4, 2))
+    list(in_order(work, range(4), 4, Workers(2)))
 """
 
 
@@ -188,7 +166,7 @@ def is_running(process):
 def test_no_process_is_left_when_the_first_one_is_interrupted_or_killed(how, tmp_path):
     script = tmp_path / "endless.py"
     script.write_text(ENDLESS, encoding="utf-8")
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     command = [sys.executable, str(script), str(root)]
     first = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     try:

@@ -1,0 +1,1 @@
+"""How many pieces of work are done: in this process or in several, in order and once each."""

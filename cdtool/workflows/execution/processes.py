@@ -1,0 +1,126 @@
+"""Processes of this machine that do pieces of work, and which piece is to blame if one of them ends.
+
+On Linux they are forked from this process, so that they share its modules and compiled kernels; elsewhere, and if this
+process has several threads, they are new processes of Python.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError, Future
+from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+from contextlib import contextmanager, suppress
+from multiprocessing import active_children, get_context
+from multiprocessing.context import BaseContext
+from multiprocessing.process import BaseProcess
+from time import monotonic_ns
+from typing import Any
+
+from cdtool.errors import WorkerError
+from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do
+
+# So many times in a row processes may end although none of them has begun a piece.
+_MOST_RESTARTS = 3
+_JOINED_WITHIN = 10.0
+
+
+class Processes:
+    """A `ProcessPoolExecutor` for one kind of work that is replaced when one of its processes ends.
+
+    `size` processes do the work; a piece that takes longer than `limit` [s] ends its process.
+    """
+
+    broken: tuple[type[BaseException], ...] = (BrokenProcessPool, CancelledError)
+    is_exact = True
+
+    def __init__(self, work: Callable[[Any], Any], size: int, limit: float | None) -> None:
+        self.size = size
+        self._work = work
+        self._limit = limit
+        self._others = set(active_children())
+        self._restarts = 0
+        self._start()
+
+    def _start(self) -> None:
+        context = _context()
+        self._claims: Any = context.RawArray("q", CLAIM * self.size)
+        free: Any = context.SimpleQueue()
+        for number in range(self.size):
+            free.put(number)
+        self._children: set[BaseProcess] = set()
+        self._pool = ProcessPoolExecutor(
+            self.size, context, initializer=begin, initargs=(self._work, self._claims, free, self._limit)
+        )
+
+    def submit(self, batch: Sequence[tuple[int, Any]]) -> Future[list[Any]]:
+        """Return the future results of some numbered pieces; a pool whose process has ended gives a failed one."""
+        try:
+            future = self._pool.submit(do, batch)
+        except BrokenProcessPool as fault:
+            future = Future()
+            future.set_exception(fault)
+        if len(self._children) < self.size:
+            self._children |= set(active_children()) - self._others
+        return future
+
+    def blamed(self, lost: Sequence[tuple[int, Any]]) -> dict[int, str]:  # noqa: ARG002  claims tell it
+        """Return the numbers of the pieces that ended their processes, with the reasons, and start new processes.
+
+        Raises WorkerError if the processes end again and again before they have begun a piece.
+        """
+        now = monotonic_ns()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+        status: dict[int, int | None] = {}
+        for child in self._children:
+            child.join(_JOINED_WITHIN)
+            status[child.pid or 0] = child.exitcode
+        found: dict[int, str] = {}
+        for first in range(0, len(self._claims), CLAIM):
+            process, number, since = self._claims[first : first + CLAIM]
+            code = status.get(process, 1)
+            if number and code not in (None, 0, TOLD_TO_END, -signal.SIGTERM):
+                found[number - 1] = self._reason(code, 1e-9 * (now - since))
+        self._restarts = 0 if found else self._restarts + 1
+        if self._restarts > _MOST_RESTARTS:
+            raise WorkerError(
+                "worker processes end before they begin their work", "with too little memory, use a smaller --jobs"
+            )
+        self._start()
+        return found
+
+    def _reason(self, code: int, seconds: float) -> str:
+        if self._limit is not None and code == 1 and seconds >= self._limit:
+            return f"took longer than {self._limit:g} s (--timeout)"
+        if code >= 0:
+            return f"its worker process ended with exit status {code}"
+        with suppress(ValueError):
+            name = signal.Signals(-code).name
+            if name == "SIGKILL":
+                return "its worker process was killed (SIGKILL): mostly because the memory was not enough"
+            return f"its worker process crashed ({name})"
+        return f"its worker process ended by signal {-code}"
+
+    def progressed(self) -> None:
+        """Note that a piece was done: the processes work."""
+        self._restarts = 0
+
+    @contextmanager
+    def __call__(self) -> Iterator[Processes]:
+        """End the processes after the block; if it ends early, without waiting for the work that has begun."""
+        try:
+            yield self
+        except BaseException:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            for child in set(active_children()) - self._others:
+                child.terminate()
+            raise
+        self._pool.shutdown(wait=True)
+
+
+def _context() -> BaseContext:
+    """Return how processes are started: a fork with other threads could keep a lock for ever."""
+    alone = threading.active_count() == 1
+    return get_context("fork" if sys.platform == "linux" and alone else "spawn")

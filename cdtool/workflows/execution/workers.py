@@ -1,0 +1,283 @@
+"""Work on many independent items, in this process or in several, with the results in the order of the items.
+
+Reading and judging a log hold Python's interpreter lock most of the time, so threads would not save time: jobs are
+processes. They receive the work once, and the items in batches: sending one costs
+as much as a twentieth of scoring a log. An item that ends its worker or takes too long is tried again in another
+worker; the items that were under way beside it are repeated without being counted.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, wait
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, Protocol, TypeVar
+
+from cdtool.errors import UsageError, WorkerError
+from cdtool.workflows.execution.in_worker import Failed, keep_freed_memory
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+# Called after each piece of work with the amount done and the total.
+Progress = Callable[[int, int], None]
+# Returns what is made of an item that could not be worked on, given the reason.
+OfLost = Callable[[Any, str], Any]
+
+_AHEAD = 2  # batches per worker
+_SHARES = 4  # of what is left, per worker
+
+
+@dataclass(frozen=True)
+class Workers:
+    """How work is done: in `jobs` processes.
+
+    An item that takes longer than `timeout` [s], or ends its worker, is tried `retries` times more. With one job and no
+    timeout the work is done in this process, which an item can end.
+    """
+
+    jobs: int = 1
+    timeout: float | None = None
+    retries: int = 1
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1:
+            raise UsageError(f"jobs is {self.jobs}", "give at least 1")
+        if self.timeout is not None and not 0.0 < self.timeout < 1e6:
+            raise UsageError(f"timeout is {self.timeout:g}", "give a time above 0 s, or none")
+        if self.retries < 0:
+            raise UsageError(f"retries is {self.retries}", "give 0 or more")
+
+
+class Pool(Protocol):
+    """The contract of a pool of workers for one kind of work; called, it is a context in which it works."""
+
+    # Exceptions of futures whose worker has ended.
+    broken: tuple[type[BaseException], ...]
+    # Number of items that it works on at a time.
+    size: int
+    # Whether `blamed` names exactly the items that ended their workers, not also others on the same worker.
+    is_exact: bool
+
+    def submit(self, batch: Sequence[tuple[int, Any]]) -> Future[list[Any]]:
+        """Return the future results of some numbered items."""
+        ...
+
+    def blamed(self, lost: Sequence[tuple[int, Any]]) -> dict[int, str]:
+        """After an exception in `broken` for the `lost` items: return those to blame, and why; make the pool usable."""
+        ...
+
+    def progressed(self) -> None:
+        """Note that an item was done."""
+        ...
+
+    def __call__(self) -> AbstractContextManager[Any]:
+        """Return the context."""
+        ...
+
+
+def in_order(
+    work: Callable[[Item], Made],
+    items: Iterable[Item],
+    total: int,
+    workers: Workers | None = None,
+    *,
+    progress: Progress | None = None,
+    of_lost: OfLost | None = None,
+    together: int = 1,
+) -> Iterator[Made]:
+    """Yield `work` of each item, in order, whatever the workers.
+
+    With several workers, `work` and the items must be picklable. An item is taken from `items` when its work begins, a
+    few batches before its result is yielded, so that waiting items and results need little memory.
+
+    Parameters
+    ----------
+    work : callable
+        Returns the result of one item.
+    items : iterable
+        The items.
+    total : int
+        Their number.
+    workers : Workers, optional
+        Who does the work; this process if it is None, or if there are few items.
+    progress : callable, optional
+        Called after each item with the number done and the total.
+    of_lost : callable, optional
+        Returns the result of an item that ended its workers or took too long, given the item and the reason.
+    together : int, optional
+        The most items of a batch. At the beginning and at the end batches are smaller, so that no worker waits.
+
+    Yields
+    ------
+    object
+        The result of each item.
+
+    Raises
+    ------
+    WorkerError
+        Without `of_lost`: an item ended its workers.
+
+    Examples
+    --------
+    >>> list(in_order(abs, [-1, 2, -3], total=3))
+    [1, 2, 3]
+    """
+    workers = workers or Workers()
+    if total > 1:
+        keep_freed_memory()
+    made = _made(work, items, total, workers, of_lost, together)
+    with _without_earlier_garbage():
+        for number, result in enumerate(made, 1):
+            yield result
+            if progress:
+                progress(number, total)
+
+
+def _made(
+    work: Callable[[Item], Made],
+    items: Iterable[Item],
+    total: int,
+    workers: Workers,
+    of_lost: OfLost | None,
+    together: int,
+) -> Iterator[Made]:
+    if not total or (workers.timeout is None and min(workers.jobs, total - 1) <= 1):
+        return map(work, items)
+    from cdtool.workflows.execution.processes import Processes
+
+    pool = Processes(work, min(workers.jobs, total), workers.timeout)
+    return _Ordered(pool, total, workers.retries, of_lost, together).results(items)
+
+
+@contextmanager
+def _without_earlier_garbage() -> Iterator[None]:
+    """Leave objects that were made before the block out of garbage collection, unless the caller does so.
+
+    There are more than 100,000, most of them of modules and compiled kernels. To search them takes 5 % of the CPU time
+    of 200 logs, and in a forked worker it copies their memory.
+    """
+    if gc.get_freeze_count():
+        yield
+        return
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
+@dataclass
+class _Batch:
+    """Consecutive numbered items, and their results once they are there; with neither, an item to be done alone."""
+
+    items: Sequence[tuple[int, Any]]
+    future: Future[list[Any]] | None = None
+    results: list[Any] | None = None
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether its workers have ended before its results."""
+        return self.future is not None and self.future.done() and bool(self.future.exception())
+
+
+class _Ordered:
+    """Results of a pool in the order of the items, whichever of them end their workers."""
+
+    def __init__(self, pool: Pool, total: int, retries: int, of_lost: OfLost | None, together: int) -> None:
+        self.pool, self.total, self.retries, self.of_lost, self.together = pool, total, retries, of_lost, together
+        self._ahead: deque[_Batch] = deque()
+        self._tried: Counter[int] = Counter()
+
+    def results(self, items: Iterable[Any]) -> Iterator[Any]:
+        """Yield the result of each item."""
+        numbered = enumerate(items)
+        with self.pool():
+            yielded = 0
+            self._fill(numbered, yielded)
+            while self._ahead:
+                results = self._results_of_first()
+                if results is None:
+                    continue
+                self._ahead.popleft()
+                yield from results
+                yielded += len(results)
+                self._fill(numbered, yielded)
+
+    def _fill(self, numbered: Iterator[tuple[int, Any]], yielded: int) -> None:
+        """Submit batches until enough are under way."""
+        while len(self._ahead) < _AHEAD * self.pool.size:
+            taken = yielded + sum(len(batch.items) for batch in self._ahead)
+            batch = list(islice(numbered, self._size(taken)))
+            if not batch:
+                return
+            self._ahead.append(_Batch(batch, self.pool.submit(batch)))
+
+    def _size(self, taken: int) -> int:
+        most = min(taken, self.total - taken) // (_SHARES * self.pool.size)
+        return max(1, min(self.together, most))
+
+    def _results_of_first(self) -> list[Any] | None:
+        """Return the results of the first batch; None if some of it is repeated now."""
+        first = self._ahead[0]
+        is_alone = first.future is None and first.results is None
+        if is_alone:
+            wait([batch.future for batch in self._ahead if batch.future is not None])
+            first.future = self.pool.submit(first.items)
+        if first.results is None:
+            assert first.future is not None, "a batch without results is under way"
+            try:
+                first.results = first.future.result()
+            except self.pool.broken:
+                self._repeat(self.pool.blamed(first.items), is_alone)
+                return None
+            self.pool.progressed()
+        failed = {
+            number: result.reason
+            for (number, _), result in zip(first.items, first.results, strict=True)
+            if isinstance(result, Failed)
+        }
+        if not failed:
+            return first.results
+        self._ahead.popleft()
+        self._ahead.extendleft(reversed(self._divided(first, failed, is_counted=True)))
+        return None
+
+    def _repeat(self, blamed: dict[int, str], is_alone: bool) -> None:
+        """Submit again what was lost; the first batch, or one with an item that is blamed, is divided into items.
+
+        An item that was not alone is blamed without proof where workers do several at a time.
+        """
+        is_counted = is_alone or self.pool.is_exact or self.retries > 0
+        ahead = [self._ahead.popleft() for _ in range(len(self._ahead))]
+        for place, batch in enumerate(ahead):
+            if not batch.is_lost:
+                self._ahead.append(batch)
+            elif not place or any(number in blamed for number, _ in batch.items):
+                self._ahead.extend(self._divided(batch, blamed, is_counted=is_counted))
+            else:
+                self._ahead.append(_Batch(batch.items, self.pool.submit(batch.items)))
+
+    def _divided(self, batch: _Batch, failed: dict[int, str], *, is_counted: bool) -> list[_Batch]:
+        """Return batches of one item each: done, lost, submitted again, or to be done alone if it failed before."""
+        single = []
+        for place, (number, item) in enumerate(batch.items):
+            alone = [(number, item)]
+            self._tried[number] += number in failed and is_counted
+            if number not in failed:
+                done = None if batch.results is None else [batch.results[place]]
+                single.append(_Batch(alone, None if done else self.pool.submit(alone), done))
+            elif self._tried[number] > self.retries:
+                single.append(_Batch(alone, results=[self._lost(item, number, failed[number])]))
+            else:
+                single.append(_Batch(alone))
+        return single
+
+    def _lost(self, item: Any, number: int, reason: str) -> Any:
+        tried = f"{reason}, in each of {self._tried[number]} attempts" if self._tried[number] > 1 else reason
+        if self.of_lost is None:
+            raise WorkerError(f"{item}: {tried}", "with too little memory, use a smaller --jobs")
+        return self.of_lost(item, tried)
