@@ -1,0 +1,185 @@
+"""Everything that determines the outcome of a log, and of a detector on it, as the keys of a store.
+
+A name is among it, since rows contain it, and so are the code and the content of every file read for the log; a path of
+the machine, the gains of other detectors and the rows that a label file has on other logs are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from cdtool.evaluation.truth.labels import Labels
+from cdtool.ingest.run_reading import split_run
+from cdtool.log_section import LogSection
+from cdtool.motion.applicable import HOLD
+from cdtool.plausible import PlausibleRanges
+from cdtool.recording import FloatArray
+from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.learned import Learned
+from cdtool.workflows.runs import shown_path
+from cdtool.workflows.store.digest import code_version, digest_of
+from cdtool.workflows.store.sources import SourceFile
+
+Sources = Sequence[SourceFile]
+
+
+@dataclass(frozen=True)
+class Determinants:
+    """What determines the outcomes of a benchmark's logs, given what was `learned` from its impact-free runs.
+
+    `taught` is the key of what was learned; `factors` are the safety factors of the sweep by detector.
+    """
+
+    setup: BenchmarkFile
+    learned: Learned
+    taught: str
+    factors: Mapping[str, FloatArray]
+
+    def log_key(self, group: str, path: Path, sources: Sources) -> str:
+        """Return the key of the rows of a log that do not depend on the detectors."""
+        return digest_of("log", self._common, *self._of_log(group, path), [item.digest for item in sources])
+
+    def detector_key(self, detector: str, path: Path, log_key: str) -> str:
+        """Return the key of the outcome of a detector on a log."""
+        return digest_of("detector", log_key, self._of_detector[detector], self._own_part(path))
+
+    def trace_key(self, path: Path, detector_keys: Sequence[str]) -> str:
+        """Return the key of the traces of a log, which explain alarms by what was learned."""
+        return digest_of("trace", list(detector_keys), self._normals, self._own_part(path))
+
+    def name(self, path: Path) -> str:
+        """Return the name of a log in results."""
+        return shown_path(path, self.setup.path.parent)
+
+    @cached_property
+    def _common(self) -> str:
+        return digest_of(code_version(), how_logs_are_read(self.setup), self.setup.watched)
+
+    def _of_log(self, group: str, path: Path) -> list[Any]:
+        setup, name = self.setup, self.name(path)
+        known = setup.impacts[group]
+        return [
+            name,
+            group,
+            group == HOLDOUT,
+            known.window,
+            self._profiles[group],
+            str(setup.sections.get(path, LogSection())),
+            setup.campaigns.get(path),
+            setup.points.get(path),
+            labels_of_log(setup, path),
+            self._ranges(name),
+        ]
+
+    @cached_property
+    def _profiles(self) -> dict[str, str]:
+        return {name: digest_of(group.force) for name, group in self.setup.impacts.items()}
+
+    @cached_property
+    def _range_digests(self) -> dict[int, str]:
+        return {}
+
+    def _ranges(self, name: str) -> str:
+        """Return the digest of the plausible ranges that a log is compared with; few are different."""
+        ranges: PlausibleRanges = self.learned.ranges.without(name)
+        if id(ranges) not in self._range_digests:
+            self._range_digests[id(ranges)] = digest_of(ranges)
+        return self._range_digests[id(ranges)]
+
+    @cached_property
+    def _of_detector(self) -> dict[str, str]:
+        setup = self.setup
+        hold = max(HOLD, *(group.window for group in setup.impacts.values()))
+        common = [rule_to_dict(setup.rule), setup.activation, setup.watched, hold]
+        return {
+            name: digest_of(
+                common,
+                setup.machine_file.detector(name),
+                [fitted_to_dict(setup.rule, item) for item in self.learned.thresholds.get(name, ())],
+                self.learned.unusable.get(name),
+                self.factors.get(name),
+            )
+            for name in setup.detectors
+        }
+
+    @cached_property
+    def _normals(self) -> str:
+        return digest_of([item.to_dict() for item in self.learned.normals.motions], str(self.learned.normals.absent))
+
+    def _own_part(self, path: Path) -> str:
+        """Return what determines the thresholds of a log that is learned from, too: all others; else empty."""
+        both = self.setup.both
+        if not both:
+            return ""
+        files = {split_run(log)[0] for log in both} if self.setup.has_runs else set(both)
+        own = split_run(path)[0] if self.setup.has_runs else path
+        return self.taught if own in files else ""
+
+
+def how_logs_are_read(setup: BenchmarkFile) -> list[Any]:
+    """Return the settings that determine how any log of a benchmark is read, cut and matched."""
+    machine_file = setup.machine_file
+    return [
+        machine_file.machine,
+        machine_file.columns,
+        machine_file.topics,
+        setup.operations,
+        setup.onset,
+        setup.synchronisation,
+        setup.mass_before_cell,
+    ]
+
+
+def labels_of_log(setup: BenchmarkFile, path: Path) -> list[Any] | None:
+    """Return what the label file says about a log, or about each of its runs; None without a label file."""
+    labels = setup.labels
+    if labels is None:
+        return None
+    name = shown_path(path, setup.path.parent)
+    if setup.has_runs:
+        file = shown_path(split_run(path)[0], setup.path.parent)
+        names = [item for item in labels.contacts if _file_of(item) in (file, PurePosixPath(file).name)]
+    else:
+        known = labels.name_of(name)
+        names = [] if known is None else [known]
+    return [labels.clock, labels.not_contacts, _rows(labels, names)]
+
+
+def _file_of(name: str) -> str:
+    return name.partition("#")[0]
+
+
+def _rows(labels: Labels, names: Sequence[str]) -> list[Any]:
+    return [[name, labels.contacts[name], labels.lines[name]] for name in names]
+
+
+def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources]) -> str:
+    """Return the key of what is learned from the impact-free runs of a benchmark."""
+    learn = [
+        [
+            shown_path(path, setup.path.parent),
+            str(setup.learned_sections.get(path, LogSection())),
+            labels_of_log(setup, path),
+            setup.is_scored_too(path) if setup.both else False,
+            [item.digest for item in sources[path]],
+        ]
+        for path in setup.learn
+    ]
+    return digest_of(
+        "learned",
+        code_version(),
+        how_logs_are_read(setup),
+        [[name, setup.machine_file.detector(name)] for name in setup.detectors],
+        rule_to_dict(setup.rule),
+        str(setup.budget),
+        replace(setup.activation),
+        setup.watched,
+        setup.guard,
+        setup.window,
+        learn,
+    )

@@ -1,0 +1,64 @@
+"""The digest of everything that determines an outcome: values of any frozen dataclasses, and the code itself."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+
+import cdtool
+
+# Rooms of the code that do not determine what a recording comes to.
+_ONLY_SHOWN = ("cli", "report", "simulation", "impact")
+
+
+def digest_of(*values: Any) -> str:
+    """Return the SHA-256 of values: numbers, texts, arrays, and collections and dataclasses of them."""
+    text = json.dumps([_plain(item) for item in values], separators=(",", ":"), sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON values that differ if it differs; a dataclass with the name of its class."""
+    if value is None or isinstance(value, str | int | float):
+        return value
+    if isinstance(value, np.ndarray):
+        content = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
+        return [str(value.dtype), list(value.shape), content]
+    if is_dataclass(value):
+        named = {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
+        return [f"{type(value).__module__}.{type(value).__qualname__}", named]
+    if isinstance(value, Mapping):
+        return {"mapping": [[_plain(key), _plain(item)] for key, item in value.items()]}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, set | frozenset):
+        return sorted(json.dumps(_plain(item), sort_keys=True) for item in value)
+    if isinstance(value, PurePath):
+        return value.as_posix()
+    return [type(value).__qualname__, _plain(value.value) if isinstance(value, Enum) else repr(value)]
+
+
+@cache
+def code_version() -> str:
+    """Return the digest of the code that determines outcomes, and of the libraries that it computes with."""
+    import numba
+    import scipy
+
+    from cdtool.registry import plugin_packages
+
+    digest = hashlib.sha256()
+    root = Path(cdtool.__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        if path.relative_to(root).parts[0] not in _ONLY_SHOWN:
+            digest.update(path.read_bytes())
+    libraries = {"numpy": np.__version__, "scipy": scipy.__version__, "numba": numba.__version__}
+    digest.update(json.dumps([libraries, plugin_packages()], sort_keys=True).encode())
+    return digest.hexdigest()

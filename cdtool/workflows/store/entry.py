@@ -1,0 +1,34 @@
+"""One entry of the store: what was computed, under the key of everything that determined it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from cdtool.workflows.store.sources import SourceFile
+
+Kind = Literal["log", "detector", "trace", "learned"]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What was computed for a recording: rows of the log, of one detector, its traces, or thresholds learned.
+
+    `key` is a SHA-256 in hexadecimal digits; `content` is JSON. `sources` are the files read for it, `seconds` the time
+    that it took, `failed` whether it is a reading error; `version` is that of the code.
+    """
+
+    key: str
+    kind: Kind
+    recording: str
+    detector: str
+    content: str
+    sources: tuple[SourceFile, ...] = ()
+    seconds: float = 0.0
+    failed: bool = False
+    version: str = ""
+
+    @property
+    def size(self) -> int:
+        """Return the size of the sources [bytes]."""
+        return sum(item.size for item in self.sources)

@@ -1,0 +1,97 @@
+"""The entries of a run that is under way: a line each in a file of its own, so that a killed run loses none.
+
+The file is locked while its writer lives. The next run takes over the entries of a journal whose writer has ended; a
+line that was not written to its end does not count.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import sys
+import weakref
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+from cdtool.workflows.store.encoding import decoded, encoded
+from cdtool.workflows.store.entry import Entry
+
+_SUFFIX = ".journal"
+
+
+class Journal:
+    """The journal of one run in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / f"{secrets.token_hex(8)}{_SUFFIX}"
+        self._file = self.path.open("xb", buffering=0)
+        _lock(self._file.fileno())
+        if hasattr(os, "register_at_fork"):  # the lock is to end with this process, not with the last worker
+            own = weakref.ref(self._file)
+            os.register_at_fork(after_in_child=lambda: _close(own()))
+
+    def add(self, entries: list[Entry]) -> None:
+        """Add entries; when it returns, they outlive this process."""
+        self._file.write(b"".join(map(_line, entries)))
+
+    def clear(self) -> None:
+        """Remove all entries: they are in a part of the store now."""
+        self._file.seek(0)
+        self._file.truncate()
+
+    def close(self) -> None:
+        """Remove the journal."""
+        self.path.unlink(missing_ok=True)
+        self._file.close()
+
+
+def _close(file: IO[bytes] | None) -> None:
+    if file is not None:
+        file.close()
+
+
+def left_behind(folder: Path) -> Iterator[tuple[Path, list[Entry]]]:
+    """Yield the journals of writers that have ended, locked until the next one is asked for, with their entries."""
+    for path in sorted(folder.glob(f"*{_SUFFIX}")):
+        with suppress(OSError), path.open("r+b") as file:
+            if not _lock(file.fileno()) or not path.exists():
+                continue
+            yield path, list(_entries(file.read()))
+
+
+def _line(entry: Entry) -> bytes:
+    text = encoded(entry, Entry).encode("utf-8", "surrogatepass")
+    return b"%08x %s\n" % (zlib.crc32(text), text)
+
+
+def _entries(content: bytes) -> Iterator[Entry]:
+    for line in content.split(b"\n"):
+        check, _, text = line.partition(b" ")
+        if check == b"%08x" % zlib.crc32(text):
+            with suppress(ValueError):
+                yield decoded(text.decode("utf-8", "surrogatepass"), Entry)
+
+
+def _lock(handle: int) -> bool:
+    """Lock a file for this process; return False if another one has locked it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        try:
+            os.lseek(handle, 1 << 40, os.SEEK_SET)
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        finally:
+            os.lseek(handle, 0, os.SEEK_SET)
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,274 @@
+"""The store: an append-only folder of Parquet files with what was computed, found by key.
+
+    store.json                what the folder is
+    parts/*.parquet           the entries, a row each; a file is complete or not there
+    runs/*.parquet            a file per run: which entries it used, how many it computed
+    *.journal                 entries of a run that is under way
+
+Several processes may write at the same time: each writes files of its own. An entry that two of them compute is there
+twice, which changes nothing.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import secrets
+import time
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.bounded_loading import read_bytes
+from cdtool.errors import ConfigurationError, UsageError
+from cdtool.files import write_bytes, write_text
+from cdtool.workflows.store.encoding import decoded, encoded
+from cdtool.workflows.store.entry import Entry
+from cdtool.workflows.store.journal import Journal, left_behind
+from cdtool.workflows.store.sources import SourceFile
+
+_KIND, _SCHEMA = "cdtool store", 1
+_MARK = "store.json"
+# A part is written when it has so many entries, or characters of content.
+_MOST_ENTRIES, _MOST_CONTENT = 4000, 32 << 20
+# Parts that are held in memory.
+_MOST_PARTS = 3
+_NAMES = tuple(item.name for item in fields(Entry))
+_PLAIN = ("key", "kind", "recording", "sources")
+
+
+class Store:
+    """The store in a folder, which is created if it does not exist; raises ConfigurationError for another folder."""
+
+    def __init__(self, folder: Path, *, writes: bool = True) -> None:
+        self.folder = folder
+        require_pyarrow()
+        _check(folder, create=writes)
+        self._journal: Journal | None = None
+        self._waiting: list[Entry] = []
+        self._content = 0
+        self._parts: OrderedDict[Path, dict[str, list[Any]]] = OrderedDict()
+        if writes:
+            for path, entries in left_behind(folder):
+                if entries:
+                    write_part(folder, entries)
+                path.unlink(missing_ok=True)
+        self._index = _Index(sorted((folder / "parts").glob("*.parquet")))
+
+    def sources_of(self, recording: str) -> tuple[SourceFile, ...] | None:
+        """Return the files from which a recording was last read; None for one that the store does not know."""
+        text = self._index.sources.get(_encodable(recording))
+        return None if text is None else decoded(text, tuple[SourceFile, ...])
+
+    def has(self, key: str) -> bool:
+        """Return whether there is an entry."""
+        return self._index.place(key) is not None
+
+    def get(self, key: str) -> Entry | None:
+        """Return an entry; None if there is none, or its file was removed or damaged meanwhile."""
+        place = self._index.place(key)
+        if place is None:
+            return None
+        path, row = place
+        rows = self._rows(path)
+        if rows is None or rows["key"][row] != key:
+            return None
+        values = {name: rows[name][row] for name in _NAMES}
+        values["sources"] = decoded(values["sources"], tuple[SourceFile, ...])
+        return Entry(**values)
+
+    def add(self, entries: list[Entry]) -> None:
+        """Add entries: they outlive this process when it returns, except on an object store."""
+        if self._journal is None:
+            self._journal = Journal(self.folder)
+        self._journal.add(entries)
+        self._waiting += entries
+        self._content += sum(len(item.content) for item in entries)
+        if len(self._waiting) >= _MOST_ENTRIES or self._content >= _MOST_CONTENT:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the entries that were added to a part."""
+        if self._waiting:
+            write_part(self.folder, self._waiting)
+        if self._journal is not None:
+            self._journal.clear()
+        self._waiting, self._content = [], 0
+
+    @contextmanager
+    def writing(self) -> Iterator[Store]:
+        """Write everything at the end of the block, also if it ends early."""
+        try:
+            yield self
+        finally:
+            self.flush()
+            if self._journal is not None:
+                self._journal.close()
+                self._journal = None
+
+    def _rows(self, path: Path) -> dict[str, list[Any]] | None:
+        """Return the columns of a part."""
+        if path in self._parts:
+            self._parts.move_to_end(path)
+            return self._parts[path]
+        rows = read_columns(path, _NAMES)
+        if rows is None:
+            return None
+        self._parts[path] = rows
+        if len(self._parts) > _MOST_PARTS:
+            self._parts.popitem(last=False)
+        return self._parts[path]
+
+
+class _Index:
+    """Where the entry of each key is: the first 64 bits of the keys, sorted, with part and row."""
+
+    def __init__(self, parts: list[Path]) -> None:
+        self.parts: list[Path] = []
+        self.sources: dict[str, str] = {}
+        heads: list[npt.NDArray[np.uint64]] = []
+        places: list[npt.NDArray[np.int64]] = []
+        for path in parts:
+            rows = read_columns(path, _PLAIN)
+            if rows is None:
+                continue
+            keys = rows["key"]
+            heads.append(np.array([int(key[:16], 16) for key in keys], dtype=np.uint64))
+            places.append((len(self.parts) << 32) + np.arange(len(keys), dtype=np.int64))
+            self.parts.append(path)
+            logs = zip(rows["kind"], rows["recording"], rows["sources"], strict=True)
+            self.sources |= {name: text for kind, name, text in logs if kind == "log"}
+        every = np.concatenate(heads) if heads else np.empty(0, np.uint64)
+        order = np.argsort(every, kind="stable")
+        self._heads = every[order]
+        self._places = np.concatenate(places)[order] if places else np.empty(0, np.int64)
+
+    def place(self, key: str) -> tuple[Path, int] | None:
+        """Return the part and the row of a key; None if there is none."""
+        head = np.uint64(int(key[:16], 16))
+        at = int(np.searchsorted(self._heads, head))
+        if at == len(self._heads) or self._heads[at] != head:
+            return None
+        place = int(self._places[at])
+        return self.parts[place >> 32], place & 0xFFFFFFFF
+
+
+def require_pyarrow() -> None:
+    """Raise UsageError with the next step if pyarrow is not installed."""
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError as fault:
+        raise UsageError("--store needs pyarrow", "install it: pip install 'cdtool[store]'") from fault
+
+
+def write_part(folder: Path, entries: Iterable[Entry]) -> Path:
+    """Write entries to a new part of a store, and return it."""
+    import pyarrow as pa
+
+    entries = [replace(item, recording=_encodable(item.recording)) for item in entries]
+    columns: dict[str, list[Any]] = {name: [getattr(item, name) for item in entries] for name in _NAMES}
+    columns["sources"] = [encoded(item.sources, tuple[SourceFile, ...]) for item in entries]
+    types = {"content": pa.large_string(), "seconds": pa.float64(), "failed": pa.bool_()}
+    arrays = [pa.array(columns[name], type=types.get(name, pa.string())) for name in _NAMES]
+    return _write_table(folder / "parts", pa.table(arrays, names=list(_NAMES)))
+
+
+def _write_table(folder: Path, table: Any) -> Path:
+    import pyarrow.parquet as pq
+
+    stream = io.BytesIO()
+    pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
+    path = folder / f"{secrets.token_hex(16)}.parquet"
+    write_bytes(path, stream.getvalue())
+    return path
+
+
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]] | None:
+    """Return columns of a part; None if the file is gone or damaged."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(pa.BufferReader(path.read_bytes()), columns=list(names), page_checksum_verification=True)
+    except (OSError, pa.ArrowException):
+        return None
+    return {name: table[name].to_pylist() for name in names}
+
+
+def _encodable(name: str) -> str:
+    """Return the name of a recording without half surrogate pairs, which names that are not UTF-8 have."""
+    return name.encode("utf-8", "replace").decode("utf-8")
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """A finished run: when it began and ended [s since 1970], of which benchmark, and how many entries it used.
+
+    `computed` of the `used` entries were computed by it, `failed` recordings could not be read.
+    """
+
+    began: float
+    ended: float
+    benchmark: str
+    benchmark_sha256: str
+    used: int
+    computed: int
+    failed: int
+    version: str
+
+
+def write_run(folder: Path, run: RunRecord, keys: Iterable[str]) -> None:
+    """Write which entries a run has used."""
+    import pyarrow as pa
+
+    values = {item.name: getattr(run, item.name) for item in fields(RunRecord)}
+    table = pa.table({"key": pa.array([bytes.fromhex(key) for key in keys], type=pa.binary(32))})
+    _write_table(folder / "runs", table.replace_schema_metadata({"run": json.dumps(values)}))
+
+
+def read_runs(folder: Path) -> list[tuple[Path, RunRecord]]:
+    """Return the finished runs of a store, the newest first."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    found = []
+    for path in (folder / "runs").glob("*.parquet"):
+        try:
+            metadata = pq.read_schema(pa.BufferReader(path.read_bytes())).metadata or {}
+            found.append((path, RunRecord(**json.loads(metadata[b"run"]))))
+        except (OSError, pa.ArrowException, KeyError, TypeError, ValueError):
+            continue
+    return sorted(found, key=lambda item: item[1].ended, reverse=True)
+
+
+def _check(folder: Path, *, create: bool) -> None:
+    """Create an empty store, or check that a folder is one; raises ConfigurationError."""
+    mark = folder / _MARK
+    if mark.is_file():
+        values = _values(mark)
+        if values.get("kind") != _KIND or values.get("schema_version") != _SCHEMA:
+            raise ConfigurationError(
+                f"{mark}: is not that of a store of this version", "give another folder, or remove this one"
+            )
+        return
+    if not create:
+        raise ConfigurationError(f"{folder}: is not a store", "give the folder that was given as --store")
+    if folder.exists() and (not folder.is_dir() or any(True for _ in folder.iterdir())):
+        raise ConfigurationError(f"{folder}: is neither a store nor an empty folder", "give another folder")
+    for part in ("parts", "runs"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    write_text(mark, json.dumps({"kind": _KIND, "schema_version": _SCHEMA, "created": int(time.time())}) + "\n")
+
+
+def _values(mark: Path) -> Mapping[str, Any]:
+    try:
+        values = json.loads(read_bytes(mark, ConfigurationError))
+    except ValueError:
+        return {}
+    return values if isinstance(values, dict) else {}
