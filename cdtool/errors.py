@@ -64,3 +64,19 @@ def nearest(name: str, known: Iterable[str]) -> str:
     if close:
         return f"did you mean {' or '.join(close)}? known: {listed}"
     return f"known: {listed}"
+
+
+def is_lasting(fault: CdtoolError) -> bool:
+    """Return whether the same files give the same error again: it is not one of the system.
+
+    A network, a full disk, missing permissions, too little memory or a package that is not installed may be in order
+    the next time.
+    """
+    seen: set[int] = set()
+    cause: BaseException | None = fault
+    while cause is not None and id(cause) not in seen:
+        if isinstance(cause, OSError | ImportError | MemoryError):
+            return False
+        seen.add(id(cause))
+        cause = cause.__cause__ or cause.__context__
+    return True

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,43 +21,42 @@ from cdtool.workflows.benchmark.counting import Exposure, SweepRows
 from cdtool.workflows.benchmark.force_rows import point_rows
 from cdtool.workflows.benchmark.log_outcome import (
     LogOutcome,
-    LogRows,
     OfOperation,
-    WantedTraces,
     slowest_of,
     striking_of,
 )
+from cdtool.workflows.benchmark.pieces import Piece, PieceScoring, ScoreLog, lost
+from cdtool.workflows.benchmark.stored_outcomes import Planned, StoredOutcomes
 from cdtool.workflows.contacts.impact_free import unchecked
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
-from cdtool.workflows.runs import shown_path
+from cdtool.workflows.store.sources import SourceFile
 
 # The name of its group and the path of each log.
 Logs = Sequence[tuple[str, Path]]
-# Returns the outcome of the log of a group, or of each of its runs.
-ScoreLog = Callable[[str, Path, WantedTraces], list[LogOutcome]]
-
 # The most logs that a worker receives at once.
 _TOGETHER = 8
 
 
-@dataclass(frozen=True)
-class _Piece:
-    """One log, by its number, and the choice of traces as far as it is known."""
+@dataclass
+class _Place:
+    """A log, its files, and the number of its operations so far; its traces are kept in the store if there is one."""
 
-    log: int
+    number: int
     group: str
     path: Path
-    choice: TraceChoice
+    sources: tuple[SourceFile, ...] | None = None
+    stored: StoredOutcomes | None = None
+    operations: int = 0
 
+    @property
+    def log(self) -> tuple[str, Path]:
+        """Return the group and the path of the log."""
+        return self.group, self.path
 
-@dataclass(frozen=True)
-class _PieceScoring:
-    """Scores one log."""
-
-    score: ScoreLog
-
-    def __call__(self, piece: _Piece) -> list[LogOutcome]:
-        return self.score(piece.group, piece.path, WantedTraces(piece.log, piece.choice.copy()))
+    def keep(self, operation: int, trace: Trace) -> None:
+        """Store the trace of an operation."""
+        if self.stored:
+            self.stored.add_trace(self.log, self.sources, operation, trace)
 
 
 class Gathering:
@@ -87,41 +87,89 @@ class Gathering:
         self._scored: dict[str, str] = {}
         self._unchecked: list[tuple[str, Finding]] = []
         self._traces: dict[int, Trace] = {}
+        # Traces that are kept but not made yet, with the log and the number of the operation in it.
+        self._absent: dict[int, tuple[_Place, int]] = {}
+        self._place = _Place(0, "", Path())
         self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
         # Time that all logs took [s].
         self.reading = self.detecting = 0.0
 
     def score(
-        self, score: ScoreLog, logs: Logs, workers: Workers | None = None, progress: Progress | None = None
+        self,
+        score: ScoreLog,
+        logs: Logs,
+        workers: Workers | None = None,
+        progress: Progress | None = None,
+        stored: StoredOutcomes | None = None,
     ) -> None:
-        """Score the logs, and add their rows; a log that ends its workers is left out with the reason.
+        """Score the logs that are not `stored`, and add the rows of all; one that ends its workers is left out.
 
         Raises ConfigurationError if the same log, under any name, was learned from or given twice.
         """
-        scored = in_order(
-            _PieceScoring(score),
-            self._pieces(logs),
-            len(logs),
+        workers = workers or Workers()
+        plan = stored.plan(logs, workers) if stored else [Planned()] * len(logs)
+        missing = [log for log, planned in enumerate(plan) if not planned.is_known]
+        work = PieceScoring(self.setup, score, with_sources=stored is not None)
+        computed = in_order(
+            work,
+            self._pieces(missing, logs, plan, stored),
+            len(missing),
             workers,
-            progress=progress,
-            of_lost=self._lost,
+            of_lost=partial(lost, self.setup),
             together=_TOGETHER,
         )
-        for log, outcomes in enumerate(scored):
+        for log, ((group, path), planned) in enumerate(zip(logs, plan, strict=True)):
+            outcomes: Sequence[LogOutcome] | None = None
+            sources = planned.sources
+            if planned.is_known:
+                assert stored is not None, "a log is known from the store"
+                outcomes = stored.known(planned)
+            if outcomes is None:  # also if the entry has been removed meanwhile
+                made = work(Piece(log, group, path, self._choice)) if planned.is_known else next(computed)
+                outcomes, sources = made.outcomes, made.sources
+                if stored:
+                    outcomes = stored.add(group, path, planned, made)
+            self._place = _Place(log, group, path, sources, stored)
             for outcome in outcomes:
-                self._add(log, logs[log][0], outcome)
+                self._add(log, group, outcome)
+            if progress:
+                progress(log + 1, len(logs))
+        for _ in computed:  # their processes end
+            pass
+        self._make_absent_traces(work, workers)
 
-    def _pieces(self, logs: Logs) -> Iterator[_Piece]:
+    def _pieces(
+        self, missing: Sequence[int], logs: Logs, plan: Sequence[Planned], stored: StoredOutcomes | None
+    ) -> Iterator[Piece]:
         # Known now: more traces are made than are kept at the logs' turn, never fewer. Those of a batch share a choice.
         choice = self._choice.copy()
-        for log, (group, path) in enumerate(logs):
+        for log in missing:
             if choice.offered != self._choice.offered:
                 choice = self._choice.copy()
-            yield _Piece(log, group, path, choice)
+            group, path = logs[log]
+            yield stored.piece(log, group, path, plan[log], choice) if stored else Piece(log, group, path, choice)
 
-    def _lost(self, piece: _Piece, reason: str) -> list[LogOutcome]:
-        left_out = Skipped(shown_path(piece.path, self.setup.path.parent), reason)
-        return [LogOutcome(LogRows(None, skipped=(left_out,)))]
+    def _make_absent_traces(self, work: PieceScoring, workers: Workers) -> None:
+        """Make the traces that are kept and were not made when the logs were scored, as of logs that were stored."""
+        absent: dict[int, list[tuple[int, _Place, int]]] = {}
+        for number in self._choice.kept():
+            if number not in self._traces and number in self._absent:
+                place, operation = self._absent[number]
+                trace = place.stored.trace(place.log, place.sources, operation) if place.stored else None
+                if trace is not None:
+                    self._traces[number] = trace
+                else:
+                    absent.setdefault(place.number, []).append((number, place, operation))
+        wanted = list(absent.values())
+        pieces = (Piece(log[0][1].number, *log[0][1].log, operations=tuple(item[2] for item in log)) for log in wanted)
+        made = in_order(work, pieces, len(wanted), workers, of_lost=partial(lost, self.setup))
+        for log, outcome in zip(wanted, made, strict=True):
+            traces = [trace for of_run in outcome.outcomes for trace in of_run.traces]
+            for number, place, operation in log:
+                trace = traces[operation] if operation < len(traces) else None
+                if trace is not None:  # the log may have changed meanwhile
+                    self._traces[number] = trace
+                    place.keep(operation, trace)
 
     def _add(self, log: int, group: str, outcome: LogOutcome) -> None:
         self.reading += outcome.reading
@@ -140,26 +188,33 @@ class Gathering:
                     exposure = self._exposure[group, name] = Exposure()
                 exposure.add(item)
                 self._sweep.add(group, name, item)
-            self._offer(log, group, of_operation, outcome.traces[number])
+            self._offer(log, group, of_operation, outcome.traces[number] if outcome.traces else None)
         for detector in outcome.detectors:
             if any(item is not None for item in detector.operations):
                 self._exposure[group, detector.detector].recordings += 1
         if outcome.recording.point:
             self._tests.setdefault((group, outcome.recording.point), []).extend(outcome.rows.verdicts)
-        self.outcomes.append(outcome)
+        self.outcomes.append(replace(outcome, traces=()))
 
     def _offer(self, log: int, group: str, outcomes: OfOperation, trace: Trace | None) -> None:
         number = self._choice.offer(log, group, len(outcomes), striking_of(outcomes), slowest_of(outcomes))
-        if number is not None:
-            assert trace is not None, "a trace that is kept was wanted"
-            kept = self._choice.kept()
-            self._traces = {n: trace for n, trace in self._traces.items() if n in kept} | {number: trace}
+        operation, self._place.operations = self._place.operations, self._place.operations + 1
+        if number is None:
+            return
+        kept = self._choice.kept()
+        self._traces = {n: made for n, made in self._traces.items() if n in kept}
+        self._absent = {n: made for n, made in self._absent.items() if n in kept}
+        if trace is None:
+            self._absent[number] = self._place, operation
+        else:
+            self._traces[number] = trace
+            self._place.keep(operation, trace)
 
     @property
     def traces(self) -> tuple[Trace, ...]:
         """Return the selected traces."""
         why = self._choice.kept()
-        return tuple(replace(self._traces[number], chosen=why[number]) for number in why)
+        return tuple(replace(self._traces[number], chosen=why[number]) for number in why if number in self._traces)
 
     def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
         """Return all results; raises RecordingError if no log could be scored."""

@@ -26,7 +26,7 @@ from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
-from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
+from cdtool.workflows.benchmark.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Scored, score_runs
 from cdtool.workflows.execution.workers import Progress, Workers
@@ -132,7 +132,7 @@ class _TriggerScoring:
     clock: str
     listed_only: bool
 
-    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> list[LogOutcome]:
+    def __call__(self, group: str, path: Path, wanted: Wanted | None, _: object = None) -> list[LogOutcome]:
         found = score_runs(self.setup, group, path, lambda _: (self._detect, {}), {})
         if self.setup.has_runs:
             found = self._listed_runs(found)

@@ -48,9 +48,9 @@ class Determinants:
         """Return the key of the outcome of a detector on a log."""
         return digest_of("detector", log_key, self._of_detector[detector], self._own_part(path))
 
-    def trace_key(self, path: Path, detector_keys: Sequence[str]) -> str:
-        """Return the key of the traces of a log, which explain alarms by what was learned."""
-        return digest_of("trace", list(detector_keys), self._normals, self._own_part(path))
+    def trace_key(self, path: Path, number: int, detector_keys: Sequence[str]) -> str:
+        """Return the key of the trace of an operation of a log, which explains alarms by what was learned."""
+        return digest_of("trace", number, list(detector_keys), self._normals, self._own_part(path))
 
     def name(self, path: Path) -> str:
         """Return the name of a log in results."""

@@ -6,8 +6,8 @@ without the others, and its outcome be kept.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from cdtool.evaluation.explanation.explanation import explain_operation
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
@@ -83,6 +83,7 @@ class LogRows:
 
     `unchecked`: names of logs assumed to be free of impacts, with the ground truth that is missing from them.
     `beside`: name and SHA-256 of each file beside the log with a channel. `strokes`: of a log that is not cut.
+    `unread`: it could not be read.
     """
 
     recording: RecordingResult | None
@@ -93,13 +94,15 @@ class LogRows:
     unchecked: tuple[tuple[str, Finding], ...] = ()
     beside: tuple[tuple[str, str], ...] = ()
     strokes: int = 0
+    unread: bool = False
 
 
 @dataclass(frozen=True)
 class LogOutcome:
     """The results of one log or run, small enough to be sent from one process to another.
 
-    `traces` has one entry per operation, None where its trace is not wanted. `reading`, `detecting` [s]: time taken.
+    `traces` has one entry per operation, None where its trace is not wanted; it is empty if none is. `reading`,
+    `detecting` [s]: time taken. `lasts`: the log would have the same outcome again.
     """
 
     rows: LogRows
@@ -107,6 +110,7 @@ class LogOutcome:
     traces: tuple[Trace | None, ...] = ()
     reading: float = 0.0
     detecting: float = 0.0
+    lasts: bool = True
 
     @property
     def recording(self) -> RecordingResult | None:
@@ -189,7 +193,23 @@ class WantedTraces:
         return self.choice.offer(self.log, group, len(outcomes), striking, slowest) is not None
 
 
-def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: WantedTraces | None) -> LogOutcome:
+@dataclass
+class TheseTraces:
+    """The traces of certain operations of a log, by number from 0, counted on through its runs."""
+
+    numbers: Collection[int]
+    seen: int = 0
+
+    def is_wanted(self, _: str, __: OfOperation) -> bool:
+        """Return whether the trace of the next operation of the log is wanted."""
+        self.seen += 1
+        return self.seen - 1 in self.numbers
+
+
+Wanted = WantedTraces | TheseTraces
+
+
+def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: Wanted | None) -> LogOutcome:
     """Return what remains of a scored log; alarms are explained by comparison with `normals`, for wanted traces."""
     uncut = scored.matched.uncut if scored.matched else UncutStrokes("")
     rows = LogRows(
@@ -201,6 +221,7 @@ def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: W
         unchecked=tuple(scored.unchecked),
         beside=scored.log.beside if scored.log else (),
         strokes=uncut.strokes,
+        unread=scored.unread,
     )
     outcome = LogOutcome(
         rows,
@@ -216,6 +237,7 @@ def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: W
         ),
         reading=scored.reading,
         detecting=scored.detecting,
+        lasts=scored.lasts,
     )
     if wanted is None:
         return outcome
@@ -223,7 +245,7 @@ def outcome_of(scored: Scored, setup: BenchmarkFile, normals: Normals, wanted: W
         _trace(judged, setup, normals) if wanted.is_wanted(judged.group, tuple(outcome.of_operation(number))) else None
         for number, judged in enumerate(scored.judged)
     ]
-    return LogOutcome(rows, outcome.detectors, tuple(traces), outcome.reading, outcome.detecting)
+    return replace(outcome, traces=tuple(traces))
 
 
 def _on_operation(detector: str, scored: Scored, number: int) -> OperationOutcome | None:

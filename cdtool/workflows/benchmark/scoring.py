@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from cdtool.errors import CdtoolError, RecordingError
+from cdtool.errors import CdtoolError, RecordingError, is_lasting
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.verdict import ForceVerdict, assess_force
 from cdtool.evaluation.results import (
@@ -59,6 +59,9 @@ class Scored:
     verdicts: dict[int, ForceVerdict] = field(default_factory=dict)
     skipped: list[Skipped] = field(default_factory=list)
     findings: list[RecordingFinding] = field(default_factory=list)
+    # Whether the log could not be read, and whether that lasts: it is not because of a network or a full disk.
+    unread: bool = False
+    lasts: bool = True
     # Names of logs assumed to be free of impacts, with the ground truth that is missing from them.
     unchecked: list[tuple[str, Finding]] = field(default_factory=list)
     source: str = ""
@@ -68,6 +71,11 @@ class Scored:
     matched: MatchedLog | None = None
     reading: float = 0.0
     detecting: float = 0.0
+
+    def leave_out(self, left_out: Skipped, fault: CdtoolError) -> None:
+        """Note that the log cannot be read."""
+        self.skipped.append(left_out)
+        self.unread, self.lasts = True, is_lasting(fault)
 
     @property
     def left_out(self) -> list[Skipped]:
@@ -161,7 +169,7 @@ def score_runs(
     try:
         runs = read_runs(path, setup.machine_file, cut)
     except CdtoolError as fault:
-        about_log.skipped.append(unread(path, setup.path.parent, fault))
+        about_log.leave_out(unread(path, setup.path.parent, fault), fault)
         return [about_log]
     finally:
         about_log.reading = perf_counter() - begin
@@ -238,7 +246,7 @@ def _score(
             if not contacts:
                 raise RecordingError(f"{path}: no contact {section}", "change from and to, or move it to [holdout]")
     except CdtoolError as fault:
-        scored.skipped.append(unread(path, setup.path.parent, fault))
+        scored.leave_out(unread(path, setup.path.parent, fault), fault)
         scored.reading = perf_counter() - begin
         return scored
     scored.reading = perf_counter() - begin

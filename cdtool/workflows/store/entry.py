@@ -7,15 +7,16 @@ from typing import Literal
 
 from cdtool.workflows.store.sources import SourceFile
 
-Kind = Literal["log", "detector", "trace", "learned"]
+Kind = Literal["log", "detector", "trace", "learned", "source"]
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What was computed for a recording: rows of the log, of one detector, its traces, or thresholds learned.
+    """What was computed for a recording: rows of the log, of one detector, a trace, or thresholds learned.
 
     `key` is a SHA-256 in hexadecimal digits; `content` is JSON. `sources` are the files read for it, `seconds` the time
-    that it took, `failed` whether it is a reading error; `version` is that of the code.
+    that it took, `failed` whether it is a reading error; `version` is that of the code. An entry of the kind "source" has
+    only the sources of a log that was learned from.
     """
 
     key: str

@@ -37,10 +37,13 @@ _KIND, _SCHEMA = "cdtool store", 1
 _MARK = "store.json"
 # A part is written when it has so many entries, or characters of content.
 _MOST_ENTRIES, _MOST_CONTENT = 4000, 32 << 20
+# A place is the number of a part, and that of a row in these bits.
+_ROW_BITS = 32
+_ROW = (1 << _ROW_BITS) - 1
 # Parts that are held in memory.
 _MOST_PARTS = 3
 _NAMES = tuple(item.name for item in fields(Entry))
-_PLAIN = ("key", "kind", "recording", "sources")
+_PLAIN = ("key", "kind", "recording", "sources", "failed")
 
 
 class Store:
@@ -66,18 +69,25 @@ class Store:
         text = self._index.sources.get(_encodable(recording))
         return None if text is None else decoded(text, tuple[SourceFile, ...])
 
-    def has(self, key: str) -> bool:
-        """Return whether there is an entry."""
-        return self._index.place(key) is not None
+    def place(self, key: str) -> int | None:
+        """Return where an entry is; None if there is none."""
+        return self._index.place(key)
+
+    def is_failed(self, place: int) -> bool:
+        """Return whether the entry at a place is a reading error."""
+        return place in self._index.failed
 
     def get(self, key: str) -> Entry | None:
         """Return an entry; None if there is none, or its file was removed or damaged meanwhile."""
         place = self._index.place(key)
-        if place is None:
-            return None
-        path, row = place
-        rows = self._rows(path)
-        if rows is None or rows["key"][row] != key:
+        found = None if place is None else self.at(place)
+        return found if found is not None and found.key == key else None
+
+    def at(self, place: int) -> Entry | None:
+        """Return the entry at a place; None if its file was removed or damaged meanwhile."""
+        row = place & _ROW
+        rows = self._rows(self._index.parts[place >> _ROW_BITS])
+        if rows is None:
             return None
         values = {name: rows[name][row] for name in _NAMES}
         values["sources"] = decoded(values["sources"], tuple[SourceFile, ...])
@@ -127,11 +137,12 @@ class Store:
 
 
 class _Index:
-    """Where the entry of each key is: the first 64 bits of the keys, sorted, with part and row."""
+    """Where the entry of each key is: the first 64 bits of the keys, sorted, with their places."""
 
     def __init__(self, parts: list[Path]) -> None:
         self.parts: list[Path] = []
         self.sources: dict[str, str] = {}
+        self.failed: set[int] = set()
         heads: list[npt.NDArray[np.uint64]] = []
         places: list[npt.NDArray[np.int64]] = []
         for path in parts:
@@ -140,23 +151,24 @@ class _Index:
                 continue
             keys = rows["key"]
             heads.append(np.array([int(key[:16], 16) for key in keys], dtype=np.uint64))
-            places.append((len(self.parts) << 32) + np.arange(len(keys), dtype=np.int64))
+            places.append((len(self.parts) << _ROW_BITS) + np.arange(len(keys), dtype=np.int64))
             self.parts.append(path)
             logs = zip(rows["kind"], rows["recording"], rows["sources"], strict=True)
-            self.sources |= {name: text for kind, name, text in logs if kind == "log"}
+            self.sources |= {name: text for kind, name, text in logs if kind in ("log", "source")}
+            first = (len(self.parts) - 1) << _ROW_BITS
+            self.failed |= {first + row for row, failed in enumerate(rows["failed"]) if failed}
         every = np.concatenate(heads) if heads else np.empty(0, np.uint64)
         order = np.argsort(every, kind="stable")
         self._heads = every[order]
         self._places = np.concatenate(places)[order] if places else np.empty(0, np.int64)
 
-    def place(self, key: str) -> tuple[Path, int] | None:
-        """Return the part and the row of a key; None if there is none."""
+    def place(self, key: str) -> int | None:
+        """Return the place of a key; None if there is none."""
         head = np.uint64(int(key[:16], 16))
         at = int(np.searchsorted(self._heads, head))
         if at == len(self._heads) or self._heads[at] != head:
             return None
-        place = int(self._places[at])
-        return self.parts[place >> 32], place & 0xFFFFFFFF
+        return int(self._places[at])
 
 
 def require_pyarrow() -> None:

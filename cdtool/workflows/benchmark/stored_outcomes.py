@@ -1,0 +1,243 @@
+"""The outcomes of a benchmark's logs in order, each from the store if it is there, otherwise computed and stored.
+
+What is stored of a log are its rows and the outcome of each detector, each under the digest of everything that
+determines it; so a detector with another gain is run on its own. Errors of the system are not stored.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cdtool.evaluation.traces.choice import TraceChoice
+from cdtool.evaluation.traces.trace import Trace
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
+from cdtool.workflows.benchmark.determinants import Determinants
+from cdtool.workflows.benchmark.log_outcome import DetectorOutcome, LogOutcome, LogRows
+from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome, source_files
+from cdtool.workflows.execution.workers import Workers, in_order
+from cdtool.workflows.store.digest import code_version
+from cdtool.workflows.store.encoding import decoded, encoded
+from cdtool.workflows.store.entry import Entry
+from cdtool.workflows.store.sources import SourceFile, read_sources, state_of
+from cdtool.workflows.store.store import RunRecord, Store, write_run
+
+_Rows = tuple[LogRows, ...]
+_OfDetector = tuple[DetectorOutcome | None, ...]
+# Files that a worker hashes before its digests are sent.
+_HASHED_TOGETHER = 64
+
+
+@dataclass(frozen=True)
+class StoreUse:
+    """How a store is used: `folder`; `trust_times`: a file of the same size and time is the same; `retry_failed`."""
+
+    folder: Path
+    trust_times: bool = False
+    retry_failed: bool = False
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One log: the places of its rows and of its detectors' outcomes in the store, None where there is none."""
+
+    sources: tuple[SourceFile, ...] | None = None
+    rows: int | None = None
+    detectors: tuple[int | None, ...] = ()
+
+    @property
+    def is_known(self) -> bool:
+        """Whether all of it is in the store."""
+        return self.rows is not None and None not in self.detectors
+
+
+@dataclass(frozen=True)
+class StoreReport:
+    """How many recordings were computed, at least in part, and how many were all in the store."""
+
+    computed: int = 0
+    reused: int = 0
+
+
+@dataclass(frozen=True)
+class _Hashing:
+    """Reads the sources of one log."""
+
+    setup: BenchmarkFile
+
+    def __call__(self, path: Path) -> tuple[SourceFile, ...] | None:
+        return read_sources(source_files(self.setup, path))
+
+
+def known_sources(
+    setup: BenchmarkFile, store: Store, use: StoreUse, paths: Sequence[Path], names: Sequence[str], workers: Workers
+) -> list[tuple[SourceFile, ...] | None]:
+    """Return the sources of those logs that the store knows by name, hashed unless their times are trusted."""
+    found: list[tuple[SourceFile, ...] | None] = [None] * len(paths)
+    to_hash: list[int] = []
+    for number, (path, name) in enumerate(zip(paths, names, strict=True)):
+        before = store.sources_of(name)
+        if before is None:
+            continue
+        states = tuple((item.size, item.modified) for item in before)
+        if use.trust_times and state_of(source_files(setup, path)) == states:
+            found[number] = before
+        else:
+            to_hash.append(number)
+    logs = [paths[number] for number in to_hash]
+    hashed = in_order(_Hashing(setup), logs, len(logs), workers, of_lost=lambda *_: None, together=_HASHED_TOGETHER)
+    for number, sources in zip(to_hash, hashed, strict=True):
+        found[number] = sources
+    return found
+
+
+class StoredOutcomes:
+    """The outcomes of logs in a store, and those that are computed and added to it."""
+
+    def __init__(self, store: Store, use: StoreUse, setup: BenchmarkFile, determinants: Determinants) -> None:
+        self.store, self.use, self.setup, self.determinants = store, use, setup, determinants
+        self.names = setup.detectors
+        self.keys: list[str] = []
+        self.computed = self.reused = self.failed = 0
+        self.began = time.time()
+
+    def plan(self, logs: Sequence[tuple[str, Path]], workers: Workers) -> list[Planned]:
+        """Return what is in the store of each log."""
+        of = self.determinants
+        paths = [path for _, path in logs]
+        sources = known_sources(self.setup, self.store, self.use, paths, [of.name(path) for path in paths], workers)
+        return [self._planned(group, path, known) for (group, path), known in zip(logs, sources, strict=True)]
+
+    def _planned(self, group: str, path: Path, sources: tuple[SourceFile, ...] | None) -> Planned:
+        nothing = Planned(sources, None, (None,) * len(self.names))
+        if sources is None:
+            return nothing
+        key = self.determinants.log_key(group, path, sources)
+        place = self.store.place(key)
+        if place is None or (self.use.retry_failed and self.store.is_failed(place)):
+            return nothing
+        detectors = (self.store.place(self.determinants.detector_key(name, path, key)) for name in self.names)
+        return Planned(sources, place, tuple(detectors))
+
+    def piece(self, log: int, group: str, path: Path, planned: Planned, choice: TraceChoice) -> Piece:
+        """Return the work that is left of a log; traces are wanted only if every detector is run."""
+        missing = tuple(name for name, place in zip(self.names, planned.detectors, strict=True) if place is None)
+        is_whole = planned.rows is None or len(missing) == len(self.names)
+        if is_whole:
+            return Piece(log, group, path, choice, sources=planned.sources)
+        return Piece(log, group, path, detectors=missing, sources=planned.sources)
+
+    def known(self, planned: Planned) -> list[LogOutcome] | None:
+        """Return the outcomes of a log that are all in the store; None if one of them is gone or damaged."""
+        assert planned.rows is not None, "the log is known"
+        entries = [self.store.at(place) for place in (planned.rows, *planned.detectors) if place is not None]
+        try:
+            rows = decoded(entries[0].content, _Rows)  # type: ignore[union-attr]  # None is an AttributeError
+            detectors = [decoded(item.content, _OfDetector) for item in entries[1:]]  # type: ignore[union-attr]
+        except (AttributeError, ValueError):
+            return None
+        self.keys += [item.key for item in entries if item is not None]
+        self.reused += 1
+        self.failed += any(item.unread for item in rows)
+        return _combined(rows, detectors)
+
+    def add(self, group: str, path: Path, planned: Planned, made: PieceOutcome) -> list[LogOutcome]:
+        """Store what was computed of a log, and return the outcomes with every detector."""
+        self.computed += 1
+        rows = tuple(item.rows for item in made.outcomes)
+        self.failed += any(item.unread for item in rows)
+        new = {
+            name: tuple(_of_detector(item, name) for item in made.outcomes)
+            for name, place in zip(self.names, planned.detectors, strict=True)
+            if place is None or planned.rows is None
+        }
+        if made.sources is not None:
+            self._store(group, path, made, new)
+        if len(new) == len(self.names):
+            return list(made.outcomes)
+        stored = {
+            name: self.store.at(place)
+            for name, place in zip(self.names, planned.detectors, strict=True)
+            if place is not None
+        }
+        self.keys += [entry.key for entry in stored.values() if entry is not None]
+        every = [
+            new[name] if name in new else decoded(stored[name].content, _OfDetector)  # type: ignore[union-attr]
+            for name in self.names
+        ]
+        return _combined(rows, every)
+
+    def _store(self, group: str, path: Path, made: PieceOutcome, new: dict[str, _OfDetector]) -> None:
+        assert made.sources is not None
+        of, name, version = self.determinants, self.determinants.name(path), code_version()
+        key = of.log_key(group, path, made.sources)
+        rows = tuple(item.rows for item in made.outcomes)
+        unread = any(item.unread for item in rows)
+        entries = [Entry(key, "log", name, "", encoded(rows, _Rows), made.sources, made.seconds, unread, version)]
+        for detector, outcomes in new.items():
+            content = encoded(outcomes, _OfDetector)
+            entries.append(
+                Entry(
+                    of.detector_key(detector, path, key), "detector", name, detector, content, (), 0.0, unread, version
+                )
+            )
+        self.store.add(entries)
+        self.keys += [entry.key for entry in entries]
+
+    def trace(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> Trace | None:
+        """Return the stored trace of an operation of a log; None if there is none."""
+        key = self._trace_key(log, sources, number)
+        entry = None if key is None else self.store.get(key)
+        if entry is None:
+            return None
+        self.keys.append(entry.key)
+        try:
+            return decoded(entry.content, Trace)
+        except ValueError:
+            return None
+
+    def add_trace(
+        self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int, trace: Trace
+    ) -> None:
+        """Store the trace of an operation of a log."""
+        key = self._trace_key(log, sources, number)
+        if key is not None:
+            name = self.determinants.name(log[1])
+            self.store.add([Entry(key, "trace", name, "", encoded(trace, Trace), version=code_version())])
+            self.keys.append(key)
+
+    def _trace_key(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> str | None:
+        if sources is None:
+            return None
+        of, (group, path) = self.determinants, log
+        key = of.log_key(group, path, sources)
+        return of.trace_key(path, number, [of.detector_key(name, path, key) for name in self.names])
+
+    def finish(self) -> StoreReport:
+        """Write which entries the run has used."""
+        run = RunRecord(
+            self.began,
+            time.time(),
+            self.setup.path.name,
+            self.setup.digest,
+            len(self.keys),
+            self.computed,
+            self.failed,
+            code_version(),
+        )
+        write_run(self.store.folder, run, self.keys)
+        return StoreReport(self.computed, self.reused)
+
+
+def _of_detector(outcome: LogOutcome, name: str) -> DetectorOutcome | None:
+    return next((item for item in outcome.detectors if item.detector == name), None)
+
+
+def _combined(rows: Sequence[LogRows], detectors: Sequence[_OfDetector]) -> list[LogOutcome]:
+    """Return the outcomes of a log or of its runs from its rows and those of each detector."""
+    return [
+        LogOutcome(of_run, tuple(item[number] for item in detectors if item[number] is not None))  # type: ignore[misc]
+        for number, of_run in enumerate(rows)
+    ]
