@@ -15,7 +15,7 @@ from cdtool.workflows.benchmark.stored_outcomes import StoredOutcomes
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.store.digest import code_version, digest_of
-from cdtool.workflows.store.entry import Entry
+from cdtool.workflows.store.entry import Entry, source_entry
 from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.store import Store
 from cdtool.workflows.store.use import StoreUse
@@ -42,9 +42,9 @@ class StoreOfRun:
         if None in sources.values():  # one cannot be read now: what is learned without it must not be found again
             return teaching.learned
         key = digest_of(learned_key(setup, self._runs, setup.detectors), teaching.every_detector)
+        self._keys += [key, *(entry.key for entry in self._source_entries(setup))]
         found = self._restored(key, setup)
         if found is not None:
-            self._keys.append(key)
             return found
         learned = teaching.learned
         if learned.lasts and all(known.is_unchanged(path, item) for path, item in self._runs.items()):
@@ -66,12 +66,10 @@ class StoreOfRun:
             return None
 
     def _add(self, key: str, setup: BenchmarkFile, learned: Learned) -> None:
-        text, version = learned.to_text(setup.rule), code_version()
-        entries = [Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=version)]
-        for path, sources in self._runs.items():
-            name = shown_path(path, setup.path.parent)
-            of_run = digest_of("source", name, sources)
-            entries.append(Entry(of_run, "source", name, "", "", sources, version=version))
-            self._keys.append(of_run)
-        self.store.add(entries)
-        self._keys.append(key)
+        text = learned.to_text(setup.rule)
+        of_runs = Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=code_version())
+        self.store.add([of_runs, *self._source_entries(setup)])
+
+    def _source_entries(self, setup: BenchmarkFile) -> list[Entry]:
+        names = ((shown_path(path, setup.path.parent), sources) for path, sources in self._runs.items())
+        return [source_entry(name, sources) for name, sources in names]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from cdtool.evaluation.traces.choice import TraceChoice
@@ -21,7 +22,7 @@ from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.store.digest import code_version
 from cdtool.workflows.store.encoding import decoded, encoded
-from cdtool.workflows.store.entry import Entry
+from cdtool.workflows.store.entry import Entry, source_entry
 from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.store import RunRecord, Store, write_run
 from cdtool.workflows.store.use import StoreUse
@@ -73,26 +74,35 @@ class StoredOutcomes:
         """Return what is in the store of each log."""
         known = KnownSources(self.setup, self.store, self.use, workers)
         sources = known.of([path for _, path in logs])
-        return [self._planned(group, path, known) for (group, path), known in zip(logs, sources, strict=True)]
+        keys = [key for log, of_log in zip(logs, sources, strict=True) if of_log for key in self._keys_of(log, of_log)]
+        places = iter(self.store.places(keys))
+        each = 1 + len(self.names)
+        return [self._planned(item, list(islice(places, each)) if item else None) for item in sources]
 
-    def _planned(self, group: str, path: Path, sources: tuple[SourceFile, ...] | None) -> Planned:
+    def _keys_of(self, log: tuple[str, Path], sources: tuple[SourceFile, ...]) -> list[str]:
+        """Return the key of the rows of a log, and of the outcome of each detector."""
+        of, (group, path) = self.determinants, log
+        key = of.log_key(group, path, sources)
+        return [key, *(of.detector_key(name, path, key) for name in self.names)]
+
+    def _planned(self, sources: tuple[SourceFile, ...] | None, places: list[int | None] | None) -> Planned:
         nothing = Planned(sources, None, (None,) * len(self.names))
-        if sources is None:
+        if places is None or places[0] is None or (self.use.retry_failed and self.store.is_failed(places[0])):
             return nothing
-        key = self.determinants.log_key(group, path, sources)
-        place = self.store.place(key)
-        if place is None or (self.use.retry_failed and self.store.is_failed(place)):
-            return nothing
-        detectors = (self.store.place(self.determinants.detector_key(name, path, key)) for name in self.names)
-        return Planned(sources, place, tuple(detectors))
+        return Planned(sources, places[0], tuple(places[1:]))
 
     def piece(self, log: int, group: str, path: Path, planned: Planned, choice: TraceChoice) -> Piece:
         """Return the work that is left of a log; traces are wanted only if every detector is run."""
-        missing = tuple(name for name, place in zip(self.names, planned.detectors, strict=True) if place is None)
-        is_whole = planned.rows is None or len(missing) == len(self.names)
-        if is_whole:
+        missing = self.missing(planned)
+        if len(missing) == len(self.names):
             return Piece(log, group, path, choice, sources=planned.sources)
         return Piece(log, group, path, detectors=missing, sources=planned.sources)
+
+    def missing(self, planned: Planned) -> tuple[str, ...]:
+        """Return the detectors that have to be run on a log: all if its rows are missing."""
+        if planned.rows is None:
+            return self.names
+        return tuple(name for name, place in zip(self.names, planned.detectors, strict=True) if place is None)
 
     def known(self, planned: Planned) -> list[LogOutcome] | None:
         """Return the outcomes of a log that are all in the store; None if one of them is gone or damaged."""
@@ -104,6 +114,11 @@ class StoredOutcomes:
         except (AttributeError, ValueError):
             return None
         self.keys += [item.key for item in entries if item is not None]
+        if planned.sources is not None and entries[0] is not None and planned.sources != entries[0].sources:
+            touched = source_entry(entries[0].recording, planned.sources)
+            self.keys.append(touched.key)
+            if self.store.places([touched.key]) == [None]:
+                self.store.add([touched])
         self.reused += 1
         self.failed += any(item.unread for item in rows)
         return _combined(rows, detectors)
@@ -176,9 +191,7 @@ class StoredOutcomes:
     def _trace_key(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> str | None:
         if sources is None:
             return None
-        of, (group, path) = self.determinants, log
-        key = of.log_key(group, path, sources)
-        return of.trace_key(path, number, [of.detector_key(name, path, key) for name in self.names])
+        return self.determinants.trace_key(log[1], number, self._keys_of(log, sources)[1:])
 
     def finish(self) -> StoreReport:
         """Write which entries the run has used."""
@@ -188,6 +201,7 @@ class StoredOutcomes:
             self.setup.path.name,
             self.setup.digest,
             len(self.keys),
+            self.computed + self.reused,
             self.computed,
             self.failed,
             code_version(),
