@@ -43,6 +43,7 @@ _ROW = (1 << _ROW_BITS) - 1
 # Parts that are held in memory.
 _MOST_PARTS = 3
 _NAMES = tuple(item.name for item in fields(Entry))
+_KEY_BYTES = 32
 _NO_SOURCES = "[]"
 _PLAIN = ("key", "kind", "recording", "sources", "failed")
 
@@ -86,7 +87,7 @@ class Store:
 
     def sources_of(self, recording: str) -> tuple[SourceFile, ...] | None:
         """Return the files from which a recording was last read; None for one that the store does not know."""
-        text = self._index.sources.get(_encodable(recording))
+        text = self._index.sources.get(encodable(recording))
         return None if text is None else decoded(text, tuple[SourceFile, ...])
 
     def places(self, keys: Sequence[str]) -> list[int | None]:
@@ -215,12 +216,31 @@ def write_part(folder: Path, entries: Iterable[Entry]) -> Path:
     """Write entries to a new part of a store, and return it."""
     import pyarrow as pa
 
-    entries = [replace(item, recording=_encodable(item.recording)) for item in entries]
+    entries = [replace(item, recording=encodable(item.recording)) for item in entries]
     columns: dict[str, list[Any]] = {name: [getattr(item, name) for item in entries] for name in _NAMES}
     columns["sources"] = [encoded(item.sources, tuple[SourceFile, ...]) for item in entries]
-    types = {"content": pa.large_string(), "seconds": pa.float64(), "failed": pa.bool_()}
-    arrays = [pa.array(columns[name], type=types.get(name, pa.string())) for name in _NAMES]
+    arrays = [_numbers(columns[name]) if name in ("seconds", "failed") else _texts(columns[name]) for name in _NAMES]
     return _write_table(folder / "parts", pa.table(arrays, names=list(_NAMES)))
+
+
+def _texts(values: Sequence[str]) -> Any:
+    """Return a column of texts; `pyarrow.array` would import pandas, which takes longer than a small store."""
+    import pyarrow as pa
+
+    pieces = [value.encode() for value in values]
+    ends = np.zeros(len(pieces) + 1, dtype=np.int64)
+    np.cumsum([len(piece) for piece in pieces], out=ends[1:])
+    return pa.LargeStringArray.from_buffers(len(pieces), pa.py_buffer(ends), pa.py_buffer(b"".join(pieces)))
+
+
+def _numbers(values: Sequence[float]) -> Any:
+    import pyarrow as pa
+
+    array = np.array(values)
+    if array.dtype == bool:
+        packed = np.packbits(array, bitorder="little")
+        return pa.BooleanArray.from_buffers(pa.bool_(), len(array), [None, pa.py_buffer(packed)])
+    return pa.DoubleArray.from_buffers(pa.float64(), len(array), [None, pa.py_buffer(array.astype(np.float64))])
 
 
 def _write_table(folder: Path, table: Any) -> Path:
@@ -240,13 +260,15 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]] | Non
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(pa.BufferReader(path.read_bytes()), columns=list(names), page_checksum_verification=True)
+        # `read_table` would import pandas.
+        with pq.ParquetFile(pa.BufferReader(path.read_bytes()), page_checksum_verification=True) as file:
+            table = file.read(columns=list(names))
     except (OSError, pa.ArrowException):
         return None
     return {name: table[name].to_pylist() for name in names}
 
 
-def _encodable(name: str) -> str:
+def encodable(name: str) -> str:
     """Return the name of a recording without half surrogate pairs, which names that are not UTF-8 have."""
     return name.encode("utf-8", "replace").decode("utf-8")
 
@@ -274,7 +296,11 @@ def write_run(folder: Path, run: RunRecord, keys: Iterable[str]) -> None:
     import pyarrow as pa
 
     values = {item.name: getattr(run, item.name) for item in fields(RunRecord)}
-    table = pa.table({"key": pa.array([bytes.fromhex(key) for key in keys], type=pa.binary(32))})
+    every = bytes.fromhex("".join(keys))
+    column = pa.FixedSizeBinaryArray.from_buffers(
+        pa.binary(_KEY_BYTES), len(every) // _KEY_BYTES, [None, pa.py_buffer(every)]
+    )
+    table = pa.table([column], names=["key"])
     _write_table(folder / "runs", table.replace_schema_metadata({"run": json.dumps(values)}))
 
 
