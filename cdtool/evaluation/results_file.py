@@ -10,7 +10,7 @@ import inspect
 import json
 import re
 import types
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -19,9 +19,10 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, ConclusionResult, ContactResult, LimitResult, Results
+from cdtool.evaluation.rows import Rows
 from cdtool.evaluation.summary import kind_group
 from cdtool.file_kinds import kind_of
-from cdtool.strict_json import strict_json
+from cdtool.strict_json import flat_strict_json, strict_json
 from cdtool.value_words import value_in_words
 
 Row = TypeVar("Row")
@@ -38,6 +39,8 @@ _IN_SAMPLES = re.compile(r"\bfor \d+ samples?\b")
 _RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
 _NEXT_STEP = "write one with cdtool benchmark -o results.json"
 _PLAIN = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
+# What separates the fields of a row, with the layout of `strict_json`.
+_FIELD = "\n   "
 _SCHEMA_TYPES = {str: "string", float: "number", int: "integer", bool: "boolean"}
 # The possible values of a text field: of one class, or of every class that has the field.
 WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
@@ -69,7 +72,53 @@ def to_json(results: Results) -> str:
     >>> json.loads(to_json(empty))["schema_version"] == SCHEMA_VERSION
     True
     """
-    return strict_json(asdict(results)) + "\n"
+    return "".join(json_pieces(results))
+
+
+def json_pieces(results: Results) -> Iterator[str]:
+    """Yield the text of `to_json` in pieces, so that many rows are never in memory as text.
+
+    Parameters
+    ----------
+    results : Results
+        The results.
+
+    Yields
+    ------
+    str
+        The next piece.
+
+    Examples
+    --------
+    >>> empty = Results(provenance={}, detectors=(), groups=(), contacts=(), false_alarms=(), exposure=())
+    >>> "".join(json_pieces(empty)) == to_json(empty)
+    True
+    """
+    before = "{"
+    for item in fields(results):
+        yield f'{before}\n "{item.name}": '
+        before = ","
+        value = getattr(results, item.name)
+        if isinstance(value, Sequence) and len(value) and is_dataclass(value[0]):
+            yield from _rows_in_json(value)
+        else:
+            is_row = is_dataclass(value)
+            plain = tuple(value) if isinstance(value, Rows) else asdict(value) if is_row else value
+            yield strict_json(plain).replace("\n", "\n ")
+    yield "\n}\n"
+
+
+def _rows_in_json(rows: Sequence[Any]) -> Iterator[str]:
+    before = "["
+    for row in rows:
+        values = row.__dict__
+        if any(isinstance(value, tuple | list | Mapping) for value in values.values()):
+            text = strict_json(asdict(row)).replace("\n", "\n  ")
+        else:
+            text = f"{{\n   {flat_strict_json(values, ',' + _FIELD)[1:-1]}\n  }}"
+        yield f"{before}\n  {text}"
+        before = ","
+    yield "\n ]"
 
 
 def read_results(path: Path) -> Results:
@@ -216,7 +265,7 @@ def _value(kind: Any, value: Any, where: str) -> Any:
             return None
         kind = next(item for item in get_args(kind) if item is not type(None))
         return _value(kind, value, where)
-    if origin is tuple:
+    if origin in (tuple, Sequence):
         if not isinstance(value, list):
             raise ValueError(f"{where} is not a list")
         item_kind = get_args(kind)[0]
@@ -295,7 +344,7 @@ def _schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin in (Union, types.UnionType):
         (known,) = (item for item in inner if item is not type(None))
         return {"type": [_SCHEMA_TYPES[known], "null"]}
-    if origin is tuple:
+    if origin in (tuple, Sequence):
         return {"type": "array", "items": _schema(inner[0], parts)}
     if origin is Mapping:
         return {"type": "object", "additionalProperties": _schema(inner[1], parts)}

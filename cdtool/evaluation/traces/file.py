@@ -57,7 +57,7 @@ def traces_path(results: Path) -> Path:
     return results.with_name(f"{results.stem}.traces.json.gz")
 
 
-def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
+def encode_traces(traces: Sequence[Trace], results: str = "", results_sha256: str = "") -> bytes:
     """Return traces as gzipped JSON.
 
     Parameters
@@ -66,6 +66,8 @@ def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
         The traces of a benchmark.
     results : str
         The text of the results file that they belong to.
+    results_sha256 : str
+        Its hash, in place of the text.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
     """
     values = {
         "schema_version": SCHEMA_VERSION,
-        "results_sha256": _digest(results),
+        "results_sha256": results_sha256 or _digest(results),
         "traces": [trace_values(trace) for trace in traces],
     }
     return gzip.compress(strict_json(values, compact=True).encode("utf-8"), compresslevel=6, mtime=0)
