@@ -15,28 +15,19 @@ from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.determinants import Determinants
+from cdtool.workflows.benchmark.known_sources import KnownSources
 from cdtool.workflows.benchmark.log_outcome import DetectorOutcome, LogOutcome, LogRows
-from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome, source_files
-from cdtool.workflows.execution.workers import Workers, in_order
+from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome
+from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.store.digest import code_version
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
-from cdtool.workflows.store.sources import SourceFile, read_sources, state_of
+from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.store import RunRecord, Store, write_run
+from cdtool.workflows.store.use import StoreUse
 
 _Rows = tuple[LogRows, ...]
 _OfDetector = tuple[DetectorOutcome | None, ...]
-# Files that a worker hashes before its digests are sent.
-_HASHED_TOGETHER = 64
-
-
-@dataclass(frozen=True)
-class StoreUse:
-    """How a store is used: `folder`; `trust_times`: a file of the same size and time is the same; `retry_failed`."""
-
-    folder: Path
-    trust_times: bool = False
-    retry_failed: bool = False
 
 
 @dataclass(frozen=True)
@@ -61,53 +52,27 @@ class StoreReport:
     reused: int = 0
 
 
-@dataclass(frozen=True)
-class _Hashing:
-    """Reads the sources of one log."""
-
-    setup: BenchmarkFile
-
-    def __call__(self, path: Path) -> tuple[SourceFile, ...] | None:
-        return read_sources(source_files(self.setup, path))
-
-
-def known_sources(
-    setup: BenchmarkFile, store: Store, use: StoreUse, paths: Sequence[Path], names: Sequence[str], workers: Workers
-) -> list[tuple[SourceFile, ...] | None]:
-    """Return the sources of those logs that the store knows by name, hashed unless their times are trusted."""
-    found: list[tuple[SourceFile, ...] | None] = [None] * len(paths)
-    to_hash: list[int] = []
-    for number, (path, name) in enumerate(zip(paths, names, strict=True)):
-        before = store.sources_of(name)
-        if before is None:
-            continue
-        states = tuple((item.size, item.modified) for item in before)
-        if use.trust_times and state_of(source_files(setup, path)) == states:
-            found[number] = before
-        else:
-            to_hash.append(number)
-    logs = [paths[number] for number in to_hash]
-    hashed = in_order(_Hashing(setup), logs, len(logs), workers, of_lost=lambda *_: None, together=_HASHED_TOGETHER)
-    for number, sources in zip(to_hash, hashed, strict=True):
-        found[number] = sources
-    return found
-
-
 class StoredOutcomes:
     """The outcomes of logs in a store, and those that are computed and added to it."""
 
-    def __init__(self, store: Store, use: StoreUse, setup: BenchmarkFile, determinants: Determinants) -> None:
+    def __init__(
+        self,
+        store: Store,
+        use: StoreUse,
+        setup: BenchmarkFile,
+        determinants: Determinants,
+        keys: Sequence[str] = (),
+    ) -> None:
         self.store, self.use, self.setup, self.determinants = store, use, setup, determinants
         self.names = setup.detectors
-        self.keys: list[str] = []
+        self.keys = list(keys)
         self.computed = self.reused = self.failed = 0
         self.began = time.time()
 
     def plan(self, logs: Sequence[tuple[str, Path]], workers: Workers) -> list[Planned]:
         """Return what is in the store of each log."""
-        of = self.determinants
-        paths = [path for _, path in logs]
-        sources = known_sources(self.setup, self.store, self.use, paths, [of.name(path) for path in paths], workers)
+        known = KnownSources(self.setup, self.store, self.use, workers)
+        sources = known.of([path for _, path in logs])
         return [self._planned(group, path, known) for (group, path), known in zip(logs, sources, strict=True)]
 
     def _planned(self, group: str, path: Path, sources: tuple[SourceFile, ...] | None) -> Planned:

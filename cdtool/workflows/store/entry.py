@@ -15,8 +15,8 @@ class Entry:
     """What was computed for a recording: rows of the log, of one detector, a trace, or thresholds learned.
 
     `key` is a SHA-256 in hexadecimal digits; `content` is JSON. `sources` are the files read for it, `seconds` the time
-    that it took, `failed` whether it is a reading error; `version` is that of the code. An entry of the kind "source" has
-    only the sources of a log that was learned from.
+    that it took, `failed` whether it is a reading error; `version` is that of the code. An entry of the kind "source"
+    has only the sources of a log that was learned from.
     """
 
     key: str
