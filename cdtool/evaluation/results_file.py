@@ -39,8 +39,6 @@ _IN_SAMPLES = re.compile(r"\bfor \d+ samples?\b")
 _RENAMED = {"kept": "met", "broken": "violated", "not assessable": "not_assessable"}
 _NEXT_STEP = "write one with cdtool benchmark -o results.json"
 _PLAIN = {float: "a number", int: "a whole number", str: "a text", bool: "true or false"}
-# What separates the fields of a row, with the layout of `strict_json`.
-_FIELD = "\n   "
 _SCHEMA_TYPES = {str: "string", float: "number", int: "integer", bool: "boolean"}
 # The possible values of a text field: of one class, or of every class that has the field.
 WORDS: Mapping[tuple[type, str] | str, tuple[str, ...]] = {
@@ -108,17 +106,27 @@ def json_pieces(results: Results) -> Iterator[str]:
     yield "\n}\n"
 
 
-def _rows_in_json(rows: Sequence[Any]) -> Iterator[str]:
-    before = "["
+def _rows_in_json(rows: Sequence[Any], depth: int = 2) -> Iterator[str]:
+    """Yield rows as `strict_json` lays them out at a depth."""
+    before, line = "[", "\n" + " " * depth
     for row in rows:
-        values = row.__dict__
-        if any(isinstance(value, tuple | list | Mapping) for value in values.values()):
-            text = strict_json(asdict(row)).replace("\n", "\n  ")
-        else:
-            text = f"{{\n   {flat_strict_json(values, ',' + _FIELD)[1:-1]}\n  }}"
-        yield f"{before}\n  {text}"
+        yield f"{before}{line}{{{line} {_fields_in_json(row, depth)}{line}}}"
         before = ","
-    yield "\n ]"
+    yield f"{line[:-1]}]"
+
+
+def _fields_in_json(row: Any, depth: int) -> str:
+    values, between = row.__dict__, ",\n " + " " * depth
+    if not any(isinstance(value, tuple | Mapping) for value in values.values()):
+        return flat_strict_json(values, between)[1:-1]
+    parts = []
+    for name, value in values.items():
+        if isinstance(value, tuple) and value and is_dataclass(value[0]):
+            text = "".join(_rows_in_json(value, depth + 2))
+        else:
+            text = strict_json(value).replace("\n", between[1:])
+        parts.append(f'"{name}": {text}')
+    return between.join(parts)
 
 
 def read_results(path: Path) -> Results:

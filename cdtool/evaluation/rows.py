@@ -11,6 +11,7 @@ from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache, partial
+from itertools import islice, pairwise
 from typing import Any, Generic, Protocol, TypeVar, get_args, get_origin, get_type_hints, overload
 
 Row = TypeVar("Row")
@@ -26,6 +27,8 @@ class _Column(Protocol):
     def at(self, number: int) -> Any: ...
 
     def between(self, first: int, last: int) -> Sequence[Any]: ...
+
+    def some(self, numbers: Sequence[int]) -> Sequence[Any]: ...
 
 
 class Rows(Sequence[Row], Generic[Row]):
@@ -96,8 +99,21 @@ class Rows(Sequence[Row], Generic[Row]):
     def __iter__(self) -> Iterator[Row]:
         for first in range(0, self._length, _AT_ONCE):
             last = min(first + _AT_ONCE, self._length)
-            for values in zip(*(column.between(first, last) for column in self._columns), strict=True):
-                yield _row(self.kind, self.names, values)
+            yield from self.between(first, last)
+
+    def between(self, first: int, last: int) -> Iterator[Row]:
+        """Yield the rows from one number up to another."""
+        columns = [column.between(first, last) for column in self._columns]
+        return (_row(self.kind, self.names, values) for values in zip(*columns, strict=True))
+
+    def some(self, numbers: Sequence[int]) -> Iterator[Row]:
+        """Yield the rows with these numbers."""
+        columns = [column.some(numbers) for column in self._columns]
+        return (_row(self.kind, self.names, values) for values in zip(*columns, strict=True))
+
+    def values_at(self, name: str, numbers: Sequence[int]) -> Sequence[Any]:
+        """Return the values of a field of the rows with these numbers."""
+        return self._columns[self.names.index(name)].some(numbers)
 
     def __eq__(self, other: object) -> Any:
         return _equal(self, other)
@@ -115,8 +131,8 @@ class _Picked(Sequence[Row]):
         self.rows, self.numbers = rows, numbers
 
     def values(self, name: str) -> Sequence[Any]:
-        every = self.rows.values(name)
-        return [every[number] for number in self.numbers]
+        """Return the values of a field."""
+        return self.rows.values_at(name, self.numbers)
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -133,7 +149,8 @@ class _Picked(Sequence[Row]):
         return self.rows[self.numbers[number]]
 
     def __iter__(self) -> Iterator[Row]:
-        return (self.rows[number] for number in self.numbers)
+        for first in range(0, len(self.numbers), _AT_ONCE):
+            yield from self.rows.some(self.numbers[first : first + _AT_ONCE])
 
     def __eq__(self, other: object) -> Any:
         return _equal(self, other)
@@ -232,6 +249,10 @@ class _Floats:
             return numbers
         return [None if is_absent else value for value, is_absent in zip(numbers, absent, strict=True)]
 
+    def some(self, numbers: Sequence[int]) -> Sequence[float | None]:
+        known, absent = self.numbers, self.absent
+        return [None if absent[number] else known[number] for number in numbers]
+
 
 class _Objects:
     """Texts, counts and everything else: one object for all equal texts."""
@@ -248,6 +269,10 @@ class _Objects:
     def between(self, first: int, last: int) -> Sequence[Any]:
         return self.items[first:last]
 
+    def some(self, numbers: Sequence[int]) -> Sequence[Any]:
+        items = self.items
+        return [items[number] for number in numbers]
+
 
 class _Nested:
     """A tuple of rows in each row: all of them in rows of their own."""
@@ -261,10 +286,17 @@ class _Nested:
         self.ends.append(len(self.rows))
 
     def at(self, number: int) -> tuple[Any, ...]:
-        return tuple(self.rows[self.ends[number] : self.ends[number + 1]])
+        return tuple(self.rows.between(self.ends[number], self.ends[number + 1]))
 
     def between(self, first: int, last: int) -> Sequence[tuple[Any, ...]]:
-        return [self.at(number) for number in range(first, last)]
+        ends = self.ends[first : last + 1]
+        rows = self.rows.between(ends[0], ends[-1])
+        return [tuple(islice(rows, end - begin)) for begin, end in pairwise(ends)]
+
+    def some(self, numbers: Sequence[int]) -> Sequence[tuple[Any, ...]]:
+        spans = [range(self.ends[number], self.ends[number + 1]) for number in numbers]
+        rows = self.rows.some([place for span in spans for place in span])
+        return [tuple(islice(rows, len(span))) for span in spans]
 
 
 @cache
