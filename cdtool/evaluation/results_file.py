@@ -19,7 +19,6 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, ConclusionResult, ContactResult, LimitResult, Results
-from cdtool.evaluation.rows import Rows
 from cdtool.evaluation.summary import kind_group
 from cdtool.file_kinds import kind_of
 from cdtool.strict_json import flat_strict_json, strict_json
@@ -97,17 +96,25 @@ def json_pieces(results: Results) -> Iterator[str]:
         yield f'{before}\n "{item.name}": '
         before = ","
         value = getattr(results, item.name)
-        if isinstance(value, Sequence) and len(value) and is_dataclass(value[0]):
+        if _are_rows(value):
             yield from _rows_in_json(value)
         else:
-            is_row = is_dataclass(value)
-            plain = tuple(value) if isinstance(value, Rows) else asdict(value) if is_row else value
-            yield strict_json(plain).replace("\n", "\n ")
+            yield strict_json(asdict(value) if is_dataclass(value) else value).replace("\n", "\n ")  # type: ignore[arg-type]
     yield "\n}\n"
+
+
+def _are_rows(value: Any) -> bool:
+    """Whether a value has rows; a tuple also has names."""
+    if isinstance(value, tuple):
+        return bool(value) and is_dataclass(value[0])
+    return isinstance(value, Sequence) and not isinstance(value, str)
 
 
 def _rows_in_json(rows: Sequence[Any], depth: int = 2) -> Iterator[str]:
     """Yield rows as `strict_json` lays them out at a depth."""
+    if not rows:
+        yield "[]"
+        return
     before, line = "[", "\n" + " " * depth
     for row in rows:
         yield f"{before}{line}{{{line} {_fields_in_json(row, depth)}{line}}}"
@@ -121,7 +128,7 @@ def _fields_in_json(row: Any, depth: int) -> str:
         return flat_strict_json(values, between)[1:-1]
     parts = []
     for name, value in values.items():
-        if isinstance(value, tuple) and value and is_dataclass(value[0]):
+        if _are_rows(value):
             text = "".join(_rows_in_json(value, depth + 2))
         else:
             text = strict_json(value).replace("\n", between[1:])

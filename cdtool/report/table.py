@@ -14,6 +14,8 @@ Item = TypeVar("Item")
 # A recording's group and name.
 Log = tuple[str, str]
 
+# A table of more rows shows so many of them: results.json has all.
+MOST_ROWS = 5000
 # Sorts after every number.
 _LAST = 1e300
 _TONES = {"met": "good", "pass": "good", "violated": "bad", "fail": "bad", "not_assessable": "unknown"}
@@ -66,6 +68,7 @@ class Table:
     """A table under its title; `source` names its rows in results.json.
 
     `marks`: by a property that readers may select, whether each row has it. `logs`: the recording of each row.
+    `more` rows are not shown, because there are too many.
     """
 
     name: str
@@ -75,11 +78,13 @@ class Table:
     source: str = ""
     marks: Mapping[str, Sequence[bool]] = field(default_factory=dict)
     logs: Sequence[Log] = ()
+    more: int = 0
 
     @property
     def counted_title(self) -> str:
         """The title with the number of rows."""
-        return f"{self.title} ({len(self.rows)})"
+        shown = f"{len(self.rows)} of " if self.more else ""
+        return f"{self.title} ({shown}{len(self.rows) + self.more})"
 
     def cells(self, heading: str) -> list[Cell]:
         """Return the cells below a heading."""
@@ -105,9 +110,10 @@ class Table:
 def tabulate(
     name: str, title: str, fields: Fields[Item], items: Sequence[Item], source: str = "", logs: Sequence[Log] = ()
 ) -> Table:
-    """Return the table with a row per item and a column per field."""
-    rows = [[make(item) for _, make in fields] for item in items]
-    return Table(name, title, [column for column, _ in fields], rows, source, logs=logs)
+    """Return the table with a row per item, up to `MOST_ROWS`, and a column per field."""
+    rows = [[make(item) for _, make in fields] for item in items[:MOST_ROWS]]
+    more = max(len(items) - MOST_ROWS, 0)
+    return Table(name, title, [column for column, _ in fields], rows, source, logs=logs[:MOST_ROWS], more=more)
 
 
 def count_cell(count: int, tone: str = "") -> Cell:

@@ -29,12 +29,15 @@ _FOLDER = Path(__file__).with_name("page_files")
 _REASONS = 10
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
-    *("not_met", "met", "results", "kinds", "comparisons", "force", "points", "forces", "recordings", "not_assessable"),
-    *("skipped", "damaged", "findings", "calibration"),
+    *("not_met", "met", "results", "kinds", "comparisons", "force", "points", "forces", "recordings", "cases"),
+    *("not_assessable", "skipped", "damaged", "findings", "calibration"),
 )
 _TEMPLATE, _STYLE = "report.html.j2", "report.css"
 # In the order in which they use one another.
-_SCRIPTS = ("scales.js", "chart.js", "legend.js", "plots.js", "forces.js", "trace.js", "tables.js", "report.js")
+_SCRIPTS = (
+    *("scales.js", "chart.js", "legend.js", "plots.js", "histogram.js", "forces.js", "trace.js", "tables.js"),
+    "report.js",
+)
 # JSON inside a page must not end its script element, nor its line where a script is read.
 _ESCAPES = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&\u2028\u2029"})
 

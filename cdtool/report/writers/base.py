@@ -37,8 +37,8 @@ class Report:
 
     @cached_property
     def model(self) -> Model:
-        """The tables, texts and test cases that all renderers show."""
-        return report_model(self.evaluated)
+        """The tables and texts that all renderers show."""
+        return report_model(self.evaluated, dict.fromkeys((trace.group, trace.recording) for trace in self.traces))
 
 
 class Writer(Generic[Content]):
