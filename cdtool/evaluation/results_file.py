@@ -137,12 +137,12 @@ def _fields_in_json(row: Any, depth: int) -> str:
 
 
 def read_results(path: Path) -> Results:
-    """Read a results.json.
+    """Read a results.json, or the folder results.parquet.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The file or folder.
 
     Returns
     -------
@@ -153,6 +153,8 @@ def read_results(path: Path) -> Results:
     ------
     RecordingError
         The file is not a results file, is damaged, or is of an unknown version.
+    UsageError
+        It is a folder, and pyarrow is not installed.
 
     Examples
     --------
@@ -161,6 +163,10 @@ def read_results(path: Path) -> Results:
     >>> read_results(Path("results.json")) == empty
     True
     """
+    if path.is_dir():
+        from cdtool.evaluation.results_folder import read_tables
+
+        return read_tables(path)
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = parse_json(content)
