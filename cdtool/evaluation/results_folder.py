@@ -227,7 +227,7 @@ def _write(
     if of_recordings:
         known = {item.name for item in columns}
         listed += [pa.field(name, pa.string()) for name in ("campaign", "point", "machine") if name not in known]
-        listed.append(pa.field("began", pa.timestamp("us", tz="UTC"), metadata={"meaning": "of the recording"}))
+        listed.append(pa.field("began", pa.timestamp("us"), metadata={"meaning": "when the recording began, UTC"}))
     schema = pa.schema(listed)
     with pq.ParquetWriter(path, schema, compression="zstd") as writer:
         for first in range(0, max(len(places), 1), _AT_ONCE):

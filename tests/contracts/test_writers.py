@@ -58,7 +58,7 @@ def test_it_replaces_no_file_of_another_program_unasked(name, suffix, tmp_path):
     for path in WRITERS.load(name)().files(tmp_path / f"report{suffix}"):
         path.write_bytes(b"written by hand")
         writes_folder = WRITERS.load(name).writes_folder
-        with pytest.raises(UsageError, match="already exists and (contains no|is not a folder)"):
+        with pytest.raises(UsageError, match=r"already exists and (contains no|is not a folder)"):
             check_outputs([tmp_path / f"report{suffix}"], force=writes_folder, subject=subject)
         if not writes_folder:
             check_outputs([tmp_path / f"report{suffix}"], force=True, subject=subject)

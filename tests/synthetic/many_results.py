@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from tests.report.html.html_case import ONSET, trace_of
 DETECTORS = ("momentum", "pure_inertia", "friction_ekf", "inertial_momentum", "pure_torque")
 GROUPS = ("stiff", "soft", "holdout")
 DOORS = 40
-DAY_S, FIRST_DAY = 86400.0, 1_767_225_600.0  # 2026-01-01
+FIRST_DAY = datetime(2026, 1, 1, 8, tzinfo=UTC)
 # Latency [ms] by group, and its factor by detector.
 MEDIAN_MS = {"stiff": 30.0, "soft": 120.0}
 SLOWER = (1.0, 1.3, 0.8, 1.1, 3.0)
@@ -52,8 +53,9 @@ def rows_of_logs(count: int, detectors: int = 2, seed: int = 0) -> Iterator[Rows
     rng = np.random.default_rng(seed)
     for number in range(count):
         group, door = GROUPS[number % 3], number % DOORS
-        name = f"{group}/door-{door:02d}/2026-{1 + number % 12:02d}-{1 + number % 28:02d}/run_{number:06d}.mcap"
-        began = FIRST_DAY + DAY_S * (31 * (number % 12) + number % 28)
+        day = FIRST_DAY + timedelta(days=3 * (number // DOORS) % 360)
+        name = f"{group}/door-{door:02d}/{day:%Y-%m-%d}/run_{number:06d}.mcap"
+        began = day.timestamp()
         log = RecordingResult(name, group, f"{number:064x}", 8.2, 1, int(group != "holdout"), began_s=began)
         names = DETECTORS[:detectors]
         if group == "holdout":
