@@ -6,6 +6,8 @@ from cdtool.evaluation.results import Results
 
 # A page with every recording of five detectors then has less than 15 MB.
 MOST_RECORDINGS, MOST_CONTACTS = 5000, 30_000
+# Of many results, a table of single contacts or recordings has the first ones; a comment in a pull request has fewer.
+_MOST_ROWS = 1000
 
 
 def is_many(results: Results) -> bool:
@@ -27,3 +29,23 @@ def is_many(results: Results) -> bool:
     False
     """
     return len(results.recordings) > MOST_RECORDINGS or len(results.contacts) > MOST_CONTACTS
+
+
+def most_rows(results: Results) -> int | None:
+    """Return the most rows of a table of single contacts or recordings; None: all of them.
+
+    Parameters
+    ----------
+    results : Results
+        The results of a benchmark.
+
+    Returns
+    -------
+    int or None
+        The number.
+
+    Examples
+    --------
+    >>> most_rows(Results({}, (), (), (), (), ()))
+    """
+    return _MOST_ROWS if is_many(results) else None

@@ -14,8 +14,6 @@ Item = TypeVar("Item")
 # A recording's group and name.
 Log = tuple[str, str]
 
-# A table of more rows shows so many of them: results.json has all.
-MOST_ROWS = 5000
 # Sorts after every number.
 _LAST = 1e300
 _TONES = {"met": "good", "pass": "good", "violated": "bad", "fail": "bad", "not_assessable": "unknown"}
@@ -82,9 +80,8 @@ class Table:
 
     @property
     def counted_title(self) -> str:
-        """The title with the number of rows."""
-        shown = f"{len(self.rows)} of " if self.more else ""
-        return f"{self.title} ({shown}{len(self.rows) + self.more})"
+        """The title with the number of rows, also those that are not shown."""
+        return f"{self.title} ({len(self.rows) + self.more})"
 
     def cells(self, heading: str) -> list[Cell]:
         """Return the cells below a heading."""
@@ -108,12 +105,18 @@ class Table:
 
 
 def tabulate(
-    name: str, title: str, fields: Fields[Item], items: Sequence[Item], source: str = "", logs: Sequence[Log] = ()
+    name: str,
+    title: str,
+    fields: Fields[Item],
+    items: Sequence[Item],
+    source: str = "",
+    logs: Sequence[Log] = (),
+    most: int | None = None,
 ) -> Table:
-    """Return the table with a row per item, up to `MOST_ROWS`, and a column per field."""
-    rows = [[make(item) for _, make in fields] for item in items[:MOST_ROWS]]
-    more = max(len(items) - MOST_ROWS, 0)
-    return Table(name, title, [column for column, _ in fields], rows, source, logs=logs[:MOST_ROWS], more=more)
+    """Return the table with a row per item, up to `most`, and a column per field."""
+    rows = [[make(item) for _, make in fields] for item in items[:most]]
+    columns = [column for column, _ in fields]
+    return Table(name, title, columns, rows, source, logs=logs[:most], more=len(items) - len(rows))
 
 
 def count_cell(count: int, tone: str = "") -> Cell:

@@ -91,7 +91,7 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
         (Column("why"), lambda item: Cell(item.why or NOTHING)),
     )
     table = tabulate("cases", "Worst and failed cases", fields, cases, "contacts", [case.log for case in cases])
-    marks = {"missed by every detector": [case.missed_by_all for case in cases[: len(table.rows)]]}
+    marks = {"missed by every detector": [case.missed_by_all for case in cases]}
     return replace(table, marks=marks), f"Listed: {'; '.join(counts)}." if counts else ""
 
 
@@ -110,7 +110,8 @@ def _kinds(
     missed = Counter(_contact_numbers(of_outcome.get(("missed",), ())))
     for outcome, (_, _, words, by) in _OUTCOMES.items():
         rows = of_outcome.get((outcome,), ())
-        listed = _worst(rows, ("group", "detector"), by, most, traced)
+        # A trace does not make a latency longer.
+        listed = _worst(rows, ("group", "detector"), by, most, () if outcome == "detected" else traced)
         by_all = [missed[item.group, item.recording, item.contact] == len(results.detectors) for item in listed]
         yield words, [_of_contact(*item) for item in zip(listed, by_all, strict=True)], len(rows)
 
