@@ -54,6 +54,8 @@ TITLES = {
     "provenance": "Provenance",
 }
 _CONTACT = ("group", "recording", "contact")
+# Where only the worst and the failed cases are listed.
+TITLES_OF_MANY = {"latency": "Distribution of the latency", "recordings": TITLES["cases"]}
 # A text from a file that is part of a sentence is cut to this length.
 _LONGEST = 200
 

@@ -17,7 +17,7 @@ from cdtool.plain_text import counted
 from cdtool.report.html.page_tables import PageTable, classes, visible
 from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.traces import plot_height, trace_data
-from cdtool.report.model import NO_CERTIFICATE, TITLES
+from cdtool.report.model import NO_CERTIFICATE, TITLES, TITLES_OF_MANY
 from cdtool.report.writers.base import Report
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def to_html(report: Report) -> str:
         trace_height=plot_height(traces[0]) if traces else 0,
         kept=f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
         model=model,
-        titles=TITLES,
+        titles=TITLES | (TITLES_OF_MANY if "cases" in model.tables else {}),
         certificate=NO_CERTIFICATE,
         tables=tables,
         provenance=[PageTable(table, {}) for table in model.provenance],

@@ -34,6 +34,7 @@ from cdtool.report.writers.base import Report
 Row = TypeVar("Row")
 # Heights [px] of a detector's lane in the latency plot and of the other plots.
 LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT = 66, 44, 300
+HISTOGRAM_HEIGHT = 96
 
 # Classes of a histogram, and the most points of a curve.
 CLASSES, MOST_STEPS = 60, 400
@@ -138,7 +139,7 @@ def _histograms(results: Results, summaries: Sequence[Summary], contacts: Contac
             }
             for item, of_detector in zip(items, latency, strict=True)
         ]
-        height = LANE_HEIGHT * len(rows) + LANES_AXIS_HEIGHT
+        height = HISTOGRAM_HEIGHT * len(rows) + LANES_AXIS_HEIGHT
         found.append({"group": shown(group), "rows": rows, "edges": _numbers(edges), "height": height})
     return found
 

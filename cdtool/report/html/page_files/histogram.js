@@ -1,7 +1,7 @@
 // Latencies of more contacts than a plot can mark: one chart per group, one histogram per detector.
 
-const BARS_TOP = 32;
-const BARS_BOTTOM = 56;
+const BARS_TOP = 36;
+const BARS_BOTTOM = 80;
 
 /** A histogram in each detector's lane, with the median and its interval below. */
 function histogramPlan(data, panel) {
@@ -30,7 +30,7 @@ function histogramPlan(data, panel) {
       return `M${from} ${top + BARS_BOTTOM}V${(top + BARS_BOTTOM - height).toFixed(1)}H${to}V${top + BARS_BOTTOM}Z`;
     });
     draw(tint(draw(chart.layer, "g"), detector), "path", { class: "bar", d: bars.join("") });
-    drawMedian(chart, row.median, top + BARS_BOTTOM - 4, clamp);
+    drawMedian(chart, row.median, top + BARS_BOTTOM, clamp);
   }
 
   return {
