@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -88,16 +88,16 @@ class _Drawn:
 
 
 def measured(recordings: int, detectors: int, folder: Path) -> dict[str, list[float]]:
-    """Seconds, peak of memory [MB] and size [MB] of each step with that many recordings."""
+    """Seconds of the processor, peak of memory [MB] and size [MB] of each step with that many recordings."""
     warm = _gathered(60, detectors)
     write_outputs(Report(evaluate(warm.results({"tool": "cdtool"})), warm.traces), [folder / name for name in REPORTS])
     shutil.rmtree(folder / "results.parquet")
     steps: dict[str, list[float]] = {"before": [0.0, _peak_mb(), 0.0]}
 
     def step(name: str, work: Callable[[], Any], target: Path | None = None) -> Any:
-        begin = perf_counter()
+        begin = process_time()
         made = work()
-        steps[name] = [perf_counter() - begin, _peak_mb(), _megabytes(target) if target else 0.0]
+        steps[name] = [process_time() - begin, _peak_mb(), _megabytes(target) if target else 0.0]
         return made
 
     gathered = step("gathering", lambda: _gathered(recordings, detectors))
@@ -164,7 +164,7 @@ def main(with_browser: bool) -> int:
             steps = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
             print(f"\n{recordings} recordings, {detectors} detectors")
             rows = [(step, f"{took:.1f}", f"{peak:.0f}", f"{size:.2f}") for step, (took, peak, size) in steps.items()]
-            table(("step", "s", "peak MB", "file MB"), rows)
+            table(("step", "CPU s", "peak MB", "file MB"), rows)
             peaks[recordings] = max(peak for _, peak, _ in steps.values())
             slopes[recordings] = sum(took for took, _, _ in steps.values())
         print()
@@ -173,7 +173,8 @@ def main(with_browser: bool) -> int:
         page = Path(name) / str(SIZES[-1][0]) / "report.html"
         held &= _verdict("page of 100,000 recordings [MB]", _megabytes(page), MOST_PAGE_MB)
         for recordings, took in slopes.items():
-            print(f"      {recordings} recordings: {1e3 * took / recordings:.2f} ms each in the first process")
+            each = 1e3 * took / recordings
+            print(f"      {recordings} recordings: {each:.2f} ms of CPU time each in the first process")
         if with_browser:
             seconds, messages = opened(page)
             held &= _verdict("page of 100,000 recordings reacts after [s]", seconds, MOST_SECONDS)
