@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic_ns
@@ -38,6 +38,23 @@ class Failed:
     """A piece of work that may succeed when it is repeated, with the reason why it did not."""
 
     reason: str
+
+
+def limit_words(seconds: float) -> str:
+    """Return the reason of an item that took longer than the time limit."""
+    return f"took longer than {seconds:g} s (--timeout)"
+
+
+def ended_words(code: int) -> str:
+    """Return the reason of an item whose worker process ended, by its exit status; negative: by a signal."""
+    if code >= 0:
+        return f"its worker process ended with exit status {code}"
+    with suppress(ValueError):
+        name = signal.Signals(-code).name
+        if name == "SIGKILL":
+            return "its worker process was killed (SIGKILL): mostly because the memory was not enough"
+        return f"its worker process crashed ({name})"
+    return f"its worker process ended by signal {-code}"
 
 
 def keep_freed_memory() -> None:

@@ -6,6 +6,7 @@ process has several threads, they are new processes of Python.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -20,11 +21,13 @@ from time import monotonic_ns
 from typing import Any
 
 from cdtool.errors import WorkerError
-from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do
+from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, ended_words, limit_words
 
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
 _JOINED_WITHIN = 10.0
+# After the time limit, a process has this long to end itself; the pieces are compared with it so often [s].
+_GRACE, _CHECKED_EVERY = 2.0, 1.0
 
 
 class Processes:
@@ -34,7 +37,7 @@ class Processes:
     """
 
     broken: tuple[type[BaseException], ...] = (BrokenProcessPool, CancelledError)
-    is_exact = True
+    isolates = False
 
     def __init__(self, work: Callable[[Any], Any], size: int, limit: float | None) -> None:
         self.size = size
@@ -55,7 +58,7 @@ class Processes:
             self.size, context, initializer=begin, initargs=(self._work, self._claims, free, self._limit)
         )
 
-    def submit(self, batch: Sequence[tuple[int, Any]]) -> Future[list[Any]]:
+    def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:  # noqa: ARG002
         """Return the future results of some numbered pieces; a pool whose process has ended gives a failed one."""
         try:
             future = self._pool.submit(do, batch)
@@ -66,7 +69,7 @@ class Processes:
             self._children |= set(active_children()) - self._others
         return future
 
-    def blamed(self, lost: Sequence[tuple[int, Any]]) -> dict[int, str]:  # noqa: ARG002  claims tell it
+    def blamed(self, lost: Future[list[Any]]) -> dict[int, str]:  # noqa: ARG002  the claims show it
         """Return the numbers of the pieces that ended their processes, with the reasons, and start new processes.
 
         Raises WorkerError if the processes end again and again before they have begun a piece.
@@ -92,16 +95,21 @@ class Processes:
         return found
 
     def _reason(self, code: int, seconds: float) -> str:
-        if self._limit is not None and code == 1 and seconds >= self._limit:
-            return f"took longer than {self._limit:g} s (--timeout)"
-        if code >= 0:
-            return f"its worker process ended with exit status {code}"
-        with suppress(ValueError):
-            name = signal.Signals(-code).name
-            if name == "SIGKILL":
-                return "its worker process was killed (SIGKILL): mostly because the memory was not enough"
-            return f"its worker process crashed ({name})"
-        return f"its worker process ended by signal {-code}"
+        if self._limit is not None and code in (1, -signal.SIGKILL) and seconds >= self._limit:
+            return limit_words(self._limit)
+        return ended_words(code)
+
+    def check(self) -> float | None:
+        """End a process whose piece takes too long and which did not end itself, as one that is stopped."""
+        if self._limit is None:
+            return None
+        now = monotonic_ns()
+        for first in range(0, len(self._claims), CLAIM):
+            process, number, since = self._claims[first : first + CLAIM]
+            if number and 1e-9 * (now - since) > self._limit + _GRACE:
+                with suppress(OSError):
+                    os.kill(process, signal.SIGKILL)
+        return _CHECKED_EVERY
 
     def progressed(self) -> None:
         """Note that a piece was done: the processes work."""

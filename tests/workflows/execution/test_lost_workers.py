@@ -168,7 +168,7 @@ class Shared:
     """
 
     broken = (ConnectionError,)
-    is_exact = False
+    isolates = True
     size = 1
 
     def __init__(self, ends, once):
@@ -240,7 +240,7 @@ class Sizes:
     """A pool that notes how many items it receives at once."""
 
     broken = ()
-    is_exact = True
+    isolates = False
 
     def __init__(self, size):
         self.size, self.seen = size, []
