@@ -34,7 +34,7 @@ _SILENT = 20.0
 # So long a run waits for another worker after the last one has ended [s].
 _WITHOUT_WORKERS = 60.0
 # Within this time the nanny of a worker that has ended reports why, mostly by its next worker [s].
-_REASON_WITHIN = 5.0
+_REASON_WITHIN = 20.0
 
 
 class WorkerLostError(Exception):
@@ -283,9 +283,9 @@ class ClusterWorkers:
         while True:
             if worker.address in self.session.over_memory:
                 return "its worker process was ended: the memory was not enough"
-            code = self.session.exit_status(worker)
-            if code is not None:
-                return ended_words(code)
-            if monotonic() > until or worker.nanny is None:
+            if worker.nanny is None or monotonic() > until:
                 return "its worker process ended"
+            if (successor := self.session.successor(worker)) is not None:
+                code = self.session.exit_status(worker, successor)
+                return "its worker process ended" if code is None else ended_words(code)
             threading.Event().wait(0.2)

@@ -174,13 +174,16 @@ class Session:
 
         threading.Thread(target=end, daemon=True).start()
 
-    def exit_status(self, worker: Worker) -> int | None:
-        """Return the exit status of a worker process that has ended, negative for a signal, if its nanny reports it."""
-        successors = [item.address for item in list(self.workers.values()) if item.nanny == worker.nanny]
-        if worker.nanny is None or not successors:
+    def successor(self, worker: Worker) -> str | None:
+        """Return the address of the worker process that the nanny of one that has ended has started after it."""
+        if worker.nanny is None:
             return None
+        return next((item.address for item in list(self.workers.values()) if item.nanny == worker.nanny), None)
+
+    def exit_status(self, worker: Worker, successor: str) -> int | None:
+        """Return the exit status of a worker process that has ended, negative for a signal, if its nanny reports it."""
         try:
-            logs = self.client.get_worker_logs(workers=successors[:1], nanny=True)
+            logs = self.client.get_worker_logs(workers=[successor], nanny=True)
         except Exception:
             return None
         said = re.compile(rf"Worker process {worker.number} (was killed by signal|exited with status) (\d+)")
@@ -221,13 +224,13 @@ def session_of(cluster: str, jobs: int, inputs: Iterable[Path] = ()) -> Iterator
     with ExitStack() as stack:
         stack.enter_context(_silent())
         stack.enter_context(dask.config.set(_SETTINGS))
+        connect: Any = distributed.Client
         address: Any = stack.enter_context(_local(jobs)) if cluster == LOCAL else cluster
         try:
-            client = distributed.Client(address, timeout=_CONNECTED_WITHIN, set_as_default=False)
+            client = connect(address, timeout=_CONNECTED_WITHIN, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as fault:
-            raise WorkerError(
-                f"--cluster {cluster}: no scheduler answers", "check the address; start one: dask scheduler"
-            ) from fault
+            hint = "check the address, or start one: dask scheduler"
+            raise WorkerError(f"--cluster {cluster}: no scheduler answers", hint) from fault
         stack.callback(_closed, client)
         session = Session(client, cluster, sights)
         session.wait_for_workers()
@@ -244,9 +247,10 @@ def _closed(client: Any) -> None:
 @contextmanager
 def _local(jobs: int) -> Iterator[Any]:
     """Start a scheduler and worker processes on this machine, and end them after the block."""
-    from distributed import LocalCluster
+    import distributed
 
-    cluster = LocalCluster(
+    start: Any = distributed.LocalCluster
+    cluster = start(
         n_workers=jobs,
         threads_per_worker=1,
         host="127.0.0.1",

@@ -80,10 +80,13 @@ class Pool(Protocol):
 
     # Exceptions of futures whose worker has ended.
     broken: tuple[type[BaseException], ...]
-    # Number of items that it works on at a time.
-    size: int
     # Whether `submit` can do an item alone; otherwise it is alone if nothing else is under way.
     isolates: bool
+
+    @property
+    def size(self) -> int:
+        """Return the number of items that it works on at a time."""
+        ...
 
     def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:
         """Return the future results of some numbered items; `alone`: if it isolates, on a worker with nothing else."""
@@ -97,7 +100,7 @@ class Pool(Protocol):
         ...
 
     def check(self) -> float | None:
-        """End what takes too long, as far as it cannot do so itself; return when to call this again [s]; None: never."""
+        """End what takes too long and does not end itself; return when to call this again [s], None: never."""
         ...
 
     def progressed(self) -> None:
