@@ -51,6 +51,8 @@ class _Sent:
     results: list[Any] = field(default_factory=list)
     worker: Worker | None = None
     since: float = 0.0
+    # Why its worker was ended, if it was from here.
+    reason: str = ""
     waiting: asyncio.Task[None] | None = None
 
     @property
@@ -116,7 +118,7 @@ class ClusterWorkers:
         sent = fault.args[0] if fault is not None and fault.args else None
         if not isinstance(sent, _Sent) or not sent.alone or sent.worker is None:
             return {}
-        return {sent.items[0][0]: self._reason(sent.worker, monotonic() - sent.since)}
+        return {sent.items[0][0]: sent.reason or self._reason(sent.worker, monotonic() - sent.since)}
 
     def check(self) -> float | None:
         """Return after how long waiting for a result this is to be called again: never."""
@@ -254,7 +256,10 @@ class ClusterWorkers:
         for address, last in (await self.session.last_reports()).items():
             before, since = self._silent.get(address, (last, now))
             self._silent[address] = (last, now if last != before else since)
-            if address in self._has and self._has[address].sent and now - since > self._limit + GRACE + _SILENT:
+            has = self._has.get(address)
+            if has is not None and has.sent and now - since > self._limit + GRACE + _SILENT:
+                for sent in has.sent:
+                    sent.reason = limit_words(self._limit)
                 self._drop(address)
                 self.session.restart(address)
 
@@ -277,15 +282,14 @@ class ClusterWorkers:
 
     def _reason(self, worker: Worker, seconds: float) -> str:
         """Return why a worker process has ended, as far as its scheduler or its nanny reports it."""
-        if self._limit is not None and seconds >= self._limit:
-            return limit_words(self._limit)
-        until = monotonic() + _REASON_WITHIN
-        while True:
-            if worker.address in self.session.over_memory:
-                return "its worker process was ended: the memory was not enough"
-            if worker.nanny is None or monotonic() > until:
-                return "its worker process ended"
+        until, code = monotonic() + _REASON_WITHIN, None
+        while code is None and worker.nanny is not None and monotonic() < until:
             if (successor := self.session.successor(worker)) is not None:
                 code = self.session.exit_status(worker, successor)
-                return "its worker process ended" if code is None else ended_words(code)
+                break
             threading.Event().wait(0.2)
+        if worker.address in self.session.over_memory:
+            return "its worker process was ended: the memory was not enough"
+        if self._limit is not None and code in (None, 1) and seconds >= self._limit:
+            return limit_words(self._limit)
+        return "its worker process ended" if code is None else ended_words(code)

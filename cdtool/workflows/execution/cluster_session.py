@@ -100,6 +100,8 @@ class Session:
             self._described.pop(address, None)  # if it is still there, it is asked again
             return
         except Exception as fault:
+            if self.client.status != "running":
+                return
             words = shorten(one_line(f"{type(fault).__name__}: {fault}"), 120)
             self._refuse(address, f"cdtool cannot be used there: {words}", "install the same there as here")
             return

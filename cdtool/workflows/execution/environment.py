@@ -19,7 +19,7 @@ from cdtool.workflows.store.digest import code_version
 _ONLY_SHOWN = frozenset({"typer", "rich", "matplotlib", "jinja2"})
 # Extras with what is needed to develop cdtool, and those that name other extras.
 _NOT_FOR_LOGS = frozenset({"all", "test", "dev", "benchmarks"})
-_CODE = "the code of cdtool"
+_CODE, _PLUGINS = "the code of cdtool", "the list of plug-in packages"
 
 
 @cache
@@ -31,7 +31,8 @@ def environment() -> Mapping[str, str]:
             versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
-    return {**versions, **plugin_packages(), _CODE: code_version()[:12]}
+    plugins = ", ".join(f"{name} {version}" for name, version in plugin_packages().items())
+    return {**versions, _PLUGINS: plugins or "none", _CODE: code_version()[:12]}
 
 
 def difference(here: Mapping[str, str], there: Mapping[str, str]) -> str:
