@@ -116,7 +116,7 @@ class ClusterWorkers:
         """Return the item of a lost batch of which it is known that it ended its worker, and why."""
         fault = lost.exception()
         sent = fault.args[0] if fault is not None and fault.args else None
-        if not isinstance(sent, _Sent) or not sent.alone or sent.worker is None:
+        if not isinstance(sent, _Sent) or not sent.alone or len(sent.items) > 1 or sent.worker is None:
             return {}
         return {sent.items[0][0]: sent.reason or self._reason(sent.worker, monotonic() - sent.since)}
 

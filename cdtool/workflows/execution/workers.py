@@ -313,7 +313,7 @@ class _Ordered:
             elif not place or any(number in blamed for number, _ in batch.items):
                 self._ahead.extend(self._divided(batch, blamed))
             else:
-                self._ahead.append(_Batch(batch.items, self.pool.submit(batch.items)))
+                self._ahead.append(_Batch(batch.items, self.pool.submit(batch.items, alone=True)))
 
     def _divided(self, batch: _Batch, failed: dict[int, str]) -> list[_Batch]:
         """Return batches of one item each: done, lost, submitted again, or to be done alone if it failed before."""

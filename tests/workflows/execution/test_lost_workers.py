@@ -164,7 +164,8 @@ def test_workers_that_cannot_be_are_refused(wrong):
 class Shared:
     """A pool whose only worker holds a queue of batches, all of which are lost when one of them ends it.
 
-    `ends` are the items that always end the worker, `once` those that do so the first time.
+    `ends` are the items that always end the worker, `once` those that do so the first time. An item that is to be alone
+    is done while the queue is elsewhere.
     """
 
     broken = (ConnectionError,)
@@ -177,10 +178,10 @@ class Shared:
         self.may_work = threading.Condition()
         self.ended = False
 
-    def submit(self, batch):
+    def submit(self, batch, *, alone=False):
         future = Future()
         with self.may_work:
-            self.queue.append((batch, future))
+            self.queue.append((batch, future, alone))
             self.may_work.notify()
         return future
 
@@ -190,19 +191,22 @@ class Shared:
                 self.may_work.wait_for(lambda: self.queue or self.ended)
                 if not self.queue:
                     continue
-                batch, future = self.queue[0]
+                batch, future, alone = self.queue.popleft()
                 numbers = {number for number, _ in batch}
                 if fatal := numbers & (self.ends | self.once):
                     self.once -= fatal
-                    for _, lost_future in self.queue:
-                        lost_future.set_exception(ConnectionError())
-                    self.queue.clear()
+                    future.set_exception(ConnectionError(*(numbers if alone and len(batch) == 1 else ())))
+                    for other in [item for item in self.queue if not alone and not item[2]]:
+                        self.queue.remove(other)
+                        other[1].set_exception(ConnectionError())
                 else:
-                    self.queue.popleft()
                     future.set_result([10 * item for _, item in batch])
 
     def blamed(self, lost):
-        return {lost[0][0]: "its worker ended"} if len(lost) == 1 else {}
+        return dict.fromkeys(lost.exception().args, "its worker ended")
+
+    def check(self):
+        return None
 
     def progressed(self):
         pass
@@ -245,7 +249,7 @@ class Sizes:
     def __init__(self, size):
         self.size, self.seen = size, []
 
-    def submit(self, batch):
+    def submit(self, batch, *, alone=False):  # noqa: ARG002
         self.seen.append(len(batch))
         future = Future()
         future.set_result([item for _, item in batch])
@@ -253,6 +257,9 @@ class Sizes:
 
     def blamed(self, _):
         raise AssertionError
+
+    def check(self):
+        return None
 
     def progressed(self):
         pass
