@@ -260,6 +260,7 @@ def _local(jobs: int) -> Iterator[Any]:
         # Its other pages have a free port.
         scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
         silence_logs=logging.CRITICAL + 1,
+        # Dask calls its function dask_setup.
         preload=["cdtool.workflows.execution.local_worker"],
     )
     try:

@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[3]
 # A worker that takes more is ended by its nanny; one with cdtool and its libraries takes a third of it.
 MEMORY = "700MB"
-# A file format whose logs contain what becomes of the process that reads them.
+# A file format whose logs contain how the process that reads them ends.
 FATAL = '''
 """A log that ends the process that reads it."""
 import ctypes

@@ -143,7 +143,7 @@ def test_items_are_taken_when_their_work_begins_not_all_at_once(address):
         results.close()
 
 
-def test_addresses_that_are_none_are_refused_without_repeating_a_password():
+def test_wrong_addresses_are_refused_without_repeating_a_password():
     for wrong in ("host", "http://host:1", "tcp://user:secret@host:1", "tcp://host", "tcp://host:1/secret"):
         with pytest.raises(UsageError) as raised:
             Workers(cluster=wrong)
