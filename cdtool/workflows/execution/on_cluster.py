@@ -17,7 +17,15 @@ from typing import Any
 from uuid import uuid4
 
 from cdtool.workflows.execution.environment import environment
-from cdtool.workflows.execution.in_worker import Failed, keep_freed_memory, limit_words, time_limit
+from cdtool.workflows.execution.in_worker import (
+    Failed,
+    ended_words,
+    exit_code,
+    keep_freed_memory,
+    limit_words,
+    sendable,
+    time_limit,
+)
 
 # After the time limit, the process has this long to return that it is exceeded [s]; one that does not is ended.
 GRACE = 3.0
@@ -117,7 +125,11 @@ def _result(work: Callable[[Any], Any], item: Any) -> tuple[Any]:
     except MemoryError:
         return (Failed("not enough memory"),)
     except SystemExit as end:
-        return (Failed(f"its worker process ended with exit status {end.code if isinstance(end.code, int) else 1}"),)
+        return (Failed(ended_words(exit_code(end))),)
+    except (KeyboardInterrupt, GeneratorExit) as fault:
+        return (Failed(f"it was ended by {type(fault).__name__}"),)
+    except Exception as fault:
+        raise sendable(fault) from None
 
 
 def _in_time(work: Callable[[Any], Any], item: Any, limit: float) -> tuple[Any] | None:

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import active_children, get_context
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
-from time import monotonic_ns
+from time import monotonic, monotonic_ns
 from typing import Any
 
 from cdtool.errors import WorkerError
@@ -25,7 +25,7 @@ from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, 
 
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
-_JOINED_WITHIN = 10.0
+_JOINED_WITHIN, _ENDED_WITHIN = 10.0, 3.0
 # After the time limit, a process has this long to end itself; the pieces are compared with it so often [s].
 _GRACE, _CHECKED_EVERY = 2.0, 1.0
 
@@ -81,11 +81,17 @@ class Processes:
             child.join(_JOINED_WITHIN)
             status[child.pid or 0] = child.exitcode
         found: dict[int, str] = {}
-        for first in range(0, len(self._claims), CLAIM):
-            process, number, since = self._claims[first : first + CLAIM]
+        asked: list[tuple[int, int]] = []
+        for process, number, since, told in self._each_claim():
             code = status.get(process, 1)
-            if number and code not in (None, 0, TOLD_TO_END, -signal.SIGTERM):
+            if code in (TOLD_TO_END, -signal.SIGTERM):
+                asked += [(told, number)] if told else []
+            elif number and code is not None:
                 found[number - 1] = self._reason(code, 1e-9 * (now - since))
+        # The pool asks all processes to end when one of them has ended; if none has, the first one was asked by others.
+        if not found and asked and all(code in (TOLD_TO_END, -signal.SIGTERM) for code in status.values()):
+            _, number = min(asked)
+            found |= {number - 1: ended_words(-signal.SIGTERM)} if number else {}
         self._restarts = 0 if found else self._restarts + 1
         if self._restarts > _MOST_RESTARTS:
             raise WorkerError(
@@ -104,12 +110,14 @@ class Processes:
         if self._limit is None:
             return None
         now = monotonic_ns()
-        for first in range(0, len(self._claims), CLAIM):
-            process, number, since = self._claims[first : first + CLAIM]
+        for process, number, since, _ in self._each_claim():
             if number and 1e-9 * (now - since) > self._limit + _GRACE:
                 with suppress(OSError):
                     os.kill(process, signal.SIGKILL)
         return _CHECKED_EVERY
+
+    def _each_claim(self) -> Iterator[Sequence[int]]:
+        return (self._claims[first : first + CLAIM] for first in range(0, len(self._claims), CLAIM))
 
     def progressed(self) -> None:
         """Note that a piece was done: the processes work."""
@@ -122,8 +130,13 @@ class Processes:
             yield self
         except BaseException:
             self._pool.shutdown(wait=False, cancel_futures=True)
-            for child in set(active_children()) - self._others:
+            children = set(active_children()) - self._others
+            for child in children:
                 child.terminate()
+            until = monotonic() + _ENDED_WITHIN
+            for child in children:
+                child.join(max(0.0, until - monotonic()))
+                child.kill()  # one that ignores the signal
             raise
         self._pool.shutdown(wait=True)
 
