@@ -77,6 +77,8 @@ def begin(work: Callable[[Any], Any], claims: Any, free_claims: Any, limit: floa
     _claim[0] = os.getpid()
     keep_freed_memory()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):  # see processes.py
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

@@ -49,8 +49,12 @@ class Processes:
 
     def _start(self) -> None:
         context = _context()
-        self._claims: Any = context.RawArray("q", CLAIM * self.size)
-        free: Any = context.SimpleQueue()
+        try:
+            self._claims: Any = context.RawArray("q", CLAIM * self.size)
+            free: Any = context.SimpleQueue()
+        except OSError as fault:
+            words = f"no shared memory for processes: {fault.strerror or fault}"
+            raise WorkerError(words, "free space in /dev/shm, or use --jobs 1 without --timeout") from fault
         for number in range(self.size):
             free.put(number)
         self._children: set[BaseProcess] = set()
@@ -61,7 +65,8 @@ class Processes:
     def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:  # noqa: ARG002
         """Return the future results of some numbered pieces; a pool whose process has ended gives a failed one."""
         try:
-            future = self._pool.submit(do, batch)
+            with _without_interruption():  # it starts processes
+                future = self._pool.submit(do, batch)
         except BrokenProcessPool as fault:
             future = Future()
             future.set_exception(fault)
@@ -136,9 +141,27 @@ class Processes:
             until = monotonic() + _ENDED_WITHIN
             for child in children:
                 child.join(max(0.0, until - monotonic()))
-                child.kill()  # one that ignores the signal
+                if child.is_alive():  # it ignores the signal
+                    child.kill()
+                    child.join(_ENDED_WITHIN)
             raise
         self._pool.shutdown(wait=True)
+
+
+@contextmanager
+def _without_interruption() -> Iterator[None]:
+    """Let Ctrl-C wait until the block has ended; processes that it starts do not receive it before `begin` ignores it.
+
+    Otherwise Python prints where a process was interrupted while it started.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _context() -> BaseContext:

@@ -2,6 +2,7 @@
 
 import ctypes
 import faulthandler
+import multiprocessing
 import os
 import signal
 import sys
@@ -17,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.errors import UsageError, WorkerError
+from cdtool.workflows.execution import processes
 from cdtool.workflows.execution.workers import Workers, _Ordered, in_order
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -40,6 +42,41 @@ def left(number):
         os._exit(7)
     if number == 6:
         sys.exit(8)
+    return number
+
+
+def ended(number):
+    if number == 1:
+        os._exit(0)
+    if number == 3:
+        sys.exit()
+    if number == 5:
+        raise KeyboardInterrupt
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGTERM)
+    return number
+
+
+class OddError(Exception):
+    """It cannot be copied to another process."""
+
+    def __init__(self, file, number):
+        super().__init__(f"{file} is odd")
+        self.number = number
+
+
+def odd(number):
+    if number == 5:
+        raise OddError("05.csv", number)
+    if number > 5:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        time.sleep(60.0)
+    return number
+
+
+def stopped(number):
+    if number == 2:
+        os.kill(os.getpid(), signal.SIGSTOP)
     return number
 
 
@@ -102,6 +139,50 @@ def test_the_reason_and_the_number_of_attempts_are_stated(work, number, reason, 
     words = reason if not retries else f"{reason}, in each of {retries + 1} attempts"
     assert made[number] == (number, words)
     assert made[0] == 0 and made[7:] == [7, 8]
+
+
+@pytest.mark.parametrize("beside", [0, 1])
+def test_items_that_leave_their_workers_in_any_way_are_lost_and_no_other(beside, capfd):
+    stop = threading.Event()
+    threads = [threading.Thread(target=stop.wait) for _ in range(beside)]  # then processes are not forked
+    for thread in threads:
+        thread.start()
+    try:
+        made = run(ended, 12, Workers(2, retries=0), 2)
+    finally:
+        stop.set()
+    reasons = {
+        1: "its worker process ended with exit status 0",
+        3: "its worker process ended with exit status 0",
+        5: "it was ended by KeyboardInterrupt",
+        7: "its worker process crashed (SIGTERM)",
+    }
+    assert made == [(number, reasons[number]) if number in reasons else number for number in range(12)]
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_ignore_sigterm_end(capfd, monkeypatch):
+    monkeypatch.setattr(processes, "_ENDED_WITHIN", 0.5)
+    before = set(multiprocessing.active_children())
+    with pytest.raises(RuntimeError, match=r"OddError: 05\.csv is odd"):
+        run(odd, 8, Workers(2))
+    assert set(multiprocessing.active_children()) == before
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_process_that_is_stopped_is_ended_by_the_time_limit(monkeypatch):
+    monkeypatch.setattr(processes, "_GRACE", 0.2)
+    made = run(stopped, 6, Workers(2, timeout=0.5, retries=0))
+    assert made == [0, 1, (2, "took longer than 0.5 s (--timeout)"), 3, 4, 5]
+
+
+def test_without_shared_memory_one_line_states_it(monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(multiprocessing.context.BaseContext, "RawArray", full)
+    with pytest.raises(WorkerError, match="no shared memory for processes: No space left on device"):
+        run(abs, 8, Workers(2))
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
