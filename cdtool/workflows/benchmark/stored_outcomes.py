@@ -33,7 +33,7 @@ _OfDetector = tuple[DetectorOutcome | None, ...]
 
 @dataclass(frozen=True)
 class Planned:
-    """One log: the places of its rows and of its detectors' outcomes in the store, None where there is none."""
+    """One log: the places of its rows and of its detectors' outcomes in the store, None where it is missing."""
 
     sources: tuple[SourceFile, ...] | None = None
     rows: int | None = None
@@ -185,7 +185,7 @@ class StoredOutcomes:
         self.keys += [entry.key for entry in entries]
 
     def trace(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> Trace | None:
-        """Return the stored trace of an operation of a log; None if there is none."""
+        """Return the stored trace of an operation of a log; None if it is missing."""
         key = self._trace_key(log, sources, number)
         entry = None if key is None else self.store.get(key)
         if entry is None:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-# A worker that is asked to end exits with this status.
+# A worker that another process ends exits with this status.
 TOLD_TO_END = 143
 # Entries of a claim: the process, the number of the piece counted from 1 (0: none), when it began, and when the process
 # was asked to end (0: not) [ns].

@@ -57,7 +57,9 @@ class Store:
     def __init__(self, folder: Path, *, writes: bool = True) -> None:
         self.folder, self.writes = folder, writes
         require_pyarrow()
-        _check(folder, create=writes)
+        if writes:
+            _create(folder)
+        require_store(folder)
         self._journal: Journal | None = None
         self._waiting: list[Entry] = []
         self._content = 0
@@ -99,7 +101,7 @@ class Store:
         return place in self._index.failed
 
     def get(self, key: str) -> Entry | None:
-        """Return an entry; None if there is none, or its file was removed or damaged meanwhile."""
+        """Return an entry; None if it is missing, or its file was removed or damaged meanwhile."""
         (place,) = self._index.places([key])
         found = None if place is None else self.at(place)
         return found if found is not None and found.key == key else None
@@ -339,18 +341,23 @@ def read_keys(path: Path) -> list[Any]:
     return [] if columns is None else columns["key"]
 
 
-def _check(folder: Path, *, create: bool) -> None:
-    """Create an empty store, or check that a folder is one; raises ConfigurationError."""
+def require_store(folder: Path) -> None:
+    """Raise ConfigurationError if a folder is not a store of this version."""
+    mark = folder / _MARK
+    if not mark.is_file():
+        raise ConfigurationError(f"{folder}: is not a store", "give the folder that was given as --store")
+    values = _values(mark)
+    if values.get("kind") != _KIND or values.get("schema_version") != _SCHEMA:
+        raise ConfigurationError(
+            f"{mark}: is not that of a store of this version", "give another folder, or remove this one"
+        )
+
+
+def _create(folder: Path) -> None:
+    """Create an empty store, unless the folder is one; raises ConfigurationError for a folder with other content."""
     mark = folder / _MARK
     if mark.is_file():
-        values = _values(mark)
-        if values.get("kind") != _KIND or values.get("schema_version") != _SCHEMA:
-            raise ConfigurationError(
-                f"{mark}: is not that of a store of this version", "give another folder, or remove this one"
-            )
         return
-    if not create:
-        raise ConfigurationError(f"{folder}: is not a store", "give the folder that was given as --store")
     if folder.exists() and (not folder.is_dir() or any(True for _ in folder.iterdir())):
         raise ConfigurationError(f"{folder}: is neither a store nor an empty folder", "give another folder")
     for part in ("parts", "runs"):
