@@ -317,7 +317,9 @@ def test_where_several_share_a_worker_only_those_that_end_it_alone_are_lost(coun
     ordered = _Ordered(pool, count, retries, lost, together)
     made = list(ordered.results(range(count)))
     gone = {item for item in made if isinstance(item, tuple)}
-    assert {number for number, _ in gone} == {number for number in ends if number < count}
+    lost_items, always = {number for number, _ in gone}, {number for number in ends if number < count}
+    # One that ends it alone for the first time is lost if nothing is tried again.
+    assert always <= lost_items <= (always | once if not retries else always)
     assert [item[0] * 10 if isinstance(item, tuple) else item for item in made] == [10 * k for k in range(count)]
 
 
