@@ -18,6 +18,7 @@ from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
 from cdtool.exit_status import Fact
+from cdtool.remote.remote_path import location
 
 if TYPE_CHECKING:
     from cdtool.dynamics import Machine
@@ -108,7 +109,7 @@ class _Run:
         for number, found in enumerate(detected.runs):
             if self.estimate_force:
                 self.forces |= {item.operation: item for item in map(self.estimate_force, found.detections)}
-            self.done.append((Path(found.recording.source) if is_cut else log, found))
+            self.done.append((location(found.recording.source) if is_cut else log, found))
             self.skipped += found.not_scored
             self.findings += [*lost(found.recording), *found.findings]
             if plots:

@@ -24,6 +24,7 @@ from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
+from cdtool.remote.remote_path import location
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, Wanted, outcome_of
@@ -97,7 +98,7 @@ def score(
     >>> [(row.group, row.detected, row.missed, row.false_alarms) for row in scored.evaluated.summaries]
     [('stiff', 4, 0, 0), ('soft', 2, 1, 0), ('holdout', 0, 0, 1)]
     """
-    given, workers = read_triggers(Path(triggers)), Workers(jobs)
+    given, workers = read_triggers(location(triggers)), Workers(jobs)
     names = tuple(given.rows)
     setup = read_benchmark_file(benchmark, learning=False, also_known=names)
     setup, measured = with_synchronisation(setup, workers)
@@ -119,7 +120,7 @@ def score(
         gathered.skipped += _without_run(said, known, gathered.scored)
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
-    return Score(evaluate(results, rules), gathered.traces, (Path(triggers), *setup.inputs))
+    return Score(evaluate(results, rules), gathered.traces, (location(triggers), *setup.inputs))
 
 
 @dataclass(frozen=True)

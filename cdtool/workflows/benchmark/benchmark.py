@@ -25,6 +25,7 @@ from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges
 from cdtool.recording import FloatArray
 from cdtool.registry import plugin_packages
+from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import (
@@ -209,7 +210,7 @@ def _provenance(
     learned: Sequence[Operation],
 ) -> dict[str, Any]:
     base = setup.path.parent
-    digests = {shown_path(Path(item.recording.source), base): item.recording.digest for item in learned}
+    digests = {shown_path(location(item.recording.source), base): item.recording.digest for item in learned}
     return {
         "tool": "cdtool",
         "tool_version": __version__,

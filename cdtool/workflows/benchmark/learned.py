@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from cdtool.detectors import DETECTORS
@@ -19,6 +18,7 @@ from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges, PlausibleRanges
+from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.normal_motion import NormalMotion
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict
@@ -152,7 +152,7 @@ def learn(setup: BenchmarkFile, workers: Workers, *, every_detector: bool = Fals
         calibration=tuple(made.calibration),
         unusable=made.unusable,
         names=tuple(operation.name for operation in names),
-        digests={shown_path(Path(item.recording.source), base): item.recording.digest for item in names},
+        digests={shown_path(location(item.recording.source), base): item.recording.digest for item in names},
         sources={item.recording.digest: item.whole.name for item in runs.operations},
     )
     return learned, Teaching(runs.operations, made.pairs) if setup.both else Teaching()

@@ -24,6 +24,7 @@ from cdtool.ingest.reading import LogFolder, log_parts
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.recording import UNITLESS
+from cdtool.remote.remote_path import location
 from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
 from cdtool.workflows.convert.section_rows import Rows, SectionRows
@@ -108,7 +109,7 @@ def convert(
     >>> converted.files, converted.columns
     (('stiff-03.mcap',), 7)
     """
-    log, target = Path(source), Path(output)
+    log, target = location(source), location(output)
     writer = _writer(target)
     parts = log_parts(log)
     _check_apart(target, log, parts)
