@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,12 +9,16 @@ import typer
 from cdtool.cli import completions
 from cdtool.cli.console import plain, print_skipped, progress
 from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption, listed
+from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
 
 
 def benchmark(
-    file: Annotated[Path, typer.Argument(help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE")],
+    file: Annotated[
+        Place,
+        typer.Argument(parser=location, help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE"),
+    ],
     output: OutputOption = None,
     force: ForceOption = False,
     detectors: Annotated[

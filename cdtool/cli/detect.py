@@ -16,9 +16,9 @@ from cdtool.cli.detect_shown import as_rows, show_detected
 from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
+from cdtool.cli.place import Place, location
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
 from cdtool.exit_status import Fact
-from cdtool.remote.remote_path import location
 
 if TYPE_CHECKING:
     from cdtool.dynamics import Machine
@@ -31,13 +31,14 @@ if TYPE_CHECKING:
 
 @with_options
 def detect(
-    logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
+    logs: Annotated[list[Place], typer.Argument(parser=location, help="Recordings to analyse.", metavar="LOG...")],
     options: LogOptions,
     contact_at: Annotated[
         str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z (m, in the link's frame).")
     ] = "",
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="PNG, SVG or PDF file to draw; a folder for several logs.")
+        Place | None,
+        typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw; a folder for several logs."),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,

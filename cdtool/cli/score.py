@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from cdtool.cli.console import plain, print_skipped, progress
 from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption
+from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def score(
     triggers: Annotated[
-        Path,
+        Place,
         typer.Argument(
-            help="CSV with columns recording, time_s and, for several detectors, detector.", metavar="TRIGGERS"
+            parser=location,
+            help="CSV with columns recording, time_s and, for several detectors, detector.",
+            metavar="TRIGGERS",
         ),
     ],
     benchmark: Annotated[
-        Path, typer.Option("--benchmark", "-b", help="Benchmark file: recordings, contacts and rules.")
+        Place,
+        typer.Option("--benchmark", "-b", parser=location, help="Benchmark file: recordings, contacts and rules."),
     ],
     output: OutputOption = None,
     force: ForceOption = False,

@@ -409,7 +409,7 @@ class RemotePath(type(Path())):  # type: ignore[misc]
             if not missing_ok:
                 raise
         finally:
-            staging.note_answer(str(self), None)
+            staging.forget(str(self))
 
     rmdir: Any = _refused("rmdir")
     rename: Any = _refused("rename")

@@ -116,6 +116,13 @@ def note_answer(url: str, found: ObjectInfo | None) -> None:
         _session.answers[url] = (time.monotonic(), found)
 
 
+def forget(url: str) -> None:
+    """Forget the copy of a file and what is known of it: it was written."""
+    with _session.lock:
+        _drop(url)
+        _session.answers.pop(url, None)
+
+
 def staged(url: str) -> Path:
     """Return the local copy of the file at a URL, of its current version; raises StorageError, MissingObjectError."""
     with _session.lock:

@@ -203,7 +203,7 @@ def _error_of(url: str, fault: Exception) -> StorageError:
     if isinstance(fault, FileNotFoundError):
         return MissingObjectError(url)
     if name in _NO_CREDENTIALS:
-        return StorageError(url, "no credentials are set", "set them as for the storage's own tools", errno.EACCES)
+        return StorageError(url, "no credentials are set", "set them as for the storage's own tools", errno.EPERM)
     if isinstance(fault, PermissionError):
         return StorageError(url, f"access is denied: {reason}", "check the credentials", errno.EACCES)
     if "PreconditionFailed" in said or "412" in said or "At least one of the pre-conditions" in said:

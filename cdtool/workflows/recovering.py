@@ -12,6 +12,7 @@ from cdtool.files import replaced
 from cdtool.findings import Finding
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.remote.remote_path import is_remote
+from cdtool.remote.uploads import check_place
 
 if TYPE_CHECKING:
     from cdtool.formats.mcap.container.clean_file import CleanFile
@@ -164,10 +165,11 @@ def _check_names(source: Path, output: Path, force: bool) -> None:
         raise RecordingError(f"{source}: cannot be read", "check the file's permissions")
     if output.suffix.lower() != ".mcap":
         raise UsageError(f"{output}: must end in .mcap", "choose another name")
-    if not output.parent.is_dir():
+    if is_remote(output):
+        check_place(output)
+    elif not output.parent.is_dir():
         raise UsageError(f"{output}: no folder {output.parent}", "create the folder first")
     if output.exists() and output.samefile(source):
         raise UsageError(f"{output}: is the file to recover", "choose another name")
     if output.exists() and not force:
         raise UsageError(f"{output}: already exists", "choose another name, or overwrite it with --force")
-

@@ -77,6 +77,16 @@ def only_message_indexes(content: memoryview, at: int = 0) -> bool:
     return at == end
 
 
+def only_message_indexes_between(file: FileBytes, at: int, end: int) -> bool:
+    """Return the same for the bytes of a file, reading only the beginning of each record."""
+    while at <= end - PREFIX:
+        opcode, length = _OPCODE_AND_LENGTH.unpack(file.read(at, PREFIX))
+        if opcode != MessageIndex.opcode:
+            return False
+        at += PREFIX + length
+    return at == end
+
+
 def _may_be_wanted(index: ChunkIndex, summary: Summary, wanted: Callable[[str], bool]) -> bool:
     """Return whether a chunk may have a wanted topic: its index names one, or an undefined channel, or no channel."""
     channels = [summary.channels.get(channel) for channel in index.message_index_offsets]
