@@ -348,10 +348,6 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         """Yield what fits a pattern in this folder or one below it; raises StorageError."""
         return self.glob(f"**/{pattern}")
 
-    def matches(self) -> Iterator[RemotePath]:
-        """Yield what fits this path if its names are patterns; raises StorageError."""
-        return self._of(self._scheme, self._segments[:1]).glob("/".join(self._segments[1:]))
-
     # Its content.
 
     def __fspath__(self) -> str:

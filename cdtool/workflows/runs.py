@@ -20,7 +20,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, Recording
-from cdtool.remote.remote_path import RemotePath, joined, location
+from cdtool.remote.remote_path import joined, location
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.log_checks.log_findings import log_warnings
@@ -341,13 +341,13 @@ def absent_truth(recording: Recording) -> list[Finding]:
 
 
 def _glob(path: Path) -> Iterator[Path]:
-    root = Path(path.anchor) if path.is_absolute() else Path()
-    pattern = str(path.relative_to(root)) if path.is_absolute() else str(path)
+    root = location(path.anchor) if path.is_absolute() else Path()
+    pattern = path.relative_to(root).as_posix() if path.is_absolute() else str(path)
     # As in a shell, a name that begins with a dot must be matched explicitly. Incomplete files have such names.
     written_out = set(path.parts)
     return (
         match
-        for match in (path.matches() if isinstance(path, RemotePath) else root.glob(pattern))
+        for match in root.glob(pattern)
         if all(part in written_out for part in match.parts if part.startswith("."))
         and (match.is_file() or is_bag_folder(match))
     )

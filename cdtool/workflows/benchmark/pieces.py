@@ -10,6 +10,7 @@ from time import perf_counter
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.ingest.run_reading import split_run
+from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, LogRows, TheseTraces, Wanted, WantedTraces
 from cdtool.workflows.runs import shown_path
@@ -86,6 +87,8 @@ class PieceScoring:
         known = piece.sources
         if known is not None and tuple((item.size, item.modified) for item in known) != before:
             known = None
+        if is_remote(piece.path):  # what was read is known by its SHA-256, a file at a URL by its version
+            return known or read_sources(files)
         recording = outcomes[0].recording
         if recording is None or not recording.sha256 or len(files) > 1 or self.setup.has_runs or piece.path.is_dir():
             return known or read_sources(files)
