@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from cdtool.workflows.benchmark.log_outcome import (
     slowest_of,
     striking_of,
 )
-from cdtool.workflows.benchmark.pieces import Piece, PieceScoring, ScoreLog, lost
+from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome, PieceScoring, ScoreLog, lost
 from cdtool.workflows.benchmark.stored_outcomes import Planned, StoredOutcomes
 from cdtool.workflows.contacts.impact_free import unchecked
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
@@ -96,7 +96,7 @@ class Gathering:
 
     def score(
         self,
-        score: ScoreLog,
+        scoring: Callable[[], ScoreLog],
         logs: Logs,
         workers: Workers | None = None,
         progress: Progress | None = None,
@@ -104,20 +104,22 @@ class Gathering:
     ) -> None:
         """Score the logs that are not `stored`, and add the rows of all; one that ends its workers is left out.
 
-        Raises ConfigurationError if the same log, under any name, was learned from or given twice.
+        `scoring` is called if a log has to be scored. Raises ConfigurationError if the same log, under any name, was
+        learned from or given twice.
         """
         workers = workers or Workers()
         plan = stored.plan(logs, workers) if stored else [Planned()] * len(logs)
         missing = [log for log, planned in enumerate(plan) if not planned.is_known]
-        work = PieceScoring(self.setup, score, with_sources=stored is not None)
-        computed = in_order(
-            work,
-            self._pieces(missing, logs, plan, stored),
-            len(missing),
-            workers,
-            of_lost=partial(lost, self.setup),
-            together=_TOGETHER,
-        )
+
+        @cache
+        def work() -> PieceScoring:
+            return PieceScoring(self.setup, scoring(), with_sources=stored is not None)
+
+        pieces = self._pieces(missing, logs, plan, stored)
+        of_lost = partial(lost, self.setup)
+        computed: Iterator[PieceOutcome] = iter(())
+        if missing:
+            computed = in_order(work(), pieces, len(missing), workers, of_lost=of_lost, together=_TOGETHER)
         for log, ((group, path), planned) in enumerate(zip(logs, plan, strict=True)):
             outcomes: Sequence[LogOutcome] | None = None
             sources = planned.sources
@@ -125,7 +127,7 @@ class Gathering:
                 assert stored is not None, "a log is known from the store"
                 outcomes = stored.known(planned)
             if outcomes is None:  # also if the entry has been removed meanwhile
-                made = work(Piece(log, group, path, self._choice)) if planned.is_known else next(computed)
+                made = work()(Piece(log, group, path, self._choice)) if planned.is_known else next(computed)
                 outcomes, sources = made.outcomes, made.sources
                 if stored:
                     outcomes = stored.add(group, path, planned, made)
@@ -149,7 +151,7 @@ class Gathering:
             group, path = logs[log]
             yield stored.piece(log, group, path, plan[log], choice) if stored else Piece(log, group, path, choice)
 
-    def _make_absent_traces(self, work: PieceScoring, workers: Workers) -> None:
+    def _make_absent_traces(self, work: Callable[[], PieceScoring], workers: Workers) -> None:
         """Make the traces that are kept and were not made when the logs were scored, as of logs that were stored."""
         absent: dict[int, list[tuple[int, _Place, int]]] = {}
         for number in self._choice.kept():
@@ -161,8 +163,10 @@ class Gathering:
                 else:
                     absent.setdefault(place.number, []).append((number, place, operation))
         wanted = list(absent.values())
+        if not wanted:
+            return
         pieces = (Piece(log[0][1].number, *log[0][1].log, operations=tuple(item[2] for item in log)) for log in wanted)
-        made = in_order(work, pieces, len(wanted), workers, of_lost=partial(lost, self.setup))
+        made = in_order(work(), pieces, len(wanted), workers, of_lost=partial(lost, self.setup))
         for log, outcome in zip(wanted, made, strict=True):
             traces = [trace for of_run in outcome.outcomes for trace in of_run.traces]
             for number, place, operation in log:

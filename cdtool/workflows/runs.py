@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
 
 from cdtool.dynamics import Machine
-from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, nearest
+from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError, is_lasting, nearest
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.evaluation.truth.onset import OnsetRule
@@ -30,13 +30,15 @@ from cdtool.workflows.log_checks.log_findings import log_warnings
 class Runs:
     """The operations of some logs, what was left out, findings to report, and the plausible ranges of channels.
 
-    `ranges` are those of what is learned from: of a part of a log, that part.
+    `ranges` are those of what is learned from: of a part of a log, that part. `lasts`: the same logs would give the
+    same again, none was left out for a reason such as a network.
     """
 
     operations: tuple[Operation, ...]
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
     ranges: LearnedRanges
+    lasts: bool = True
 
 
 def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = False) -> list[Path]:
@@ -164,22 +166,30 @@ def reported(runs: LogRuns, path: Path, base: Path | None = None) -> tuple[list[
 
 
 @dataclass(frozen=True)
+class _NotRead:
+    """A log that cannot be read, and whether that lasts: an error loses its cause on the way between processes."""
+
+    fault: CdtoolError
+    lasts: bool
+
+
+@dataclass(frozen=True)
 class _AsLogged:
-    """Reads the runs of a log through a machine file; one that cannot be read gives the error."""
+    """Reads the runs of a log through a machine file."""
 
     machine_file: MachineFile
     cut: RunCut | None
 
-    def __call__(self, path: Path) -> LogRuns | CdtoolError:
+    def __call__(self, path: Path) -> LogRuns | _NotRead:
         try:
             return runs_of(path, self.machine_file, self.cut)
         except CdtoolError as fault:
-            return fault
+            return _NotRead(fault, is_lasting(fault))
 
 
-def _not_read(path: Path, reason: str) -> RecordingError:
+def _lost_run(path: Path, reason: str) -> _NotRead:
     """Return the error of a log that ended its workers."""
-    return RecordingError(f"{path}: {reason}")
+    return _NotRead(RecordingError(f"{path}: {reason}"), lasts=False)
 
 
 def _with_channels(path: Path, recording: Recording) -> Recording:
@@ -231,11 +241,11 @@ def load_runs(
 
     cut = RunCut.of(reading.operations)
     read = _AsLogged(machine_file, cut)
-    logs = list(in_order(read, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_not_read))
+    logs = list(in_order(read, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_lost_run))
     logged: list[tuple[Path, Path, LoggedRecording | CdtoolError]] = []  # as listed, the log or its run
     for path, log in zip(paths, logs, strict=True):
-        if isinstance(log, CdtoolError):
-            logged.append((path, path, log))
+        if isinstance(log, _NotRead):
+            logged.append((path, path, log.fault))
         elif cut is None:
             logged += [(path, path, item) for item in log.runs]
         else:
@@ -243,6 +253,7 @@ def load_runs(
             of_log, about_log = reported(log, path, base)
             skipped += of_log
             findings += about_log
+    lasts = all(log.lasts for log in logs if isinstance(log, _NotRead))
     known = LearnedRanges(ranges) if ranges else _ranges_of(logged, machine_file.machine, reading, rule)
     for listed, path, item in logged:
         try:
@@ -272,7 +283,7 @@ def load_runs(
         findings.extend(lost(recording))
         findings.extend(log_warnings(recording, contacts, rule))
         without.extend((recording.name, item) for item in absent_truth(recording))
-    return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known)
+    return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known, lasts)
 
 
 def _ranges_of(
@@ -301,12 +312,27 @@ def _ranges_of(
     return LearnedRanges.of(parts, scored)
 
 
+def resolve_all(paths: Iterable[Path]) -> list[Path]:
+    """Return the real paths of many logs; the folders of logs are few, and each is resolved once."""
+    folders: dict[Path, Path] = {}
+    found = []
+    for path in paths:
+        if path.is_symlink() or path.name in ("", ".."):
+            found.append(path.resolve())
+            continue
+        folder = path.parent
+        if folder not in folders:
+            folders[folder] = folder.resolve()
+        found.append(folders[folder] / path.name)
+    return found
+
+
 def _each_once(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     """Return the paths without repetitions, and the repetitions."""
     once: dict[Path, Path] = {}
     repeated: list[Path] = []
-    for path in paths:
-        if once.setdefault(path.resolve(), path) is not path:
+    for path, true in zip(paths, resolve_all(paths), strict=True):
+        if once.setdefault(true, path) is not path:
             repeated.append(path)
     return list(once.values()), repeated
 

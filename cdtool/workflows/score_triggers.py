@@ -115,7 +115,7 @@ def score(
         if listed_only:
             work = [item for item in work if any(shown_path(item[1], base) in said[name] for name in names)]
     scoring = _TriggerScoring(setup, given.path, said, clock, listed_only)
-    gathered.score(scoring, work, workers, progress)
+    gathered.score(lambda: scoring, work, workers, progress)
     if runs:
         gathered.skipped += _without_run(said, known, gathered.scored)
     results = gathered.results(_provenance(setup, given, clock))

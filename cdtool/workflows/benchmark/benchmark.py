@@ -10,7 +10,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from cdtool.detectors import DETECTORS
 from cdtool.detectors.base import Detector
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
@@ -19,13 +18,12 @@ from cdtool.evaluation.results import RecordingFinding, Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.findings import Finding
-from cdtool.findings.scoring import DetectorLeftOut, LimitsUnchecked
+from cdtool.findings.scoring import LimitsUnchecked
 from cdtool.kernel_warm_up import compile_loaded
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges
 from cdtool.recording import FloatArray
 from cdtool.registry import plugin_packages
-from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import (
@@ -36,25 +34,32 @@ from cdtool.workflows.benchmark.benchmark_file import (
     with_detectors,
     with_only,
 )
-from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds, that_can_run
-from cdtool.workflows.benchmark.log_outcome import LogOutcome, WantedTraces, outcome_of
+from cdtool.workflows.benchmark.learned import Learned, Teaching
+from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog
+from cdtool.workflows.benchmark.log_outcome import LogOutcome, Wanted, outcome_of
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
+from cdtool.workflows.benchmark.stored_learned import StoreOfRun
+from cdtool.workflows.benchmark.stored_outcomes import StoreReport
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.gathering import Gathering
-from cdtool.workflows.runs import load_runs, shown_path
-from cdtool.workflows.signature.normal_runs import NormalsWithout, normals_for
+from cdtool.workflows.signature.normal_runs import NormalsWithout
 from cdtool.workflows.signature.threshold_settings import set_by_hand
+from cdtool.workflows.store.use import StoreUse
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """The results with their statistics, the selected traces, the time per step [s], and the files read."""
+    """The results with their statistics, the selected traces, the time per step [s], and the files read.
+
+    `stored` is how much of them was in the store; None without one.
+    """
 
     evaluated: Evaluated
     traces: tuple[Trace, ...]
     seconds: Mapping[str, float]
     inputs: tuple[Path, ...] = ()
+    stored: StoreReport | None = None
 
     @property
     def results(self) -> Results:
@@ -69,6 +74,7 @@ def benchmark(
     false_alarm_budget: str | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
+    store: StoreUse | None = None,
     progress: Progress | None = None,
 ) -> Benchmark:
     """Learn every detector's threshold, run the detectors over all groups of logs, and match alarms with contacts.
@@ -86,6 +92,8 @@ def benchmark(
         Number of logs processed at a time; the results do not depend on it.
     workers : Workers, optional
         In place of `jobs`: also the longest time for a log, and how often one that ended its worker is tried again.
+    store : StoreUse, optional
+        Where outcomes are kept: a log is computed only if something that determines its outcome has changed.
     progress : callable, optional
         Called after each log with the number done and the total.
 
@@ -98,7 +106,7 @@ def benchmark(
     Raises
     ------
     ConfigurationError
-        The benchmark file or the machine file is wrong; the message names the key.
+        The benchmark file, the machine file or the store is wrong; the message names the key.
     SignatureError
         Nothing can be learned.
     RecordingError
@@ -113,47 +121,60 @@ def benchmark(
     >>> [(row.group, row.detected, row.missed) for row in done.evaluated.summaries]
     [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
-    setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
-    limits, workers = len(setup.limits), workers or Workers(jobs)
-    setup = with_detectors(setup, detectors) if detectors else setup
-    setup = replace(setup, budget=Budget.parse(false_alarm_budget)) if false_alarm_budget is not None else setup
-    refuse_limits_by_hand(setup)
-    machine_file = setup.machine_file
-    used = [machine_file.detector(name) for name in setup.detectors]
+    workers = workers or Workers(jobs)
+    work = BenchmarkWork.of(file, detectors, false_alarm_budget)
+    if store is None:
+        return _run(work, workers, None, progress)
+    with store.opened() as folder:
+        return _run(work, workers, StoreOfRun(folder, store, workers), progress)
+
+
+@dataclass(frozen=True)
+class BenchmarkWork:
+    """A benchmark file with the options of the command; `limits` is the number of limits in the file."""
+
+    setup: BenchmarkFile
+    limits: int
+    every_detector: bool
+
+    @classmethod
+    def of(cls, file: str | Path | BenchmarkFile, detectors: Sequence[str], budget: str | None) -> BenchmarkWork:
+        """Read a benchmark file unless it has been read; raises as `benchmark`."""
+        setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
+        limits = len(setup.limits)
+        setup = with_detectors(setup, detectors) if detectors else setup
+        setup = replace(setup, budget=Budget.parse(budget)) if budget is not None else setup
+        refuse_limits_by_hand(setup)
+        return cls(setup, limits, list(detectors) == ["all"])
+
+
+def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> Benchmark:
     compile_loaded()
     begin = perf_counter()
-    setup, measured = with_synchronisation(setup, workers)
-    learn = load_runs(setup.learn, machine_file, setup.run_reading(workers))
-    seconds = {"reading": perf_counter() - begin, "detecting": 0.0}
+    setup, measured = with_synchronisation(work.setup, workers)
+    teaching = Teaching(setup, workers, every_detector=work.every_detector)
+    learned = store.learned(teaching) if store else teaching.learned
+    setup = with_only(setup, learned.about.detectors)
+    seconds = perf_counter() - begin
     left_out: list[RecordingFinding] = []
-    if list(detectors) == ["all"]:
-        used, left_out = that_can_run(used, learn.operations, machine_file.machine)
-        broken = DETECTORS.broken_plugins().items()
-        left_out += [RecordingFinding.of(name, Finding(DetectorLeftOut(str(fault)))) for name, fault in broken]
-        setup = with_only(setup, [detector.name for detector in used])
-    if len(setup.limits) < limits:
-        unchecked = Finding(LimitsUnchecked(limits - len(setup.limits), limits))
+    if len(setup.limits) < work.limits:
+        unchecked = Finding(LimitsUnchecked(work.limits - len(setup.limits), work.limits))
         left_out.append(RecordingFinding.of(str(setup.path), unchecked))
-    learned = learn_thresholds(setup, learn.operations, used, learn.skipped)
-    seconds["detecting"] = perf_counter() - begin - seconds["reading"]
-    factors = _factors(setup, learned.thresholds)
-    sources = {operation.recording.digest: operation.whole.name for operation in learn.operations}
-    gathered = Gathering(setup, setup.detectors, factors, sources)
-    gathered.skipped += [*learn.skipped, *learned.skipped]
-    gathered.skipped += [Skipped(name, f"not assessable: {reason}") for name, reason in learned.unusable.items()]
-    gathered.findings += [*measured, *learn.findings, *left_out, *learned.not_assessable]
-    work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-    normals = normals_for(learn.operations, setup.rule)
-    thresholds = ThresholdsByLog.of(setup, learned)
-    runs = learn.operations if setup.both else ()
-    scoring = _LogScoring(setup, tuple(used), thresholds, learned.unusable, factors, learn.ranges, normals, runs)
-    gathered.score(scoring, work, workers, progress)
-    seconds = {"reading": seconds["reading"] + gathered.reading, "detecting": seconds["detecting"] + gathered.detecting}
+    factors = sweep_factors(setup, learned.thresholds)
+    gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
+    gathered.skipped += learned.about.skipped
+    gathered.findings += [*measured, *learned.about.findings, *left_out]
+    logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
+    stored = store.outcomes(setup, learned, factors) if store else None
+    gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored)
     gathered.skipped += _labels_without_run(setup, gathered.scored)
-    provenance = _provenance(setup, used, learned.thresholds, learned.learned_from(learn.operations))
+    used = [setup.machine_file.detector(name) for name in setup.detectors]
+    provenance = _provenance(setup, used, learned)
     provenance["units"] |= gathered.units
-    results = gathered.results(provenance, learned.calibration)
-    return Benchmark(evaluate(results, setup.limits), gathered.traces, seconds, setup.inputs)
+    results = gathered.results(provenance, learned.about.calibration)
+    report = stored.finish() if stored else None
+    times = {"reading": learned.seconds + gathered.reading, "detecting": seconds - learned.seconds + gathered.detecting}
+    return Benchmark(evaluate(results, setup.limits), gathered.traces, times, setup.inputs, report)
 
 
 @dataclass(frozen=True)
@@ -169,9 +190,16 @@ class _LogScoring:
     normals: NormalMotions
     runs: tuple[Operation, ...]
 
-    def __call__(self, group: str, path: Path, wanted: WantedTraces) -> list[LogOutcome]:
-        scored = score_runs(self.setup, group, path, self._detection_of, self.factors, self.ranges)
-        return [outcome_of(item, self.setup, self._normals_for(item), wanted) for item in scored]
+    def __call__(
+        self, group: str, path: Path, wanted: Wanted | None, detectors: tuple[str, ...] | None
+    ) -> list[LogOutcome]:
+        chosen = self if detectors is None else self._with_only(detectors)
+        scored = score_runs(chosen.setup, group, path, chosen._detection_of, chosen.factors, chosen.ranges)
+        return [outcome_of(item, chosen.setup, chosen._normals_for(item), wanted) for item in scored]
+
+    def _with_only(self, names: tuple[str, ...]) -> _LogScoring:
+        chosen = tuple(detector for detector in self.detectors if detector.name in names)
+        return replace(self, detectors=chosen, thresholds=self.thresholds.with_only(names))
 
     def _normals_for(self, scored: Scored) -> NormalMotions | NormalsWithout:
         """Return the normal motion that a log is compared with: without its own."""
@@ -182,6 +210,22 @@ class _LogScoring:
     def _detection_of(self, log: Path) -> tuple[Detect, Mapping[str, Sequence[RecordingFinding]]]:
         thresholds, untaught = self.thresholds.without(log)
         return detect_with(self.setup, self.detectors, thresholds, self.unusable), untaught
+
+
+def _scoring(
+    setup: BenchmarkFile, learned: Learned, teaching: Teaching, factors: Mapping[str, FloatArray]
+) -> _LogScoring:
+    """Return how a log is scored; the runs themselves are needed only for a log that is learned from, too."""
+    return _LogScoring(
+        setup,
+        tuple(setup.machine_file.detector(name) for name in setup.detectors),
+        ThresholdsByLog(setup, learned.thresholds, teaching.pairs if setup.both else {}),
+        learned.about.unusable,
+        factors,
+        learned.ranges,
+        learned.normals,
+        teaching.operations if setup.both else (),
+    )
 
 
 def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[Skipped]:
@@ -196,7 +240,7 @@ def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[S
     ]
 
 
-def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, FloatArray]:
+def sweep_factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, FloatArray]:
     """Return the safety factors of the sweep by detector; empty without an impact-free group."""
     if HOLDOUT not in setup.impacts:
         return {}
@@ -206,11 +250,8 @@ def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshol
 def _provenance(
     setup: BenchmarkFile,
     detectors: Sequence[Any],
-    thresholds: Mapping[str, tuple[FittedThreshold, ...]],
-    learned: Sequence[Operation],
+    learned: Learned,
 ) -> dict[str, Any]:
-    base = setup.path.parent
-    digests = {shown_path(location(item.recording.source), base): item.recording.digest for item in learned}
     return {
         "tool": "cdtool",
         "tool_version": __version__,
@@ -224,8 +265,8 @@ def _provenance(
             **asdict(setup.signature),
             "safety_factor": None if setup.budget else setup.signature.factor,
         },
-        "signature_sha256": {name: _digest(items) for name, items in thresholds.items()},
-        "learned_runs": [operation.name for operation in learned],
+        "signature_sha256": {name: _digest(items) for name, items in learned.thresholds.items()},
+        "learned_runs": list(learned.about.names),
         **setup.learned_parts,
         "safety_factor_set": "by budget" if setup.budget else "by hand" if set_by_hand(setup.rule) else "by default",
         **setup.activation.described,
@@ -233,7 +274,7 @@ def _provenance(
         "false_alarm_budget": str(setup.budget) if setup.budget else None,
         "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},
         "short_names": {detector.name: detector.short_name for detector in detectors},
-        "learned_sha256": dict(sorted(digests.items())),
+        "learned_sha256": dict(sorted(learned.about.digests.items())),
         "plugins": plugin_packages(),
     }
 

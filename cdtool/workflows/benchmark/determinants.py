@@ -7,7 +7,7 @@ the machine, the gains of other detectors and the rows that a label file has on 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -22,7 +22,7 @@ from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.learned import Learned
 from cdtool.workflows.runs import shown_path
-from cdtool.workflows.store.digest import code_version, digest_of
+from cdtool.workflows.store.digest import code_version, combined, digest_of
 from cdtool.workflows.store.sources import SourceFile
 
 Sources = Sequence[SourceFile]
@@ -32,25 +32,26 @@ Sources = Sequence[SourceFile]
 class Determinants:
     """What determines the outcomes of a benchmark's logs, given what was `learned` from its impact-free runs.
 
-    `taught` is the key of what was learned; `factors` are the safety factors of the sweep by detector.
+    `runs` are the sources of these runs; `factors` are the safety factors of the sweep by detector.
     """
 
     setup: BenchmarkFile
     learned: Learned
-    taught: str
+    runs: Mapping[Path, Sources]
     factors: Mapping[str, FloatArray]
 
     def log_key(self, group: str, path: Path, sources: Sources) -> str:
         """Return the key of the rows of a log that do not depend on the detectors."""
-        return digest_of("log", self._common, *self._of_log(group, path), [item.digest for item in sources])
+        own = digest_of(*self._of_log(group, path))
+        return combined("log", self._common, own, *(item.digest for item in sources))
 
     def detector_key(self, detector: str, path: Path, log_key: str) -> str:
         """Return the key of the outcome of a detector on a log."""
-        return digest_of("detector", log_key, self._of_detector[detector], self._own_part(path))
+        return combined("detector", log_key, self._of_detector[detector], self._own_part(path, (detector,)))
 
     def trace_key(self, path: Path, number: int, detector_keys: Sequence[str]) -> str:
         """Return the key of the trace of an operation of a log, which explains alarms by what was learned."""
-        return digest_of("trace", number, list(detector_keys), self._normals, self._own_part(path))
+        return combined("trace", str(number), *detector_keys, self._normals, self._own_part(path, ()))
 
     def name(self, path: Path) -> str:
         """Return the name of a log in results."""
@@ -101,7 +102,7 @@ class Determinants:
                 common,
                 setup.machine_file.detector(name),
                 [fitted_to_dict(setup.rule, item) for item in self.learned.thresholds.get(name, ())],
-                self.learned.unusable.get(name),
+                self.learned.about.unusable.get(name),
                 self.factors.get(name),
             )
             for name in setup.detectors
@@ -111,14 +112,22 @@ class Determinants:
     def _normals(self) -> str:
         return digest_of([item.to_dict() for item in self.learned.normals.motions], str(self.learned.normals.absent))
 
-    def _own_part(self, path: Path) -> str:
+    def _own_part(self, path: Path, detectors: tuple[str, ...]) -> str:
         """Return what determines the thresholds of a log that is learned from, too: all others; else empty."""
         both = self.setup.both
         if not both:
             return ""
         files = {split_run(log)[0] for log in both} if self.setup.has_runs else set(both)
         own = split_run(path)[0] if self.setup.has_runs else path
-        return self.taught if own in files else ""
+        if own not in files:
+            return ""
+        if detectors not in self._taught:
+            self._taught[detectors] = learned_key(self.setup, self.runs, detectors)
+        return self._taught[detectors]
+
+    @cached_property
+    def _taught(self) -> dict[tuple[str, ...], str]:
+        return {}
 
 
 def how_logs_are_read(setup: BenchmarkFile) -> list[Any]:
@@ -158,8 +167,8 @@ def _rows(labels: Labels, names: Sequence[str]) -> list[Any]:
     return [[name, labels.contacts[name], labels.lines[name]] for name in names]
 
 
-def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources]) -> str:
-    """Return the key of what is learned from the impact-free runs of a benchmark."""
+def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources], detectors: Sequence[str]) -> str:
+    """Return the key of what some detectors learn from the impact-free runs of a benchmark."""
     learn = [
         [
             shown_path(path, setup.path.parent),
@@ -174,10 +183,10 @@ def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources]) -> str:
         "learned",
         code_version(),
         how_logs_are_read(setup),
-        [[name, setup.machine_file.detector(name)] for name in setup.detectors],
+        [[name, setup.machine_file.detector(name)] for name in detectors],
         rule_to_dict(setup.rule),
         str(setup.budget),
-        replace(setup.activation),
+        setup.activation,
         setup.watched,
         setup.guard,
         setup.window,

@@ -9,34 +9,26 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.determinants import Determinants
+from cdtool.workflows.benchmark.known_sources import KnownSources
 from cdtool.workflows.benchmark.log_outcome import DetectorOutcome, LogOutcome, LogRows
-from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome, source_files
-from cdtool.workflows.execution.workers import Workers, in_order
+from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome
+from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.store.digest import code_version
 from cdtool.workflows.store.encoding import decoded, encoded
-from cdtool.workflows.store.entry import Entry
-from cdtool.workflows.store.sources import SourceFile, read_sources, state_of
+from cdtool.workflows.store.entry import Entry, source_entry
+from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.store import RunRecord, Store, write_run
+from cdtool.workflows.store.use import StoreUse
 
 _Rows = tuple[LogRows, ...]
 _OfDetector = tuple[DetectorOutcome | None, ...]
-# Files that a worker hashes before its digests are sent.
-_HASHED_TOGETHER = 64
-
-
-@dataclass(frozen=True)
-class StoreUse:
-    """How a store is used: `folder`; `trust_times`: a file of the same size and time is the same; `retry_failed`."""
-
-    folder: Path
-    trust_times: bool = False
-    retry_failed: bool = False
 
 
 @dataclass(frozen=True)
@@ -61,73 +53,56 @@ class StoreReport:
     reused: int = 0
 
 
-@dataclass(frozen=True)
-class _Hashing:
-    """Reads the sources of one log."""
-
-    setup: BenchmarkFile
-
-    def __call__(self, path: Path) -> tuple[SourceFile, ...] | None:
-        return read_sources(source_files(self.setup, path))
-
-
-def known_sources(
-    setup: BenchmarkFile, store: Store, use: StoreUse, paths: Sequence[Path], names: Sequence[str], workers: Workers
-) -> list[tuple[SourceFile, ...] | None]:
-    """Return the sources of those logs that the store knows by name, hashed unless their times are trusted."""
-    found: list[tuple[SourceFile, ...] | None] = [None] * len(paths)
-    to_hash: list[int] = []
-    for number, (path, name) in enumerate(zip(paths, names, strict=True)):
-        before = store.sources_of(name)
-        if before is None:
-            continue
-        states = tuple((item.size, item.modified) for item in before)
-        if use.trust_times and state_of(source_files(setup, path)) == states:
-            found[number] = before
-        else:
-            to_hash.append(number)
-    logs = [paths[number] for number in to_hash]
-    hashed = in_order(_Hashing(setup), logs, len(logs), workers, of_lost=lambda *_: None, together=_HASHED_TOGETHER)
-    for number, sources in zip(to_hash, hashed, strict=True):
-        found[number] = sources
-    return found
-
-
 class StoredOutcomes:
     """The outcomes of logs in a store, and those that are computed and added to it."""
 
-    def __init__(self, store: Store, use: StoreUse, setup: BenchmarkFile, determinants: Determinants) -> None:
+    def __init__(
+        self,
+        store: Store,
+        use: StoreUse,
+        setup: BenchmarkFile,
+        determinants: Determinants,
+        keys: Sequence[str] = (),
+    ) -> None:
         self.store, self.use, self.setup, self.determinants = store, use, setup, determinants
         self.names = setup.detectors
-        self.keys: list[str] = []
+        self.keys = list(keys)
         self.computed = self.reused = self.failed = 0
         self.began = time.time()
 
     def plan(self, logs: Sequence[tuple[str, Path]], workers: Workers) -> list[Planned]:
         """Return what is in the store of each log."""
-        of = self.determinants
-        paths = [path for _, path in logs]
-        sources = known_sources(self.setup, self.store, self.use, paths, [of.name(path) for path in paths], workers)
-        return [self._planned(group, path, known) for (group, path), known in zip(logs, sources, strict=True)]
+        known = KnownSources(self.setup, self.store, self.use, workers)
+        sources = known.of([path for _, path in logs])
+        keys = [key for log, of_log in zip(logs, sources, strict=True) if of_log for key in self._keys_of(log, of_log)]
+        places = iter(self.store.places(keys))
+        each = 1 + len(self.names)
+        return [self._planned(item, list(islice(places, each)) if item else None) for item in sources]
 
-    def _planned(self, group: str, path: Path, sources: tuple[SourceFile, ...] | None) -> Planned:
+    def _keys_of(self, log: tuple[str, Path], sources: tuple[SourceFile, ...]) -> list[str]:
+        """Return the key of the rows of a log, and of the outcome of each detector."""
+        of, (group, path) = self.determinants, log
+        key = of.log_key(group, path, sources)
+        return [key, *(of.detector_key(name, path, key) for name in self.names)]
+
+    def _planned(self, sources: tuple[SourceFile, ...] | None, places: list[int | None] | None) -> Planned:
         nothing = Planned(sources, None, (None,) * len(self.names))
-        if sources is None:
+        if places is None or places[0] is None or (self.use.retry_failed and self.store.is_failed(places[0])):
             return nothing
-        key = self.determinants.log_key(group, path, sources)
-        place = self.store.place(key)
-        if place is None or (self.use.retry_failed and self.store.is_failed(place)):
-            return nothing
-        detectors = (self.store.place(self.determinants.detector_key(name, path, key)) for name in self.names)
-        return Planned(sources, place, tuple(detectors))
+        return Planned(sources, places[0], tuple(places[1:]))
 
     def piece(self, log: int, group: str, path: Path, planned: Planned, choice: TraceChoice) -> Piece:
         """Return the work that is left of a log; traces are wanted only if every detector is run."""
-        missing = tuple(name for name, place in zip(self.names, planned.detectors, strict=True) if place is None)
-        is_whole = planned.rows is None or len(missing) == len(self.names)
-        if is_whole:
+        missing = self.missing(planned)
+        if len(missing) == len(self.names):
             return Piece(log, group, path, choice, sources=planned.sources)
         return Piece(log, group, path, detectors=missing, sources=planned.sources)
+
+    def missing(self, planned: Planned) -> tuple[str, ...]:
+        """Return the detectors that have to be run on a log: all if its rows are missing."""
+        if planned.rows is None:
+            return self.names
+        return tuple(name for name, place in zip(self.names, planned.detectors, strict=True) if place is None)
 
     def known(self, planned: Planned) -> list[LogOutcome] | None:
         """Return the outcomes of a log that are all in the store; None if one of them is gone or damaged."""
@@ -139,6 +114,11 @@ class StoredOutcomes:
         except (AttributeError, ValueError):
             return None
         self.keys += [item.key for item in entries if item is not None]
+        if planned.sources is not None and entries[0] is not None and planned.sources != entries[0].sources:
+            touched = source_entry(entries[0].recording, planned.sources)
+            self.keys.append(touched.key)
+            if self.store.places([touched.key]) == [None]:
+                self.store.add([touched])
         self.reused += 1
         self.failed += any(item.unread for item in rows)
         return _combined(rows, detectors)
@@ -211,9 +191,7 @@ class StoredOutcomes:
     def _trace_key(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> str | None:
         if sources is None:
             return None
-        of, (group, path) = self.determinants, log
-        key = of.log_key(group, path, sources)
-        return of.trace_key(path, number, [of.detector_key(name, path, key) for name in self.names])
+        return self.determinants.trace_key(log[1], number, self._keys_of(log, sources)[1:])
 
     def finish(self) -> StoreReport:
         """Write which entries the run has used."""
@@ -223,6 +201,7 @@ class StoredOutcomes:
             self.setup.path.name,
             self.setup.digest,
             len(self.keys),
+            self.computed + self.reused,
             self.computed,
             self.failed,
             code_version(),

@@ -13,16 +13,22 @@ from typing import Any
 
 import numpy as np
 
-import cdtool
-
-# Rooms of the code that do not determine what a recording comes to.
-_ONLY_SHOWN = ("cli", "report", "simulation", "impact")
+# Rooms of the code that do not determine the outcome of a recording.
+_ONLY_SHOWN = ("cli", "report", "simulation")
 
 
 def digest_of(*values: Any) -> str:
-    """Return the SHA-256 of values: numbers, texts, arrays, and collections and dataclasses of them."""
+    """Return the SHA-256 of values: numbers, texts, arrays, and collections and instances of classes of them.
+
+    Raises TypeError for a function, which may do anything.
+    """
     text = json.dumps([_plain(item) for item in values], separators=(",", ":"), sort_keys=True)
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def combined(*digests: str) -> str:
+    """Return the SHA-256 of digests, or of other texts without a line end."""
+    return hashlib.sha256("\n".join(digests).encode()).hexdigest()
 
 
 def _plain(value: Any) -> Any:
@@ -32,9 +38,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         content = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
         return [str(value.dtype), list(value.shape), content]
-    if is_dataclass(value):
-        named = {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
-        return [f"{type(value).__module__}.{type(value).__qualname__}", named]
     if isinstance(value, Mapping):
         return {"mapping": [[_plain(key), _plain(item)] for key, item in value.items()]}
     if isinstance(value, list | tuple):
@@ -43,7 +46,20 @@ def _plain(value: Any) -> Any:
         return sorted(json.dumps(_plain(item), sort_keys=True) for item in value)
     if isinstance(value, PurePath):
         return value.as_posix()
-    return [type(value).__qualname__, _plain(value.value) if isinstance(value, Enum) else repr(value)]
+    return [f"{type(value).__module__}.{type(value).__qualname__}", _inner(value)]
+
+
+def _inner(value: Any) -> Any:
+    """Return what an instance of a class consists of."""
+    if isinstance(value, Enum):
+        return _plain(value.value)
+    if is_dataclass(value):
+        return {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
+    if isinstance(value, bytes | np.generic):
+        return repr(value)
+    if hasattr(value, "__dict__") and not callable(value):
+        return _plain(vars(value))
+    raise TypeError(f"{value!r} has no digest")
 
 
 @cache
@@ -55,7 +71,7 @@ def code_version() -> str:
     from cdtool.registry import plugin_packages
 
     digest = hashlib.sha256()
-    root = Path(cdtool.__file__).parent
+    root = Path(__file__).parents[2]
     for path in sorted(root.rglob("*.py")):
         if path.relative_to(root).parts[0] not in _ONLY_SHOWN:
             digest.update(path.read_bytes())

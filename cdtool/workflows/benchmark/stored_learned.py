@@ -1,0 +1,75 @@
+"""What was learned from impact-free runs, from the store or learned and stored, and the outcomes that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cdtool.recording import FloatArray
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
+from cdtool.workflows.benchmark.determinants import Determinants, learned_key
+from cdtool.workflows.benchmark.known_sources import KnownSources
+from cdtool.workflows.benchmark.learned import Learned, Teaching
+from cdtool.workflows.benchmark.stored_outcomes import StoredOutcomes
+from cdtool.workflows.execution.workers import Workers
+from cdtool.workflows.runs import shown_path
+from cdtool.workflows.store.digest import code_version, digest_of
+from cdtool.workflows.store.entry import Entry, source_entry
+from cdtool.workflows.store.sources import SourceFile
+from cdtool.workflows.store.store import Store
+from cdtool.workflows.store.use import StoreUse
+
+Sources = tuple[SourceFile, ...]
+
+
+@dataclass
+class StoreOfRun:
+    """A store as one run of a benchmark uses it."""
+
+    store: Store
+    use: StoreUse
+    workers: Workers
+    _runs: dict[Path, Sources] = field(default_factory=dict)
+    _keys: list[str] = field(default_factory=list)
+
+    def learned(self, teaching: Teaching) -> Learned:
+        """Return what the runs of a benchmark give; raises what `Teaching` raises."""
+        setup = teaching.setup
+        known = KnownSources(setup, self.store, self.use, self.workers)
+        sources = dict(zip(setup.learn, known.of(setup.learn, all_of_them=True), strict=True))
+        self._runs = {path: item or () for path, item in sources.items()}
+        if None in sources.values():  # one cannot be read now: what is learned without it must not be found again
+            return teaching.learned
+        key = digest_of(learned_key(setup, self._runs, setup.detectors), teaching.every_detector)
+        self._keys += [key, *(entry.key for entry in self._source_entries(setup))]
+        found = self._restored(key, setup)
+        if found is not None:
+            return found
+        learned = teaching.learned
+        if learned.lasts and all(known.is_unchanged(path, item) for path, item in self._runs.items()):
+            self._add(key, setup, learned)
+        return learned
+
+    def outcomes(self, setup: BenchmarkFile, learned: Learned, factors: Mapping[str, FloatArray]) -> StoredOutcomes:
+        """Return the outcomes of the logs, given what was learned."""
+        determinants = Determinants(setup, learned, self._runs, factors)
+        return StoredOutcomes(self.store, self.use, setup, determinants, self._keys)
+
+    def _restored(self, key: str, setup: BenchmarkFile) -> Learned | None:
+        entry = self.store.get(key)
+        if entry is None:
+            return None
+        try:
+            return Learned.of_text(entry.content, setup.rule)
+        except ValueError:
+            return None
+
+    def _add(self, key: str, setup: BenchmarkFile, learned: Learned) -> None:
+        text = learned.to_text(setup.rule)
+        of_runs = Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=code_version())
+        self.store.add([of_runs, *self._source_entries(setup)])
+
+    def _source_entries(self, setup: BenchmarkFile) -> list[Entry]:
+        names = ((shown_path(path, setup.path.parent), sources) for path, sources in self._runs.items())
+        return [source_entry(name, sources) for name, sources in names]
