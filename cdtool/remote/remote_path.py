@@ -362,8 +362,12 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         return found is not None and not found.is_folder and found.size >= SMALLEST_BY_RANGES
 
     def digest(self) -> str:
-        """Return what identifies the file's version without reading it; raises MissingObjectError, StorageError."""
-        return staging.current_info(str(self)).digest
+        """Return what identifies the file's version without reading it; raises MissingObjectError, StorageError.
+
+        It is that of the last `stat` if that was asked for in the last seconds.
+        """
+        found = staging.known_info(str(self))
+        return (staging.current_info(str(self)) if found is None else found).digest
 
     def open(
         self,
