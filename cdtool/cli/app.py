@@ -23,7 +23,7 @@ from typer.core import TyperGroup
 from cdtool.cli.streams import lost_output, open_standard_streams
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
-from cdtool.plain_text import one_line
+from cdtool.plain_text import counted, one_line
 
 COMMANDS: Mapping[str, str] = {
     "info": "cdtool.cli.info:info",
@@ -210,6 +210,18 @@ def _run_app(came: list[int]) -> Any:
         raise
 
 
+def _transferred() -> tuple[int, int]:
+    """Return the bytes that this process and its workers have read from URLs, and in how many requests."""
+    staging = sys.modules.get("cdtool.remote.staging")
+    return staging.amount_read() if staging is not None else (0, 0)
+
+
+def _show_transferred(before: tuple[int, int]) -> None:
+    size, requests = (now - then for now, then in zip(_transferred(), before, strict=True))
+    if requests:
+        typer.echo(f"read from URLs: {size / 2**20:.1f} MiB in {counted(requests, 'request')}", err=True)
+
+
 def _main(came: list[int]) -> None:
     open_standard_streams()
     # NumPy starts a thread of linear algebra per core: a sixth of the CPU time of a short command. The matrices here
@@ -221,8 +233,12 @@ def _main(came: list[int]) -> None:
     atexit.register(gc.freeze)
     warnings.showwarning = _show_note
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # hides its advice about its own cache
+    before = _transferred()
     try:
-        status = _run_app(came)
+        try:
+            status = _run_app(came)
+        finally:
+            _show_transferred(before)
         if fault := lost_output():
             raise CdtoolError(f"standard output: {fault.strerror}", "the output is incomplete; free some disk space")
         status = status if isinstance(status, int) else status_of([])

@@ -38,7 +38,7 @@ class RangedBytes:
         self._starts: list[int] = []
         self._expected: dict[int, bytes] = {}
         self._blocks: dict[int, bytes] = {}
-        self._last_end, self._block = -1, _SMALLEST_BLOCK
+        self._last_end, self._block = -2 * _SMALLEST_BLOCK, _SMALLEST_BLOCK
 
     def read(self, at: int, length: int) -> bytes:
         """Return up to `length` bytes from `at`, fewer only at the file's end; raises StorageError."""
@@ -86,7 +86,7 @@ class RangedBytes:
 
     def _next_block(self, at: int) -> int:
         """Return the size of the next block [bytes]: larger if it continues the last one."""
-        continues = 0 <= at - self._last_end <= _SMALLEST_BLOCK
+        continues = abs(at - self._last_end) < _SMALLEST_BLOCK
         self._block = min(2 * self._block, _LARGEST_BLOCK) if continues else _SMALLEST_BLOCK
         return self._block
 
