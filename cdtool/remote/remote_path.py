@@ -27,6 +27,8 @@ from cdtool.remote.ranges import SMALLEST_BY_RANGES, RangedFile
 from cdtool.remote.storage_error import StorageError
 from cdtool.remote.urls import complete, scheme_of, shown
 
+# Protocols without a host or bucket: the first name is one below it.
+_WITHOUT_HOST = frozenset(("memory",))
 # Files that are read by ranges, by suffix: the others are read from their beginning to their end.
 _BY_RANGES = frozenset((".mcap",))
 _MAGIC = frozenset("*?[")
@@ -104,14 +106,14 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         if sys.version_info >= (3, 12):
             super().__init__(text)
         scheme, _, rest = text.partition("://")
-        first, *names = rest.split("/")
+        first, *names = ["", *rest.split("/")] if scheme in _WITHOUT_HOST else rest.split("/")
         self._scheme = scheme
         self._segments = (first, *_normal(names))
         self._listed: tuple[float, bool] | None = None
 
     @classmethod
     def _of(cls, scheme: str, segments: tuple[str, ...]) -> RemotePath:
-        return cls(f"{scheme}://{'/'.join(segments)}")
+        return cls(_url(scheme, segments))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return RemotePath, (complete(str(self)),)
@@ -125,7 +127,7 @@ class RemotePath(type(Path())):  # type: ignore[misc]
     # What it is called.
 
     def __str__(self) -> str:
-        return f"{self._scheme}://{'/'.join(self._segments)}"
+        return _url(self._scheme, self._segments)
 
     def __repr__(self) -> str:
         return f"RemotePath({str(self)!r})"
@@ -155,7 +157,7 @@ class RemotePath(type(Path())):  # type: ignore[misc]
     @property
     def anchor(self) -> str:
         """The protocol and the host or bucket."""
-        return f"{self._scheme}://{self._segments[0]}"
+        return _url(self._scheme, self._segments[:1])
 
     @property
     def drive(self) -> str:
@@ -431,6 +433,10 @@ class RemotePath(type(Path())):  # type: ignore[misc]
     copy_into: Any = _refused("copy_into")
     move: Any = _refused("move")
     move_into: Any = _refused("move_into")
+
+
+def _url(scheme: str, segments: tuple[str, ...]) -> str:
+    return f"{scheme}://{'/'.join(segments[1:] if scheme in _WITHOUT_HOST else segments)}"
 
 
 def _normal(names: list[str]) -> tuple[str, ...]:
