@@ -193,8 +193,12 @@ def compilation_shown() -> Iterator[None]:
 
 def main() -> None:
     """Run the app. A known error prints one line to stderr and exits with status 2."""
+    before = _transferred()
     with _ending_as_if_interrupted() as came:
-        _main(came)
+        try:
+            _main(came)
+        finally:
+            _show_transferred(before)
 
 
 def _run_app(came: list[int]) -> Any:
@@ -233,12 +237,8 @@ def _main(came: list[int]) -> None:
     atexit.register(gc.freeze)
     warnings.showwarning = _show_note
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # hides its advice about its own cache
-    before = _transferred()
     try:
-        try:
-            status = _run_app(came)
-        finally:
-            _show_transferred(before)
+        status = _run_app(came)
         if fault := lost_output():
             raise CdtoolError(f"standard output: {fault.strerror}", "the output is incomplete; free some disk space")
         status = status if isinstance(status, int) else status_of([])

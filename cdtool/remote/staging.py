@@ -98,17 +98,16 @@ def known_info(url: str) -> ObjectInfo | None:
 
 def current_info(url: str) -> ObjectInfo:
     """Return what is at a URL now; raises MissingObjectError, StorageError."""
-    found: ObjectInfo | None = None
     try:
         found = storage.info(url)
-        return found
     except FileNotFoundError:
+        _note_answer(url, None)
         raise
-    finally:
-        note_answer(url, found)
+    _note_answer(url, found)
+    return found
 
 
-def note_answer(url: str, found: ObjectInfo | None) -> None:
+def _note_answer(url: str, found: ObjectInfo | None) -> None:
     """Keep an answer of the storage for some seconds."""
     with _session.lock:
         if len(_session.answers) >= _MOST_ANSWERS:

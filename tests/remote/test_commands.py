@@ -49,12 +49,15 @@ def test_a_local_benchmark_file_may_name_logs_at_urls(gate, tmp_path):
 
 
 def test_a_report_folder_is_written_and_replaced(gate, memory):
-    assert cdtool("benchmark", f"{gate}/benchmark.toml", "-d", "pt", "-o", "memory://report").status == 0
+    assert cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "pt", "-o", "memory://report").status == 0
     assert {"/report/report.html", "/report/results.json", "/report/latency.png"} <= set(memory.find("/report"))
     memory.pipe_file("/report/own.txt", b"mine")
-    refused = cdtool("benchmark", f"{gate}/benchmark.toml", "-d", "pt", "-o", "memory://report")
+    refused = cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "pt", "-o", "memory://report")
     assert refused.status == 2 and "memory://report/own.txt: is not part of a cdtool report" in refused.err
-    assert cdtool("benchmark", f"{gate}/benchmark.toml", "-d", "gm", "-o", "memory://report", "--force").status == 0
+    assert (
+        cdtool("benchmark", f"{gate}/benchmark.toml", "--detectors", "gm", "-o", "memory://report", "--force").status
+        == 0
+    )
     assert memory.cat("/report/own.txt") == b"mine"
 
 

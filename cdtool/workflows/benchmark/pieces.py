@@ -72,8 +72,10 @@ class PieceScoring:
         before = state_of(files)
         outcomes = self.score(piece.group, piece.path, piece.wanted, piece.detectors)
         sources = self._sources(piece, files, before, outcomes) if self.with_sources else None
-        if state_of(files) != before or sources == ():
-            changed = Skipped(shown_path(piece.path, self.setup.path.parent), "changed while it was read")
+        after = state_of(files)
+        if after != before or sources == ():
+            why = "changed while it was read" if after is not None else "was removed, or cannot be reached, meanwhile"
+            changed = Skipped(shown_path(piece.path, self.setup.path.parent), why)
             return PieceOutcome((LogOutcome(LogRows(None, skipped=(changed,), unread=True), lasts=False),))
         lasting = sources if all(item.lasts for item in outcomes) else None
         return PieceOutcome(tuple(outcomes), lasting, perf_counter() - begin)
