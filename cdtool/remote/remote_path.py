@@ -13,6 +13,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import posixpath
 import stat
 import sys
 import time
@@ -32,7 +33,7 @@ _WITHOUT_HOST = frozenset(("memory",))
 # Files that are read by ranges, by suffix: the others are read from their beginning to their end.
 _BY_RANGES = frozenset((".mcap",))
 _MAGIC = frozenset("*?[")
-# What a listing said of a file is believed for this time [s].
+# A listing counts as an answer about each of its files for this time [s].
 _TRUSTED = 2.0
 _BUFFER = 1 << 12
 
@@ -68,6 +69,19 @@ def location(text: str | Path) -> Path:
 def joined(base: Path, text: str) -> Path:
     """Return the path of a file name that is relative to `base`, unless it is absolute or a URL."""
     return location(text) if scheme_of(text) else base / text
+
+
+def relative_name(path: Path, folder: Path) -> str:
+    """Return the name by which a file in `folder` names another file; the URL if that is in another storage.
+
+    >>> relative_name(location("s3://bucket/logs/01.csv"), location("s3://bucket/benchmarks"))
+    '../logs/01.csv'
+    """
+    if not isinstance(path, RemotePath) and not isinstance(folder, RemotePath):
+        return Path(os.path.relpath(path, folder)).as_posix()
+    if isinstance(path, RemotePath) and isinstance(folder, RemotePath) and path.anchor == folder.anchor:
+        return posixpath.relpath("/".join(path.parts[1:]), "/".join(folder.parts[1:]) or ".")
+    return path.absolute().as_posix()
 
 
 def is_remote(path: Path) -> bool:
@@ -206,12 +220,14 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         """The folders, the nearest first."""
         return tuple(self._of(self._scheme, self._segments[:i]) for i in range(len(self._segments) - 1, 0, -1))
 
-    def joinpath(self, *others: str | os.PathLike[str]) -> Path:
+    def _joined(self, *others: str | os.PathLike[str]) -> Path:
         """Return the path below; an absolute path or a URL replaces it."""
         made: Path = self
         for other in others:
             made = made / other
         return made
+
+    joinpath = _joined
 
     def __truediv__(self, other: str | os.PathLike[str]) -> Path:
         if isinstance(other, RemotePath):
@@ -227,20 +243,11 @@ class RemotePath(type(Path())):  # type: ignore[misc]
     def __rtruediv__(self, other: object) -> Path:
         return self
 
-    def with_segments(self, *segments: str | os.PathLike[str]) -> Path:
-        """Return a path of these segments."""
-        first, *rest = segments
-        return location(str(first)).joinpath(*rest)
-
     def with_name(self, name: str) -> RemotePath:
         """Return the path with another name."""
         if not self.name or not name or name in (".", ".."):
             raise ValueError(f"{name!r} is no name for {self}")
         return self._of(self._scheme, (*self._segments[:-1], *name.split("/")))
-
-    def with_stem(self, stem: str) -> RemotePath:
-        """Return the path with another stem."""
-        return self.with_name(f"{stem}{self.suffix}")
 
     def with_suffix(self, suffix: str) -> RemotePath:
         """Return the path with another suffix."""
@@ -266,10 +273,6 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         """Return True."""
         return True
 
-    def is_reserved(self) -> bool:
-        """Return False."""
-        return False
-
     def match(self, pattern: Any, **_: object) -> bool:
         """Return whether the end of the path is as a pattern."""
         return PurePosixPath(*self._segments).match(str(pattern))
@@ -278,12 +281,10 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         """Return the path itself."""
         return self
 
+    expanduser = absolute
+
     def resolve(self, strict: bool = False) -> RemotePath:  # noqa: ARG002  as of Path
         """Return the path itself: there are no links."""
-        return self
-
-    def expanduser(self) -> RemotePath:
-        """Return the path itself."""
         return self
 
     # What the storage says.
@@ -327,7 +328,7 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         """Return False."""
         return False
 
-    is_junction = is_socket = is_fifo = is_block_device = is_char_device = is_mount
+    is_reserved = is_junction = is_socket = is_fifo = is_block_device = is_char_device = is_mount
 
     def samefile(self, other: Any) -> bool:
         """Return whether another path is the same URL."""
@@ -413,6 +414,8 @@ class RemotePath(type(Path())):  # type: ignore[misc]
         finally:
             staging.forget(str(self))
 
+    with_segments: Any = _refused("with_segments")
+    with_stem: Any = _refused("with_stem")
     rmdir: Any = _refused("rmdir")
     rename: Any = _refused("rename")
     replace: Any = _refused("replace")

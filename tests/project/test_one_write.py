@@ -13,6 +13,10 @@ ROOT = Path(__file__).parents[2]
 BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
 WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", "NamedTemporaryFile", "savefig"}
 ELSEWHERE = {
+    "cdtool/remote/staging.py": "locks a temporary folder of its own",
+    "cdtool/remote/transferred.py": "writes into that folder",
+    "cdtool/workflows/execution/in_worker.py": "opens the null device",
+    "cdtool/workflows/store/journal.py": "keeps a journal open, which need not be complete",
     "cdtool/cli/streams.py": "opens the null device",
     "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
 }
