@@ -18,6 +18,8 @@ ELSEWHERE = {
     "cdtool/workflows/execution/in_worker.py": "opens the null device",
     "cdtool/workflows/store/journal.py": "keeps a journal open, which need not be complete",
     "cdtool/cli/streams.py": "opens the null device",
+    "cdtool/workflows/execution/in_worker.py": "opens the null device",
+    "cdtool/workflows/store/journal.py": "appends to a file that the next run takes over if this one is killed",
     "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
 }
 

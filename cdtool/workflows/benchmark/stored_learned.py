@@ -42,9 +42,10 @@ class StoreOfRun:
         if None in sources.values():  # one cannot be read now: what is learned without it must not be found again
             return teaching.learned
         key = digest_of(learned_key(setup, self._runs, setup.detectors), teaching.every_detector)
-        self._keys += [key, *(entry.key for entry in self._source_entries(setup))]
         found = self._restored(key, setup)
         if found is not None:
+            self._add_sources(setup)
+            self._keys.append(key)
             return found
         learned = teaching.learned
         if learned.lasts and all(known.is_unchanged(path, item) for path, item in self._runs.items()):
@@ -67,9 +68,17 @@ class StoreOfRun:
 
     def _add(self, key: str, setup: BenchmarkFile, learned: Learned) -> None:
         text = learned.to_text(setup.rule)
-        of_runs = Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=code_version())
-        self.store.add([of_runs, *self._source_entries(setup)])
+        self.store.add(
+            [Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=code_version())]
+        )
+        self._add_sources(setup)
+        self._keys.append(key)
 
-    def _source_entries(self, setup: BenchmarkFile) -> list[Entry]:
-        names = ((shown_path(path, setup.path.parent), sources) for path, sources in self._runs.items())
-        return [source_entry(name, sources) for name, sources in names]
+    def _add_sources(self, setup: BenchmarkFile) -> None:
+        """Add the sources of the runs that the store does not have with these times."""
+        base = setup.path.parent
+        entries = [source_entry(shown_path(path, base), sources) for path, sources in self._runs.items()]
+        keys = [entry.key for entry in entries]
+        places = self.store.places(keys)
+        self.store.add([entry for entry, place in zip(entries, places, strict=True) if place is None])
+        self._keys += keys

@@ -47,6 +47,7 @@ _ROW = (1 << _ROW_BITS) - 1
 # Parts that are held in memory.
 _MOST_PARTS = 3
 _NAMES = tuple(item.name for item in fields(Entry))
+_KEY_BYTES = 32
 _NO_SOURCES = "[]"
 _PLAIN = ("key", "kind", "recording", "sources", "failed")
 
@@ -60,7 +61,9 @@ class Store:
     def __init__(self, folder: Path, *, writes: bool = True) -> None:
         self.folder, self.writes = folder, writes
         require_pyarrow()
-        _check(folder, create=writes)
+        if writes:
+            _create(folder)
+        require_store(folder)
         self._journal: Journal | None = None
         self._waiting: list[Entry] = []
         self._content = 0
@@ -91,7 +94,7 @@ class Store:
 
     def sources_of(self, recording: str) -> tuple[SourceFile, ...] | None:
         """Return the files from which a recording was last read; None for one that the store does not know."""
-        text = self._index.sources.get(_encodable(recording))
+        text = self._index.sources.get(encodable(recording))
         return None if text is None else decoded(text, tuple[SourceFile, ...])
 
     def places(self, keys: Sequence[str]) -> list[int | None]:
@@ -103,7 +106,7 @@ class Store:
         return place in self._index.failed
 
     def get(self, key: str) -> Entry | None:
-        """Return an entry; None if there is none, or its file was removed or damaged meanwhile."""
+        """Return an entry; None if it is missing, or its file was removed or damaged meanwhile."""
         (place,) = self._index.places([key])
         found = None if place is None else self.at(place)
         return found if found is not None and found.key == key else None
@@ -227,12 +230,31 @@ def write_part(folder: Path, entries: Iterable[Entry]) -> Path:
     """Write entries to a new part of a store, and return it."""
     import pyarrow as pa
 
-    entries = [replace(item, recording=_encodable(item.recording)) for item in entries]
+    entries = [replace(item, recording=encodable(item.recording)) for item in entries]
     columns: dict[str, list[Any]] = {name: [getattr(item, name) for item in entries] for name in _NAMES}
     columns["sources"] = [encoded(item.sources, tuple[SourceFile, ...]) for item in entries]
-    types = {"content": pa.large_string(), "seconds": pa.float64(), "failed": pa.bool_()}
-    arrays = [pa.array(columns[name], type=types.get(name, pa.string())) for name in _NAMES]
+    arrays = [_numbers(columns[name]) if name in ("seconds", "failed") else _texts(columns[name]) for name in _NAMES]
     return _write_table(folder / "parts", pa.table(arrays, names=list(_NAMES)))
+
+
+def _texts(values: Sequence[str]) -> Any:
+    """Return a column of texts; `pyarrow.array` would import pandas, which takes longer than a small store."""
+    import pyarrow as pa
+
+    pieces = [value.encode() for value in values]
+    ends = np.zeros(len(pieces) + 1, dtype=np.int64)
+    np.cumsum([len(piece) for piece in pieces], out=ends[1:])
+    return pa.LargeStringArray.from_buffers(len(pieces), pa.py_buffer(ends), pa.py_buffer(b"".join(pieces)))
+
+
+def _numbers(values: Sequence[float]) -> Any:
+    import pyarrow as pa
+
+    array = np.array(values)
+    if array.dtype == bool:
+        packed = np.packbits(array, bitorder="little")
+        return pa.BooleanArray.from_buffers(pa.bool_(), len(array), [None, pa.py_buffer(packed)])
+    return pa.DoubleArray.from_buffers(pa.float64(), len(array), [None, pa.py_buffer(array.astype(np.float64))])
 
 
 def _write_table(folder: Path, table: Any) -> Path:
@@ -252,13 +274,15 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]] | Non
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(pa.BufferReader(path.read_bytes()), columns=list(names), page_checksum_verification=True)
+        # `read_table` would import pandas.
+        with pq.ParquetFile(pa.BufferReader(path.read_bytes()), page_checksum_verification=True) as file:
+            table = file.read(columns=list(names))
     except (OSError, pa.ArrowException):
         return None
     return {name: table[name].to_pylist() for name in names}
 
 
-def _encodable(name: str) -> str:
+def encodable(name: str) -> str:
     """Return the name of a recording without half surrogate pairs, which names that are not UTF-8 have."""
     return name.encode("utf-8", "replace").decode("utf-8")
 
@@ -286,7 +310,11 @@ def write_run(folder: Path, run: RunRecord, keys: Iterable[str]) -> None:
     import pyarrow as pa
 
     values = {item.name: getattr(run, item.name) for item in fields(RunRecord)}
-    table = pa.table({"key": pa.array([bytes.fromhex(key) for key in keys], type=pa.binary(32))})
+    every = bytes.fromhex("".join(keys))
+    column = pa.FixedSizeBinaryArray.from_buffers(
+        pa.binary(_KEY_BYTES), len(every) // _KEY_BYTES, [None, pa.py_buffer(every)]
+    )
+    table = pa.table([column], names=["key"])
     _write_table(folder / "runs", table.replace_schema_metadata({"run": json.dumps(values)}))
 
 
@@ -325,18 +353,23 @@ def read_keys(path: Path) -> list[Any]:
     return [] if columns is None else columns["key"]
 
 
-def _check(folder: Path, *, create: bool) -> None:
-    """Create an empty store, or check that a folder is one; raises ConfigurationError."""
+def require_store(folder: Path) -> None:
+    """Raise ConfigurationError if a folder is not a store of this version."""
+    mark = folder / _MARK
+    if not mark.is_file():
+        raise ConfigurationError(f"{folder}: is not a store", "give the folder that was given as --store")
+    values = _values(mark)
+    if values.get("kind") != _KIND or values.get("schema_version") != _SCHEMA:
+        raise ConfigurationError(
+            f"{mark}: is not that of a store of this version", "give another folder, or remove this one"
+        )
+
+
+def _create(folder: Path) -> None:
+    """Create an empty store, unless the folder is one; raises ConfigurationError for a folder with other content."""
     mark = folder / _MARK
     if mark.is_file():
-        values = _values(mark)
-        if values.get("kind") != _KIND or values.get("schema_version") != _SCHEMA:
-            raise ConfigurationError(
-                f"{mark}: is not that of a store of this version", "give another folder, or remove this one"
-            )
         return
-    if not create:
-        raise ConfigurationError(f"{folder}: is not a store", "give the folder that was given as --store")
     if folder.exists() and (not folder.is_dir() or any(True for _ in folder.iterdir())):
         raise ConfigurationError(f"{folder}: is neither a store nor an empty folder", "give another folder")
     for part in ("parts", "runs"):

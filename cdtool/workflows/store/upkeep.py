@@ -11,7 +11,7 @@ from pathlib import Path
 from cdtool.errors import UsageError
 from cdtool.remote.remote_path import location
 from cdtool.workflows.store.entry import Entry
-from cdtool.workflows.store.store import RunRecord, Store, read_columns, read_keys, read_runs, write_part
+from cdtool.workflows.store.store import RunRecord, Store, read_columns, read_keys, read_runs, require_store, write_part
 
 _DAY = 86_400.0
 
@@ -106,6 +106,7 @@ def collect_garbage(folder: str | Path, *, keep_runs: int = 10, older_than_days:
     """
     if keep_runs < 0 or older_than_days < 0.0:
         raise UsageError("a number of runs or days is negative", "give 0 or more")
+    require_store(location(folder))
     store = Store(location(folder))
     before = _size(store.folder)
     runs = read_runs(store.folder)
