@@ -1,8 +1,8 @@
 """A fleet on the local disk: what many recordings cost, what a second run costs, and what a killed run loses.
 
-Every run is a new process on short recordings of a simulated gate (`fleet_logs.py`: 7 s at 250 Hz, CSV, five detectors).
+Every run is a new process on short recordings of a gate (`fleet_logs.py`: 7 s at 250 Hz, CSV, five detectors).
 
-python benchmarks/fleet.py scale [RECORDINGS]   # 20,000: memory, time per recording, two workers, cost of the store; 1 h
+python benchmarks/fleet.py scale [RECORDINGS]   # 20,000: memory, time per recording, workers, cost of the store; 1 h
 python benchmarks/fleet.py again [RECORDINGS]   # 20,000: nothing changed, one recording added, one gain changed
 python benchmarks/fleet.py kills [KILLS]        # 50 kills of the first process or of a worker
 """

@@ -15,6 +15,8 @@ from cdtool.file_locks import is_temporary
 from cdtool.files import replaced_folder, resolved
 from cdtool.foreign_files import FIGURES, Kind, refuse_inputs, refuse_other_kind
 from cdtool.plain_text import plain
+from cdtool.remote.remote_path import is_remote
+from cdtool.remote.uploads import check_place
 from cdtool.report.writers import WRITERS, known_suffixes, own_writers, writer_of
 from cdtool.report.writers.base import Report, Subject, Writer
 from cdtool.value_words import fault_and_place
@@ -155,11 +157,14 @@ def _check_folder(target: Path, *, force: bool) -> None:
 
 
 def _check_parent(target: Path) -> None:
+    if is_remote(target):
+        check_place(target)
+        return
     if not target.parent.is_dir():
         raise UsageError(f"--output is '{plain(target)}': no folder {plain(target.parent)}", "create the folder first")
     _check_writable(target, target.parent)
 
 
 def _check_writable(target: Path, folder: Path) -> None:
-    if not os.access(folder, os.W_OK | os.X_OK):
+    if not is_remote(folder) and not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(f"--output is '{plain(target)}': {plain(folder)} is not writable", "choose another")

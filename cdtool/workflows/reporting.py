@@ -11,6 +11,7 @@ from cdtool.evaluation.results_file import read_results
 from cdtool.evaluation.results_folder import PROVENANCE
 from cdtool.evaluation.traces.file import read_traces, traces_path
 from cdtool.evaluation.traces.trace import Trace
+from cdtool.remote.remote_path import location
 
 
 def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]:
@@ -18,7 +19,7 @@ def load_report(results: str | Path) -> tuple[Evaluated, tuple[Trace, ...], str]
 
     Raises RecordingError if either file is damaged.
     """
-    path = Path(results)
+    path = location(results)
     evaluated = evaluate(read_results(path))
     beside = traces_path(path)
     if not beside.exists():
