@@ -24,10 +24,10 @@ from timing import Spread, main, verdict
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-import cdtool
-from cdtool.remote import transferred
-from tests.remote.s3_server import S3Server
-from tests.workflows.execution.dask_cluster import environment, site_with_plugin
+import cdtool  # noqa: E402
+from cdtool.remote import transferred  # noqa: E402
+from tests.remote.s3_server import S3Server  # noqa: E402
+from tests.workflows.execution.dask_cluster import environment, site_with_plugin  # noqa: E402
 
 RECORDINGS, GIGABYTES = 1000, 2.0
 DAMAGED, DELETED, FATAL = 30, 10, 5
