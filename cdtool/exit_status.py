@@ -97,6 +97,8 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "signature show": _ALWAYS,
     "signature check": _CAN_LOSE,
     "signature update": _CAN_LOSE,
+    "store status": _ALWAYS,
+    "store gc": _ALWAYS,
     "simulate gate": _ALWAYS,
     "simulate arm": _ALWAYS,
     "simulate season": _ALWAYS,

@@ -40,6 +40,7 @@ COMMANDS: Mapping[str, str] = {
     "recover": "cdtool.cli.recover:recover",
     "list": "cdtool.cli.list_known:list_known",
     "signature": "cdtool.cli.signature:signature",
+    "store": "cdtool.cli.store:store",
     "simulate": "cdtool.cli.simulate:simulate",
     "study": "cdtool.cli.study:study",
 }

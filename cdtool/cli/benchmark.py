@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdtool.cli import completions
-from cdtool.cli.console import plain, print_skipped, progress
+from cdtool.cli.console import plain, print_json, print_skipped, progress
 from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption, listed
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
+from cdtool.plain_text import counted
+
+if TYPE_CHECKING:
+    from cdtool.workflows.execution.workers import Workers
+    from cdtool.workflows.store.use import StoreUse
 
 
 def benchmark(
@@ -31,6 +37,21 @@ def benchmark(
         typer.Option("--false-alarm-budget", help="Set each safety factor for this rate, as 1/1000op or 0.1/h."),
     ] = None,
     jobs: JobsOption = 1,
+    store: Annotated[
+        Path | None,
+        typer.Option(
+            "--store",
+            help="Folder where outcomes are kept: only recordings for which something has changed are computed.",
+        ),
+    ] = None,
+    trust_mtime: Annotated[
+        bool,
+        typer.Option("--trust-mtime", help="With --store: a file of the same size and time is the same, unread."),
+    ] = False,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="With --store: read again what could not be read.")
+    ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list which recordings would be computed.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
@@ -43,7 +64,15 @@ def benchmark(
     from cdtool.report.outputs import check_outputs, write_outputs
     from cdtool.report.writers.base import Report
     from cdtool.workflows.benchmark.benchmark import benchmark as run
+    from cdtool.workflows.execution.workers import Workers
+    from cdtool.workflows.store.use import StoreUse
 
+    if store is None and (trust_mtime or retry_failed):
+        raise UsageError(f"{'--trust-mtime' if trust_mtime else '--retry-failed'} needs --store", "add --store DIR")
+    use = None if store is None else StoreUse(store, trust_times=trust_mtime, retry_failed=retry_failed)
+    if dry_run:
+        _show_dry_run(file, _named(detectors), false_alarm_budget, Workers(jobs), use, as_json=as_json)
+        return
     targets = output or []
     check_outputs(targets, force=force)
     with progress("benchmark") as advance:
@@ -52,6 +81,7 @@ def benchmark(
             detectors=_named(detectors),
             false_alarm_budget=false_alarm_budget,
             jobs=jobs,
+            store=use,
             progress=advance,
         )
     written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
@@ -61,9 +91,43 @@ def benchmark(
     else:
         show_conclusion(done.evaluated)
         show_table(done.evaluated)
+        if done.stored is not None:
+            typer.echo(f"store: {counted(done.stored.computed, 'recording')} computed, {done.stored.reused} as stored")
         for path in written:
             typer.echo(f"written: {plain(path)}")
     finish(done.evaluated)
+
+
+def _show_dry_run(
+    file: Path,
+    detectors: tuple[str, ...],
+    false_alarm_budget: str | None,
+    workers: Workers,
+    store: StoreUse | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Print which recordings would be computed, their size, and how long that takes."""
+    from rich.filesize import decimal
+
+    from cdtool.workflows.benchmark.dry_run import dry_run
+
+    found = dry_run(file, detectors=detectors, false_alarm_budget=false_alarm_budget, workers=workers, store=store)
+    if as_json:
+        print_json(asdict(found) | {"bytes": found.bytes})
+        return
+    for item in found.logs:
+        typer.echo(f"{plain(item.recording)}: {', '.join(item.detectors)}, {decimal(item.bytes)}")
+    time = "" if found.seconds is None else f", about {_duration(found.seconds)}"
+    total = counted(found.total, "recording")
+    typer.echo(f"{len(found.logs)} of {total} would be computed: {decimal(found.bytes)}{time}")
+
+
+def _duration(seconds: float) -> str:
+    """Return a rough time in words."""
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def _named(detectors: str | None) -> tuple[str, ...]:

@@ -68,7 +68,7 @@ def split_run(log: Path) -> tuple[Path, str]:
     ('cycles.csv', '7*')
     """
     text = str(log)
-    if log.exists() or _MARK not in text:
+    if _MARK not in text or log.exists():
         return log, ""
     places = [i for i, character in enumerate(text) if character == _MARK]
     place = next((i for i in places if Path(text[:i]).exists()), places[-1])

@@ -137,17 +137,13 @@ class Gathering:
         if missing:
             computed = in_order(work(), pieces, len(missing), workers, of_lost=of_lost, together=_TOGETHER)
         for log, ((group, path), planned) in enumerate(zip(logs, plan, strict=True)):
-            outcomes: Sequence[LogOutcome] | None = None
-            sources = planned.sources
-            if planned.is_known:
-                assert stored is not None, "a log is known from the store"
-                outcomes = stored.known(planned)
-            if outcomes is None:  # also if the entry has been removed meanwhile
-                made = work()(Piece(log, group, path, self._choice)) if planned.is_known else next(computed)
-                outcomes, sources = made.outcomes, made.sources
-                if stored:
-                    outcomes = stored.add(group, path, planned, made)
-            self._place = _Place(log, group, path, sources, stored)
+            made = None if planned.is_known else next(computed)
+            outcomes = self._complete(group, path, planned, made, stored)
+            if outcomes is None:  # what was stored of it is gone
+                planned, made = Planned(), work()(Piece(log, group, path, self._choice))
+                outcomes = self._complete(group, path, planned, made, stored)
+            assert outcomes is not None, "all of it was computed"
+            self._place = _Place(log, group, path, planned.sources if made is None else made.sources, stored)
             for outcome in outcomes:
                 self._add(log, group, outcome)
             if progress:
@@ -155,6 +151,15 @@ class Gathering:
         for _ in computed:  # their processes end
             pass
         self._make_absent_traces(work, workers)
+
+    @staticmethod
+    def _complete(
+        group: str, path: Path, planned: Planned, made: PieceOutcome | None, stored: StoredOutcomes | None
+    ) -> Sequence[LogOutcome] | None:
+        """Return the outcomes of a log with what is stored of them; None if that is gone meanwhile."""
+        if stored is None:
+            return made.outcomes if made else None
+        return stored.known(path, planned) if made is None else stored.add(group, path, planned, made)
 
     def _pieces(
         self, missing: Sequence[int], logs: Logs, plan: Sequence[Planned], stored: StoredOutcomes | None

@@ -14,7 +14,7 @@ from cdtool.log_section import MARK_HINT, LogSection, Mark
 from cdtool.machine_file import MachineFile
 from cdtool.tables import Table
 from cdtool.value_words import value_in_words
-from cdtool.workflows.runs import find_logs, shown_path
+from cdtool.workflows.runs import find_logs, resolve_all, shown_path
 
 _WHOLE = LogSection()
 
@@ -92,7 +92,7 @@ def named_logs(table: Table, found_logs: LogsOf, scored: Sequence[Path]) -> dict
 
     Raises ConfigurationError for a log that is not scored, or that belongs to two of them.
     """
-    known = {path.resolve(): path for path in scored}
+    known = dict(zip(resolve_all(scored), scored, strict=True)) if table.values else {}
     found: dict[Path, str] = {}
     for name in table.values:
         if not name.strip():

@@ -311,12 +311,27 @@ def _ranges_of(
     return LearnedRanges.of(parts, scored)
 
 
+def resolve_all(paths: Iterable[Path]) -> list[Path]:
+    """Return the real paths of many logs; the folders of logs are few, and each is resolved once."""
+    folders: dict[Path, Path] = {}
+    found = []
+    for path in paths:
+        if path.is_symlink() or path.name in ("", ".."):
+            found.append(path.resolve())
+            continue
+        folder = path.parent
+        if folder not in folders:
+            folders[folder] = folder.resolve()
+        found.append(folders[folder] / path.name)
+    return found
+
+
 def _each_once(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     """Return the paths without repetitions, and the repetitions."""
     once: dict[Path, Path] = {}
     repeated: list[Path] = []
-    for path in paths:
-        if once.setdefault(path.resolve(), path) is not path:
+    for path, true in zip(paths, resolve_all(paths), strict=True):
+        if once.setdefault(true, path) is not path:
             repeated.append(path)
     return list(once.values()), repeated
 

@@ -13,6 +13,7 @@ from cdtool.evaluation.limits import LimitRule
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import to_json
 from cdtool.exit_status import STATUSES_OF
+from cdtool.workflows.store.use import StoreUse
 from tests.command import Outcome, cdtool
 from tests.evaluation.judged_results import results as judged_results
 from tests.formats.mcap.small_files import small_file
@@ -72,6 +73,11 @@ class Folder:
             'force_profile = "late"\n[impacts.soft]\nlogs = ["soft/01.csv"]\nforce_profile = "easy"\n'
             '[force]\nlimits = "limits_of_force.toml"\n'
         )
+
+    @property
+    def store(self) -> Path:
+        with StoreUse(self.path / "store").opened() as store:
+            return store.folder
 
     def triggers(self, rows: str) -> Path:
         path = self.path / "triggers.csv"
@@ -191,6 +197,10 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("signature update", 0): lambda f: _update(f, f.gate / "holdout" / "01.csv"),
     ("signature update", 2): lambda f: _update(f, f.absent),
     ("signature update", 3): lambda f: _update(f, f.gate / "holdout" / "01.csv", f.empty),
+    ("store status", 0): lambda f: cdtool("store", "status", f.store),
+    ("store status", 2): lambda f: cdtool("store", "status", f.absent),
+    ("store gc", 0): lambda f: cdtool("store", "gc", f.store),
+    ("store gc", 2): lambda f: cdtool("store", "gc", f.absent),
     ("simulate gate", 0): GATE_RUN[0],
     ("simulate gate", 2): GATE_RUN[1],
     ("simulate arm", 0): ARM_RUN[0],

@@ -14,6 +14,8 @@ BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
 WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", "NamedTemporaryFile", "savefig"}
 ELSEWHERE = {
     "cdtool/cli/streams.py": "opens the null device",
+    "cdtool/workflows/execution/in_worker.py": "opens the null device",
+    "cdtool/workflows/store/journal.py": "appends to a file that the next run takes over if this one is killed",
     "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
 }
 

@@ -122,7 +122,7 @@ def benchmark(
     [('stiff', 4, 0), ('soft', 4, 0), ('holdout', 0, 0)]
     """
     workers = workers or Workers(jobs)
-    work = _Work.of(file, detectors, false_alarm_budget)
+    work = BenchmarkWork.of(file, detectors, false_alarm_budget)
     if store is None:
         return _run(work, workers, None, progress)
     with store.opened() as folder:
@@ -130,7 +130,7 @@ def benchmark(
 
 
 @dataclass(frozen=True)
-class _Work:
+class BenchmarkWork:
     """A benchmark file with the options of the command; `limits` is the number of limits in the file."""
 
     setup: BenchmarkFile
@@ -138,7 +138,8 @@ class _Work:
     every_detector: bool
 
     @classmethod
-    def of(cls, file: str | Path | BenchmarkFile, detectors: Sequence[str], budget: str | None) -> _Work:
+    def of(cls, file: str | Path | BenchmarkFile, detectors: Sequence[str], budget: str | None) -> BenchmarkWork:
+        """Read a benchmark file unless it has been read; raises as `benchmark`."""
         setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
         limits = len(setup.limits)
         setup = with_detectors(setup, detectors) if detectors else setup
@@ -147,7 +148,7 @@ class _Work:
         return cls(setup, limits, list(detectors) == ["all"])
 
 
-def _run(work: _Work, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> Benchmark:
+def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> Benchmark:
     compile_loaded()
     begin = perf_counter()
     setup, measured = with_synchronisation(work.setup, workers)
@@ -159,7 +160,7 @@ def _run(work: _Work, workers: Workers, store: StoreOfRun | None, progress: Prog
     if len(setup.limits) < work.limits:
         unchecked = Finding(LimitsUnchecked(work.limits - len(setup.limits), work.limits))
         left_out.append(RecordingFinding.of(str(setup.path), unchecked))
-    factors = _factors(setup, learned.thresholds)
+    factors = sweep_factors(setup, learned.thresholds)
     gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
     gathered.skipped += learned.about.skipped
     gathered.findings += [*measured, *learned.about.findings, *left_out]
@@ -239,7 +240,7 @@ def _labels_without_run(setup: BenchmarkFile, scored: Collection[str]) -> list[S
     ]
 
 
-def _factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, FloatArray]:
+def sweep_factors(setup: BenchmarkFile, thresholds: Mapping[str, tuple[FittedThreshold, ...]]) -> dict[str, FloatArray]:
     """Return the safety factors of the sweep by detector; empty without an impact-free group."""
     if HOLDOUT not in setup.impacts:
         return {}

@@ -32,7 +32,7 @@ from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.named_logs import LogsOf, labels_of, named_logs
-from cdtool.workflows.runs import RunReading, shown_path
+from cdtool.workflows.runs import RunReading, resolve_all, shown_path
 from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
 
 HOLDOUT = "holdout"
@@ -133,8 +133,8 @@ class BenchmarkFile:
         logs = [path for name, group in self.impacts.items() if name != HOLDOUT for path in group.logs]
         if self.has_runs:
             return tuple(log for log in logs if any(_may_share_a_run(log, other) for other in self.learn))
-        learned = {path.resolve() for path in self.learn}
-        return tuple(path for path in logs if path.resolve() in learned)
+        learned = set(resolve_all(self.learn))
+        return tuple(path for path, true in zip(logs, resolve_all(logs), strict=True) if true in learned)
 
     def _in_words(self, sections: Mapping[Path, LogSection]) -> dict[str, str]:
         return {shown_path(path, self.path.parent): str(section) for path, section in sections.items()}
@@ -161,7 +161,7 @@ class BenchmarkFile:
 
     @cached_property
     def _both_resolved(self) -> frozenset[Path]:
-        return frozenset(path.resolve() for path in self.both)
+        return frozenset(resolve_all(self.both))
 
     def rules_of(self, group: str) -> ScoringRules:
         """Return the settings that determine the results of a log in that group, or in no group."""
@@ -403,7 +403,8 @@ def _under_scored_paths(learn: Mapping[Path, LogSection], scored: Sequence[Path]
 
     A log is scored by what is learned from the others, and logs are distinguished by their names.
     """
-    files = {file.resolve(): file for file, _ in map(split_run, scored)}
+    logs = [file for file, _ in map(split_run, scored)]
+    files = dict(zip(resolve_all(logs), logs, strict=True))
     found: dict[Path, LogSection] = {}
     for path, section in learn.items():
         file, ids = split_run(path)
@@ -417,10 +418,10 @@ def _names(machine_file: MachineFile, detectors: Sequence[str]) -> list[tuple[st
 
 
 def _refuse_overlap(benchmark: BenchmarkFile) -> None:
-    learned = {path.resolve() for path in benchmark.learn}
+    learned = set(resolve_all(benchmark.learn))
     scored: dict[Path, str] = {}
-    for name, path in ((name, path) for name, group in benchmark.impacts.items() for path in group.logs):
-        true = path.resolve()
+    logs = [(name, path) for name, group in benchmark.impacts.items() for path in group.logs]
+    for (name, path), true in zip(logs, resolve_all(path for _, path in logs), strict=True):
         if true in learned and (name == HOLDOUT or not _ends_early(benchmark, true)):
             hint = "use a recording either in [learn] or for scoring"
             if name != HOLDOUT:
@@ -436,8 +437,9 @@ def _refuse_overlap(benchmark: BenchmarkFile) -> None:
 
 def _ends_early(benchmark: BenchmarkFile, log: Path) -> bool:
     """Return whether only a part of a log is learned from that ends before the log does."""
-    ends = {path.resolve() for path, section in benchmark.learned_sections.items() if section.end}
-    return benchmark.guard is not None or log in ends
+    if benchmark.guard is not None:
+        return True
+    return log in resolve_all(path for path, section in benchmark.learned_sections.items() if section.end)
 
 
 def _read_operations(root: Table) -> str:

@@ -22,7 +22,7 @@ from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.learned import Learned
 from cdtool.workflows.runs import shown_path
-from cdtool.workflows.store.digest import code_version, digest_of
+from cdtool.workflows.store.digest import code_version, combined, digest_of
 from cdtool.workflows.store.sources import SourceFile
 
 Sources = Sequence[SourceFile]
@@ -42,15 +42,16 @@ class Determinants:
 
     def log_key(self, group: str, path: Path, sources: Sources) -> str:
         """Return the key of the rows of a log that do not depend on the detectors."""
-        return digest_of("log", self._common, *self._of_log(group, path), [item.digest for item in sources])
+        own = digest_of(*self._of_log(group, path))
+        return combined("log", self._common, own, *(item.digest for item in sources))
 
     def detector_key(self, detector: str, path: Path, log_key: str) -> str:
         """Return the key of the outcome of a detector on a log."""
-        return digest_of("detector", log_key, self._of_detector[detector], self._own_part(path, (detector,)))
+        return combined("detector", log_key, self._of_detector[detector], self._own_part(path, (detector,)))
 
     def trace_key(self, path: Path, number: int, detector_keys: Sequence[str]) -> str:
         """Return the key of the trace of an operation of a log, which explains alarms by what was learned."""
-        return digest_of("trace", number, list(detector_keys), self._normals, self._own_part(path, ()))
+        return combined("trace", str(number), *detector_keys, self._normals, self._own_part(path, ()))
 
     def name(self, path: Path) -> str:
         """Return the name of a log in results."""

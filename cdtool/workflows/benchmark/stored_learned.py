@@ -15,7 +15,7 @@ from cdtool.workflows.benchmark.stored_outcomes import StoredOutcomes
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.store.digest import code_version, digest_of
-from cdtool.workflows.store.entry import Entry
+from cdtool.workflows.store.entry import Entry, source_entry
 from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.store import Store
 from cdtool.workflows.store.use import StoreUse
@@ -44,6 +44,7 @@ class StoreOfRun:
         key = digest_of(learned_key(setup, self._runs, setup.detectors), teaching.every_detector)
         found = self._restored(key, setup)
         if found is not None:
+            self._add_sources(setup)
             self._keys.append(key)
             return found
         learned = teaching.learned
@@ -66,12 +67,18 @@ class StoreOfRun:
             return None
 
     def _add(self, key: str, setup: BenchmarkFile, learned: Learned) -> None:
-        text, version = learned.to_text(setup.rule), code_version()
-        entries = [Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=version)]
-        for path, sources in self._runs.items():
-            name = shown_path(path, setup.path.parent)
-            of_run = digest_of("source", name, sources)
-            entries.append(Entry(of_run, "source", name, "", "", sources, version=version))
-            self._keys.append(of_run)
-        self.store.add(entries)
+        text = learned.to_text(setup.rule)
+        self.store.add(
+            [Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=code_version())]
+        )
+        self._add_sources(setup)
         self._keys.append(key)
+
+    def _add_sources(self, setup: BenchmarkFile) -> None:
+        """Add the sources of the runs that the store does not have with these times."""
+        base = setup.path.parent
+        entries = [source_entry(shown_path(path, base), sources) for path, sources in self._runs.items()]
+        keys = [entry.key for entry in entries]
+        places = self.store.places(keys)
+        self.store.add([entry for entry, place in zip(entries, places, strict=True) if place is None])
+        self._keys += keys

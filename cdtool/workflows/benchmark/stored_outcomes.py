@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from cdtool.evaluation.traces.choice import TraceChoice
@@ -21,9 +22,9 @@ from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.store.digest import code_version
 from cdtool.workflows.store.encoding import decoded, encoded
-from cdtool.workflows.store.entry import Entry
+from cdtool.workflows.store.entry import Entry, source_entry
 from cdtool.workflows.store.sources import SourceFile
-from cdtool.workflows.store.store import RunRecord, Store, write_run
+from cdtool.workflows.store.store import RunRecord, Store, encodable, write_run
 from cdtool.workflows.store.use import StoreUse
 
 _Rows = tuple[LogRows, ...]
@@ -32,7 +33,7 @@ _OfDetector = tuple[DetectorOutcome | None, ...]
 
 @dataclass(frozen=True)
 class Planned:
-    """One log: the places of its rows and of its detectors' outcomes in the store, None where there is none."""
+    """One log: the places of its rows and of its detectors' outcomes in the store, None where it is missing."""
 
     sources: tuple[SourceFile, ...] | None = None
     rows: int | None = None
@@ -73,65 +74,101 @@ class StoredOutcomes:
         """Return what is in the store of each log."""
         known = KnownSources(self.setup, self.store, self.use, workers)
         sources = known.of([path for _, path in logs])
-        return [self._planned(group, path, known) for (group, path), known in zip(logs, sources, strict=True)]
+        keys = [key for log, of_log in zip(logs, sources, strict=True) if of_log for key in self._keys_of(log, of_log)]
+        places = iter(self.store.places(keys))
+        each = 1 + len(self.names)
+        return [self._planned(item, list(islice(places, each)) if item else None) for item in sources]
 
-    def _planned(self, group: str, path: Path, sources: tuple[SourceFile, ...] | None) -> Planned:
+    def _keys_of(self, log: tuple[str, Path], sources: tuple[SourceFile, ...]) -> list[str]:
+        """Return the key of the rows of a log, and of the outcome of each detector."""
+        of, (group, path) = self.determinants, log
+        key = of.log_key(group, path, sources)
+        return [key, *(of.detector_key(name, path, key) for name in self.names)]
+
+    def _planned(self, sources: tuple[SourceFile, ...] | None, places: list[int | None] | None) -> Planned:
         nothing = Planned(sources, None, (None,) * len(self.names))
-        if sources is None:
+        if places is None or places[0] is None or (self.use.retry_failed and self.store.is_failed(places[0])):
             return nothing
-        key = self.determinants.log_key(group, path, sources)
-        place = self.store.place(key)
-        if place is None or (self.use.retry_failed and self.store.is_failed(place)):
-            return nothing
-        detectors = (self.store.place(self.determinants.detector_key(name, path, key)) for name in self.names)
-        return Planned(sources, place, tuple(detectors))
+        return Planned(sources, places[0], tuple(places[1:]))
 
     def piece(self, log: int, group: str, path: Path, planned: Planned, choice: TraceChoice) -> Piece:
         """Return the work that is left of a log; traces are wanted only if every detector is run."""
-        missing = tuple(name for name, place in zip(self.names, planned.detectors, strict=True) if place is None)
-        is_whole = planned.rows is None or len(missing) == len(self.names)
-        if is_whole:
+        missing = self.missing(planned)
+        if len(missing) == len(self.names):
             return Piece(log, group, path, choice, sources=planned.sources)
         return Piece(log, group, path, detectors=missing, sources=planned.sources)
 
-    def known(self, planned: Planned) -> list[LogOutcome] | None:
+    def missing(self, planned: Planned) -> tuple[str, ...]:
+        """Return the detectors that have to be run on a log: all if its rows are missing."""
+        if planned.rows is None:
+            return self.names
+        return tuple(name for name, place in zip(self.names, planned.detectors, strict=True) if place is None)
+
+    def known(self, path: Path, planned: Planned) -> list[LogOutcome] | None:
         """Return the outcomes of a log that are all in the store; None if one of them is gone or damaged."""
-        assert planned.rows is not None, "the log is known"
-        entries = [self.store.at(place) for place in (planned.rows, *planned.detectors) if place is not None]
-        try:
-            rows = decoded(entries[0].content, _Rows)  # type: ignore[union-attr]  # None is an AttributeError
-            detectors = [decoded(item.content, _OfDetector) for item in entries[1:]]  # type: ignore[union-attr]
-        except (AttributeError, ValueError):
+        entries = self._entries(path, (planned.rows, *planned.detectors), ("", *self.names))
+        if entries is None:
             return None
-        self.keys += [item.key for item in entries if item is not None]
+        try:
+            rows = decoded(entries[0].content, _Rows)
+            detectors = [decoded(item.content, _OfDetector) for item in entries[1:]]
+        except ValueError:
+            return None
+        self.keys += [item.key for item in entries]
+        if planned.sources is not None and planned.sources != entries[0].sources:
+            self._add_touched(source_entry(entries[0].recording, planned.sources))
         self.reused += 1
         self.failed += any(item.unread for item in rows)
         return _combined(rows, detectors)
 
-    def add(self, group: str, path: Path, planned: Planned, made: PieceOutcome) -> list[LogOutcome]:
-        """Store what was computed of a log, and return the outcomes with every detector."""
-        self.computed += 1
+    def _entries(self, path: Path, places: Sequence[int | None], detectors: Sequence[str]) -> list[Entry] | None:
+        """Return the entries of a log at some places; None if one of them is not there.
+
+        Places are found by a part of the keys: that they are of this log and detector is checked.
+        """
+        found, name = [], encodable(self.determinants.name(path))
+        for place, detector in zip(places, detectors, strict=True):
+            entry = None if place is None else self.store.at(place)
+            if entry is None or entry.recording != name or entry.detector != detector:
+                return None
+            found.append(entry)
+        return found
+
+    def _add_touched(self, entry: Entry) -> None:
+        """Add the present times of the files of a log whose content is the same as before."""
+        self.keys.append(entry.key)
+        if self.store.places([entry.key]) == [None]:
+            self.store.add([entry])
+
+    def add(self, group: str, path: Path, planned: Planned, made: PieceOutcome) -> list[LogOutcome] | None:
+        """Store what was computed of a log, and return the outcomes with every detector.
+
+        Returns None if only some detectors were run, and the outcomes of the others are gone or are those of another
+        content.
+        """
         rows = tuple(item.rows for item in made.outcomes)
-        self.failed += any(item.unread for item in rows)
-        new = {
-            name: tuple(_of_detector(item, name) for item in made.outcomes)
-            for name, place in zip(self.names, planned.detectors, strict=True)
-            if place is None or planned.rows is None
-        }
+        unread = any(item.unread for item in rows)
+        missing = self.missing(planned)
+        stored: dict[str, Entry] = {}
+        if len(missing) < len(self.names) and not unread:
+            others = [name for name in self.names if name not in missing]
+            places = [place for place in planned.detectors if place is not None]
+            entries = self._entries(path, places, others)
+            if entries is None or _digests(made.sources) != _digests(planned.sources):
+                return None
+            stored = dict(zip(others, entries, strict=True))
+        self.computed += 1
+        self.failed += unread
+        new = {name: tuple(_of_detector(item, name) for item in made.outcomes) for name in missing}
         if made.sources is not None:
             self._store(group, path, made, new)
-        if len(new) == len(self.names):
+        if not stored:
             return list(made.outcomes)
-        stored = {
-            name: self.store.at(place)
-            for name, place in zip(self.names, planned.detectors, strict=True)
-            if place is not None
-        }
-        self.keys += [entry.key for entry in stored.values() if entry is not None]
-        every = [
-            new[name] if name in new else decoded(stored[name].content, _OfDetector)  # type: ignore[union-attr]
-            for name in self.names
-        ]
+        self.keys += [entry.key for entry in stored.values()]
+        try:
+            every = [new.get(name) or decoded(stored[name].content, _OfDetector) for name in self.names]
+        except ValueError:
+            return None
         return _combined(rows, every)
 
     def _store(self, group: str, path: Path, made: PieceOutcome, new: dict[str, _OfDetector]) -> None:
@@ -142,17 +179,13 @@ class StoredOutcomes:
         unread = any(item.unread for item in rows)
         entries = [Entry(key, "log", name, "", encoded(rows, _Rows), made.sources, made.seconds, unread, version)]
         for detector, outcomes in new.items():
-            content = encoded(outcomes, _OfDetector)
-            entries.append(
-                Entry(
-                    of.detector_key(detector, path, key), "detector", name, detector, content, (), 0.0, unread, version
-                )
-            )
+            text, own = encoded(outcomes, _OfDetector), of.detector_key(detector, path, key)
+            entries.append(Entry(own, "detector", name, detector, text, failed=unread, version=version))
         self.store.add(entries)
         self.keys += [entry.key for entry in entries]
 
     def trace(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> Trace | None:
-        """Return the stored trace of an operation of a log; None if there is none."""
+        """Return the stored trace of an operation of a log; None if it is missing."""
         key = self._trace_key(log, sources, number)
         entry = None if key is None else self.store.get(key)
         if entry is None:
@@ -176,9 +209,7 @@ class StoredOutcomes:
     def _trace_key(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> str | None:
         if sources is None:
             return None
-        of, (group, path) = self.determinants, log
-        key = of.log_key(group, path, sources)
-        return of.trace_key(path, number, [of.detector_key(name, path, key) for name in self.names])
+        return self.determinants.trace_key(log[1], number, self._keys_of(log, sources)[1:])
 
     def finish(self) -> StoreReport:
         """Write which entries the run has used."""
@@ -188,12 +219,17 @@ class StoredOutcomes:
             self.setup.path.name,
             self.setup.digest,
             len(self.keys),
+            self.computed + self.reused,
             self.computed,
             self.failed,
             code_version(),
         )
         write_run(self.store.folder, run, self.keys)
         return StoreReport(self.computed, self.reused)
+
+
+def _digests(sources: Sequence[SourceFile] | None) -> list[str] | None:
+    return None if sources is None else [item.digest for item in sources]
 
 
 def _of_detector(outcome: LogOutcome, name: str) -> DetectorOutcome | None:

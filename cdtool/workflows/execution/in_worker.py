@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-# A worker that was told to end exits with this status.
+# A worker that another process ends exits with this status.
 TOLD_TO_END = 143
 # Entries of a claim: the process, the number of the piece counted from 1 (0: none), and when it began [ns].
 CLAIM = 3

@@ -26,6 +26,11 @@ def digest_of(*values: Any) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
+def combined(*digests: str) -> str:
+    """Return the SHA-256 of digests, or of other texts without a line end."""
+    return hashlib.sha256("\n".join(digests).encode()).hexdigest()
+
+
 def _plain(value: Any) -> Any:
     """Return a value as JSON values that differ if it differs; a dataclass with the name of its class."""
     if value is None or isinstance(value, str | int | float):

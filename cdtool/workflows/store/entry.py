@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from cdtool.workflows.store.digest import code_version, digest_of
 from cdtool.workflows.store.sources import SourceFile
 
 Kind = Literal["log", "detector", "trace", "learned", "source"]
@@ -16,7 +17,7 @@ class Entry:
 
     `key` is a SHA-256 in hexadecimal digits; `content` is JSON. `sources` are the files read for it, `seconds` the time
     that it took, `failed` whether it is a reading error; `version` is that of the code. An entry of the kind "source"
-    has only the sources of a log that was learned from.
+    has only sources: of a log that was learned from, or that has the same content as before with another time.
     """
 
     key: str
@@ -33,3 +34,8 @@ class Entry:
     def size(self) -> int:
         """Return the size of the sources [bytes]."""
         return sum(item.size for item in self.sources)
+
+
+def source_entry(recording: str, sources: tuple[SourceFile, ...]) -> Entry:
+    """Return an entry that has only the sources of a recording."""
+    return Entry(digest_of("source", recording, sources), "source", recording, "", "", sources, version=code_version())

@@ -13,6 +13,7 @@ import weakref
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
@@ -20,6 +21,8 @@ from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
 
 _SUFFIX = ".journal"
+# JSON has no tab: it is escaped in texts.
+_BETWEEN = "\t"
 
 
 class Journal:
@@ -63,7 +66,9 @@ def left_behind(folder: Path) -> Iterator[tuple[Path, list[Entry]]]:
 
 
 def _line(entry: Entry) -> bytes:
-    text = encoded(entry, Entry).encode("utf-8", "surrogatepass")
+    """Return an entry as a line: a check sum, the entry without its content, and the content, which is JSON, too."""
+    head = encoded(replace(entry, content=""), Entry)
+    text = f"{head}{_BETWEEN}{entry.content}".encode("utf-8", "surrogatepass")
     return b"%08x %s\n" % (zlib.crc32(text), text)
 
 
@@ -72,7 +77,8 @@ def _entries(content: bytes) -> Iterator[Entry]:
         check, _, text = line.partition(b" ")
         if check == b"%08x" % zlib.crc32(text):
             with suppress(ValueError):
-                yield decoded(text.decode("utf-8", "surrogatepass"), Entry)
+                head, _, inner = text.decode("utf-8", "surrogatepass").partition(_BETWEEN)
+                yield replace(decoded(head, Entry), content=inner)
 
 
 def _lock(handle: int) -> bool:

@@ -1,4 +1,4 @@
-"""The files that a log is read from: their content by digest, and their state, which tells whether they changed."""
+"""The files that a log is read from: their content by digest, and their state, by which a change is noticed."""
 
 from __future__ import annotations
 

@@ -43,16 +43,23 @@ _ROW = (1 << _ROW_BITS) - 1
 # Parts that are held in memory.
 _MOST_PARTS = 3
 _NAMES = tuple(item.name for item in fields(Entry))
+_KEY_BYTES = 32
+_NO_SOURCES = "[]"
 _PLAIN = ("key", "kind", "recording", "sources", "failed")
 
 
 class Store:
-    """The store in a folder, which is created if it does not exist; raises ConfigurationError for another folder."""
+    """The store in a folder, which is created if it does not exist; raises ConfigurationError for another folder.
+
+    Without `writes` nothing is created, and entries that are added are dropped.
+    """
 
     def __init__(self, folder: Path, *, writes: bool = True) -> None:
-        self.folder = folder
+        self.folder, self.writes = folder, writes
         require_pyarrow()
-        _check(folder, create=writes)
+        if writes:
+            _create(folder)
+        require_store(folder)
         self._journal: Journal | None = None
         self._waiting: list[Entry] = []
         self._content = 0
@@ -62,24 +69,40 @@ class Store:
                 if entries:
                     write_part(folder, entries)
                 path.unlink(missing_ok=True)
-        self._index = _Index(sorted((folder / "parts").glob("*.parquet")))
+        self._all_parts = sorted((folder / "parts").glob("*.parquet"))
+        self._index = _Index(self._all_parts)
+
+    @property
+    def parts(self) -> list[Path]:
+        """Return the files with entries, as they were when the store was opened."""
+        return list(self._all_parts)
+
+    def entries_of(self, part: Path) -> list[Entry] | None:
+        """Return the entries of a file; None if it is gone or damaged."""
+        rows = read_columns(part, _NAMES)
+        return None if rows is None else [_entry(rows, row) for row in range(len(rows["key"]))]
+
+    @staticmethod
+    def is_enough(entries: Sequence[Entry]) -> bool:
+        """Return whether entries are enough for a file."""
+        return len(entries) >= _MOST_ENTRIES or sum(len(item.content) for item in entries) >= _MOST_CONTENT
 
     def sources_of(self, recording: str) -> tuple[SourceFile, ...] | None:
         """Return the files from which a recording was last read; None for one that the store does not know."""
-        text = self._index.sources.get(_encodable(recording))
+        text = self._index.sources.get(encodable(recording))
         return None if text is None else decoded(text, tuple[SourceFile, ...])
 
-    def place(self, key: str) -> int | None:
-        """Return where an entry is; None if there is none."""
-        return self._index.place(key)
+    def places(self, keys: Sequence[str]) -> list[int | None]:
+        """Return where the entries of keys are; None for a key without one."""
+        return self._index.places(keys)
 
     def is_failed(self, place: int) -> bool:
         """Return whether the entry at a place is a reading error."""
         return place in self._index.failed
 
     def get(self, key: str) -> Entry | None:
-        """Return an entry; None if there is none, or its file was removed or damaged meanwhile."""
-        place = self._index.place(key)
+        """Return an entry; None if it is missing, or its file was removed or damaged meanwhile."""
+        (place,) = self._index.places([key])
         found = None if place is None else self.at(place)
         return found if found is not None and found.key == key else None
 
@@ -89,12 +112,12 @@ class Store:
         rows = self._rows(self._index.parts[place >> _ROW_BITS])
         if rows is None:
             return None
-        values = {name: rows[name][row] for name in _NAMES}
-        values["sources"] = decoded(values["sources"], tuple[SourceFile, ...])
-        return Entry(**values)
+        return _entry(rows, row)
 
     def add(self, entries: list[Entry]) -> None:
         """Add entries: they outlive this process when it returns, except on an object store."""
+        if not self.writes:
+            return
         if self._journal is None:
             self._journal = Journal(self.folder)
         self._journal.add(entries)
@@ -150,7 +173,7 @@ class _Index:
             if rows is None:
                 continue
             keys = rows["key"]
-            heads.append(np.array([int(key[:16], 16) for key in keys], dtype=np.uint64))
+            heads.append(_heads(keys))
             places.append((len(self.parts) << _ROW_BITS) + np.arange(len(keys), dtype=np.int64))
             self.parts.append(path)
             logs = zip(rows["kind"], rows["recording"], rows["sources"], strict=True)
@@ -162,13 +185,25 @@ class _Index:
         self._heads = every[order]
         self._places = np.concatenate(places)[order] if places else np.empty(0, np.int64)
 
-    def place(self, key: str) -> int | None:
-        """Return the place of a key; None if there is none."""
-        head = np.uint64(int(key[:16], 16))
-        at = int(np.searchsorted(self._heads, head))
-        if at == len(self._heads) or self._heads[at] != head:
-            return None
-        return int(self._places[at])
+    def places(self, keys: Sequence[str]) -> list[int | None]:
+        """Return the places of keys; None for a key that is not known."""
+        if not len(self._heads):
+            return [None] * len(keys)
+        heads = _heads(keys)
+        at = np.minimum(np.searchsorted(self._heads, heads), len(self._heads) - 1)
+        places = np.where(self._heads[at] == heads, self._places[at], -1)
+        return [place if place >= 0 else None for place in places.tolist()]
+
+
+def _heads(keys: Sequence[str]) -> npt.NDArray[np.uint64]:
+    """Return the first 64 bits of keys."""
+    return np.frombuffer(bytes.fromhex("".join(key[:16] for key in keys)), dtype=">u8").astype(np.uint64)
+
+
+def _entry(rows: Mapping[str, list[Any]], row: int) -> Entry:
+    values = {name: rows[name][row] for name in _NAMES}
+    text = values["sources"]
+    return Entry(**values | {"sources": () if text == _NO_SOURCES else decoded(text, tuple[SourceFile, ...])})
 
 
 def require_pyarrow() -> None:
@@ -183,12 +218,31 @@ def write_part(folder: Path, entries: Iterable[Entry]) -> Path:
     """Write entries to a new part of a store, and return it."""
     import pyarrow as pa
 
-    entries = [replace(item, recording=_encodable(item.recording)) for item in entries]
+    entries = [replace(item, recording=encodable(item.recording)) for item in entries]
     columns: dict[str, list[Any]] = {name: [getattr(item, name) for item in entries] for name in _NAMES}
     columns["sources"] = [encoded(item.sources, tuple[SourceFile, ...]) for item in entries]
-    types = {"content": pa.large_string(), "seconds": pa.float64(), "failed": pa.bool_()}
-    arrays = [pa.array(columns[name], type=types.get(name, pa.string())) for name in _NAMES]
+    arrays = [_numbers(columns[name]) if name in ("seconds", "failed") else _texts(columns[name]) for name in _NAMES]
     return _write_table(folder / "parts", pa.table(arrays, names=list(_NAMES)))
+
+
+def _texts(values: Sequence[str]) -> Any:
+    """Return a column of texts; `pyarrow.array` would import pandas, which takes longer than a small store."""
+    import pyarrow as pa
+
+    pieces = [value.encode() for value in values]
+    ends = np.zeros(len(pieces) + 1, dtype=np.int64)
+    np.cumsum([len(piece) for piece in pieces], out=ends[1:])
+    return pa.LargeStringArray.from_buffers(len(pieces), pa.py_buffer(ends), pa.py_buffer(b"".join(pieces)))
+
+
+def _numbers(values: Sequence[float]) -> Any:
+    import pyarrow as pa
+
+    array = np.array(values)
+    if array.dtype == bool:
+        packed = np.packbits(array, bitorder="little")
+        return pa.BooleanArray.from_buffers(pa.bool_(), len(array), [None, pa.py_buffer(packed)])
+    return pa.DoubleArray.from_buffers(pa.float64(), len(array), [None, pa.py_buffer(array.astype(np.float64))])
 
 
 def _write_table(folder: Path, table: Any) -> Path:
@@ -196,7 +250,8 @@ def _write_table(folder: Path, table: Any) -> Path:
 
     stream = io.BytesIO()
     pq.write_table(table, stream, compression="zstd", write_page_checksum=True)
-    path = folder / f"{secrets.token_hex(16)}.parquet"
+    # In the order of their names, the newest is last: it knows the present times of files.
+    path = folder / f"{time.time_ns():020d}-{secrets.token_hex(8)}.parquet"
     write_bytes(path, stream.getvalue())
     return path
 
@@ -207,13 +262,15 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]] | Non
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(pa.BufferReader(path.read_bytes()), columns=list(names), page_checksum_verification=True)
+        # `read_table` would import pandas.
+        with pq.ParquetFile(pa.BufferReader(path.read_bytes()), page_checksum_verification=True) as file:
+            table = file.read(columns=list(names))
     except (OSError, pa.ArrowException):
         return None
     return {name: table[name].to_pylist() for name in names}
 
 
-def _encodable(name: str) -> str:
+def encodable(name: str) -> str:
     """Return the name of a recording without half surrogate pairs, which names that are not UTF-8 have."""
     return name.encode("utf-8", "replace").decode("utf-8")
 
@@ -222,7 +279,7 @@ def _encodable(name: str) -> str:
 class RunRecord:
     """A finished run: when it began and ended [s since 1970], of which benchmark, and how many entries it used.
 
-    `computed` of the `used` entries were computed by it, `failed` recordings could not be read.
+    `computed` of its `recordings` were computed at least in part, `failed` could not be read.
     """
 
     began: float
@@ -230,6 +287,7 @@ class RunRecord:
     benchmark: str
     benchmark_sha256: str
     used: int
+    recordings: int
     computed: int
     failed: int
     version: str
@@ -240,7 +298,11 @@ def write_run(folder: Path, run: RunRecord, keys: Iterable[str]) -> None:
     import pyarrow as pa
 
     values = {item.name: getattr(run, item.name) for item in fields(RunRecord)}
-    table = pa.table({"key": pa.array([bytes.fromhex(key) for key in keys], type=pa.binary(32))})
+    every = bytes.fromhex("".join(keys))
+    column = pa.FixedSizeBinaryArray.from_buffers(
+        pa.binary(_KEY_BYTES), len(every) // _KEY_BYTES, [None, pa.py_buffer(every)]
+    )
+    table = pa.table([column], names=["key"])
     _write_table(folder / "runs", table.replace_schema_metadata({"run": json.dumps(values)}))
 
 
@@ -259,18 +321,43 @@ def read_runs(folder: Path) -> list[tuple[Path, RunRecord]]:
     return sorted(found, key=lambda item: item[1].ended, reverse=True)
 
 
-def _check(folder: Path, *, create: bool) -> None:
-    """Create an empty store, or check that a folder is one; raises ConfigurationError."""
+def read_speed(parts: Iterable[Path]) -> float | None:
+    """Return how much of logs a worker computed per second in the past [bytes/s]; None if nothing is known."""
+    size = seconds = 0.0
+    for path in parts:
+        rows = read_columns(path, ("kind", "sources", "seconds"))
+        if rows is None:
+            continue
+        for kind, text, taken in zip(rows["kind"], rows["sources"], rows["seconds"], strict=True):
+            if kind == "log" and taken > 0.0:
+                size += sum(item.size for item in decoded(text, tuple[SourceFile, ...]))
+                seconds += taken
+    return size / seconds if size and seconds else None
+
+
+def read_keys(path: Path) -> list[Any]:
+    """Return the keys in a file of entries, as text, or of a run, as bytes; empty if it is gone or damaged."""
+    columns = read_columns(path, ("key",))
+    return [] if columns is None else columns["key"]
+
+
+def require_store(folder: Path) -> None:
+    """Raise ConfigurationError if a folder is not a store of this version."""
+    mark = folder / _MARK
+    if not mark.is_file():
+        raise ConfigurationError(f"{folder}: is not a store", "give the folder that was given as --store")
+    values = _values(mark)
+    if values.get("kind") != _KIND or values.get("schema_version") != _SCHEMA:
+        raise ConfigurationError(
+            f"{mark}: is not that of a store of this version", "give another folder, or remove this one"
+        )
+
+
+def _create(folder: Path) -> None:
+    """Create an empty store, unless the folder is one; raises ConfigurationError for a folder with other content."""
     mark = folder / _MARK
     if mark.is_file():
-        values = _values(mark)
-        if values.get("kind") != _KIND or values.get("schema_version") != _SCHEMA:
-            raise ConfigurationError(
-                f"{mark}: is not that of a store of this version", "give another folder, or remove this one"
-            )
         return
-    if not create:
-        raise ConfigurationError(f"{folder}: is not a store", "give the folder that was given as --store")
     if folder.exists() and (not folder.is_dir() or any(True for _ in folder.iterdir())):
         raise ConfigurationError(f"{folder}: is neither a store nor an empty folder", "give another folder")
     for part in ("parts", "runs"):

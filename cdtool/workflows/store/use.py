@@ -24,6 +24,11 @@ class StoreUse:
     trust_times: bool = False
     retry_failed: bool = False
 
+    @property
+    def exists(self) -> bool:
+        """Whether the folder exists and is not empty."""
+        return self.folder.is_dir() and any(True for _ in self.folder.iterdir())
+
     @contextmanager
     def opened(self, *, writes: bool = True) -> Iterator[Store]:
         """Open the store, which is created if it does not exist, and write what was added at the end of the block."""

@@ -1,0 +1,111 @@
+"""What a run of a benchmark would compute, without computing it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cdtool.workflows.benchmark.benchmark import BenchmarkWork, sweep_factors
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, with_only
+from cdtool.workflows.benchmark.learned import Teaching
+from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
+from cdtool.workflows.benchmark.pieces import source_files
+from cdtool.workflows.benchmark.stored_learned import StoreOfRun
+from cdtool.workflows.execution.workers import Workers
+from cdtool.workflows.runs import shown_path
+from cdtool.workflows.store.store import read_speed
+from cdtool.workflows.store.use import StoreUse
+
+
+@dataclass(frozen=True)
+class PlannedLog:
+    """A log that would be computed: its size [bytes], and the detectors that would run on it."""
+
+    recording: str
+    group: str
+    bytes: int
+    detectors: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """The logs that would be computed, out of a `total`, and how long that takes [s]; None: nothing to estimate it by.
+
+    `learned` is the number of impact-free runs.
+    """
+
+    logs: tuple[PlannedLog, ...]
+    total: int
+    learned: int
+    seconds: float | None
+
+    @property
+    def bytes(self) -> int:
+        """Return the size of the logs that would be computed."""
+        return sum(item.bytes for item in self.logs)
+
+
+def dry_run(
+    file: str | Path | BenchmarkFile,
+    *,
+    detectors: Sequence[str] = (),
+    false_alarm_budget: str | None = None,
+    workers: Workers | None = None,
+    store: StoreUse | None = None,
+) -> DryRun:
+    """Return which logs of a benchmark `cdtool.benchmark` would compute with the same arguments; nothing is written.
+
+    If the store does not have what was learned from the impact-free runs, they are read: what they give decides about
+    all others. The time is estimated by that of the recordings in the store.
+
+    Raises
+    ------
+    CdtoolError
+        As `cdtool.benchmark`, apart from errors of the logs.
+    """
+    workers = workers or Workers()
+    work = BenchmarkWork.of(file, detectors, false_alarm_budget)
+    if store is None or not store.exists:
+        names = work.setup.detectors
+        logs = [(group, path, names) for group, item in work.setup.impacts.items() for path in item.logs]
+        return _planned(work.setup, logs, len(logs), None)
+    with store.opened(writes=False) as folder:
+        setup, _ = with_synchronisation(work.setup, workers)
+        used = StoreOfRun(folder, store, workers)
+        learned = used.learned(Teaching(setup, workers, every_detector=work.every_detector))
+        setup = with_only(setup, learned.about.detectors)
+        outcomes = used.outcomes(setup, learned, sweep_factors(setup, learned.thresholds))
+        every = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
+        plan = outcomes.plan(every, workers)
+        missing = [
+            (*log, outcomes.missing(planned)) for log, planned in zip(every, plan, strict=True) if not planned.is_known
+        ]
+        return _planned(setup, missing, len(every), read_speed(folder.parts), workers.jobs)
+
+
+def _planned(
+    setup: BenchmarkFile,
+    logs: Sequence[tuple[str, Path, tuple[str, ...]]],
+    total: int,
+    speed: float | None,
+    jobs: int = 1,
+) -> DryRun:
+    """Return the dry run of these logs; `speed` is that of one worker [bytes/s]."""
+    planned = tuple(
+        PlannedLog(shown_path(path, setup.path.parent), group, _size(setup, path), names) for group, path, names in logs
+    )
+    size = sum(item.bytes for item in planned)
+    seconds = None if speed is None else size / speed / jobs
+    return DryRun(planned, total, len(setup.learn), seconds if planned else 0.0)
+
+
+def _size(setup: BenchmarkFile, path: Path) -> int:
+    """Return the size of a log's files; those that are missing do not count."""
+    total = 0
+    for file in source_files(setup, path):
+        try:
+            total += file.stat().st_size
+        except OSError:
+            continue
+    return total
