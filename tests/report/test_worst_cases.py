@@ -104,7 +104,7 @@ def test_the_note_counts_all_of_each_kind(report):
     assert re.search(rf"\d+ of {missed} missed", note) and f"of {len(results.false_alarms)} false alarms" in note
 
 
-def test_a_recording_with_a_trace_that_is_no_case_is_an_example(report):
+def test_a_recording_with_a_trace_but_without_a_case_is_an_example(report):
     names = [item for item in report.evaluated.results.recordings if item.group == "holdout"]
     quiet = next(item.recording for item in reversed(names) if item.recording not in {
         alarm.recording for alarm in report.evaluated.results.false_alarms})  # fmt: skip
