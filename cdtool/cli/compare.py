@@ -22,8 +22,8 @@ _SHOWN = 10
 
 
 def compare(
-    old: Annotated[Path, typer.Argument(help="results.json of the old build.", metavar="OLD")],
-    new: Annotated[Path, typer.Argument(help="results.json of the new build.", metavar="NEW")],
+    old: Annotated[Path, typer.Argument(help="results.json or results.parquet of the old build.", metavar="OLD")],
+    new: Annotated[Path, typer.Argument(help="results.json or results.parquet of the new build.", metavar="NEW")],
     level: Annotated[
         float, typer.Option("--level", help="Family-wise error rate: chance of any wrong 'worse' or 'better'.")
     ] = 0.05,

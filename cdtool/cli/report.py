@@ -13,7 +13,7 @@ from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def report(
-    results: Annotated[Path, typer.Argument(help="results.json of a benchmark.", metavar="RESULTS")],
+    results: Annotated[Path, typer.Argument(help="results.json or results.parquet of a benchmark.", metavar="RESULTS")],
     output: OutputOption = None,
     force: ForceOption = False,
 ) -> None:
