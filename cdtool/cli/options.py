@@ -114,7 +114,7 @@ OutputOption = Annotated[
     typer.Option(
         "--output",
         "-o",
-        help="Output, repeatable: .json, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder for all.",
+        help="Output, repeatable: .json, .parquet, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder.",
     ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Also replace files that cdtool did not write.")]
