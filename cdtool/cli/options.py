@@ -120,7 +120,7 @@ OutputOption = Annotated[
         "--output",
         "-o",
         parser=location,
-        help="Output, repeatable: .json, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder for all.",
+        help="Output, repeatable: .json, .parquet, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder.",
     ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Also replace files that cdtool did not write.")]

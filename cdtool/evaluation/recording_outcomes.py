@@ -68,9 +68,9 @@ def recording_outcomes(results: Results) -> Iterator[RecordingOutcome]:
     results : Results
         The results of a benchmark.
 
-    Yields
-    ------
-    RecordingOutcome
+    Returns
+    -------
+    iterator of RecordingOutcome
         In the order of the benchmark file.
 
     Examples

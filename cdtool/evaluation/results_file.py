@@ -80,10 +80,10 @@ def json_pieces(results: Results) -> Iterator[str]:
     results : Results
         The results.
 
-    Yields
-    ------
-    str
-        The next piece.
+    Returns
+    -------
+    iterator of str
+        The pieces.
 
     Examples
     --------

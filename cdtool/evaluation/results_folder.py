@@ -59,7 +59,22 @@ class _Column:
 
 
 def require_pyarrow(folder: Path) -> None:
-    """Raise UsageError with the next step if pyarrow is not installed."""
+    """Check that Parquet can be read and written.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder, for the message.
+
+    Raises
+    ------
+    UsageError
+        pyarrow is not installed.
+
+    Examples
+    --------
+    >>> require_pyarrow(Path("results.parquet"))
+    """
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError as fault:
@@ -79,7 +94,7 @@ def tables() -> Mapping[str, Any]:
 
 
 def write_tables(results: Results, folder: Path) -> str:
-    """Write all rows into an empty folder, and what they are from; return the text of `provenance.json`.
+    """Write all rows into an empty folder.
 
     Parameters
     ----------
@@ -91,11 +106,16 @@ def write_tables(results: Results, folder: Path) -> str:
     Returns
     -------
     str
-        The content of the file that belongs to no table.
+        What the rows are from: the text of `provenance.json`, which is not written.
 
     Examples
     --------
-    `cdtool benchmark -o results.parquet` writes them.
+    >>> empty = Results(provenance={}, detectors=(), groups=(), contacts=(), false_alarms=(), exposure=())
+    >>> folder = Path("results.parquet")
+    >>> folder.mkdir()
+    >>> text = write_tables(empty, folder)
+    >>> sorted(path.name for path in folder.iterdir()) == sorted(tables())
+    True
     """
     of_recordings = _OfRecordings(results)
     for table, kind in tables().items():
@@ -105,13 +125,30 @@ def write_tables(results: Results, folder: Path) -> str:
             joined = of_recordings if table in _OF_RECORDING else None
             _write(folder / table / f"{name}.parquet", _columns(kind), rows, numbers, joined)
     rest = {item.name: getattr(results, item.name) for item in fields(results) if item.name not in tables()}
-    text = strict_json({"kind": KIND, **rest, "conclusion": vars(results.conclusion)}) + "\n"
-    (folder / PROVENANCE).write_bytes(text.encode("utf-8", "replace"))
-    return text
+    return strict_json({"kind": KIND, **rest, "conclusion": vars(results.conclusion)}) + "\n"
 
 
 def holds_only_tables(folder: Path, others: Sequence[str] = ()) -> bool:
-    """Return whether a folder is empty, or has only what `write_tables` wrote, and `others`."""
+    """Return whether a folder may be replaced.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    others : sequence of str
+        Names that may be in it too.
+
+    Returns
+    -------
+    bool
+        True if it is empty, or has only tables of `write_tables`, `provenance.json` and `others`.
+
+    Examples
+    --------
+    >>> Path("reports").mkdir()
+    >>> holds_only_tables(Path("reports"))
+    True
+    """
     held = [item for item in folder.iterdir() if item.name not in (PROVENANCE, *others)]
     if not held and not (folder / PROVENANCE).exists():
         return True

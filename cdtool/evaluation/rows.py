@@ -164,6 +164,20 @@ class _Picked(Sequence[Row]):
 def values_of(rows: Sequence[Any], name: str) -> Sequence[Any]:
     """Return the values of a field of rows, without making rows that are held as columns.
 
+    Parameters
+    ----------
+    rows : sequence
+        The rows.
+    name : str
+        The field.
+
+    Returns
+    -------
+    sequence
+        The values, in the order of the rows.
+
+    Examples
+    --------
     >>> from cdtool.evaluation.results import Skipped
     >>> values_of((Skipped("a.csv", "empty"),), "reason")
     ['empty']
@@ -174,8 +188,22 @@ def values_of(rows: Sequence[Any], name: str) -> Sequence[Any]:
 
 
 def picked(rows: Sequence[Row], numbers: Sequence[int]) -> Sequence[Row]:
-    """Return the rows with these numbers; those of `Rows` are made when they are asked for.
+    """Return some of many rows.
 
+    Parameters
+    ----------
+    rows : sequence
+        The rows.
+    numbers : sequence of int
+        The positions of those that are wanted.
+
+    Returns
+    -------
+    sequence
+        The rows in the order of the numbers; those of `Rows` are made when they are asked for.
+
+    Examples
+    --------
     >>> picked("abc", [2, 0])
     ('c', 'a')
     """

@@ -13,7 +13,7 @@ from cdtool.evaluation.results import Results, onset_words
 from cdtool.evaluation.rows import values_of
 from cdtool.plain_text import counted, shorten
 from cdtool.report.few_contacts import explained
-from cdtool.report.many import is_many
+from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
 from cdtool.report.table import Log, Table
 from cdtool.report.tables import forces, recordings
@@ -191,6 +191,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         notes={
             **_NOTES,
             **(_NOTES_OF_MANY if many else {}),
+            "groups": _groups_note(evaluated) if many else "",
             "cases": f"{counts} {_ALL_OF_THEM}" if many else "",
             "results": _results_note(evaluated),
             "differences": differences_note(evaluated) if evaluated.comparisons else "",
@@ -225,6 +226,14 @@ def counts_text(evaluated: Evaluated) -> str:
     count = counted(sum(item.false_alarms for item in summaries), "false alarm")
     alarms = count if assessed else f"false alarms {NOT_ASSESSABLE}"
     return f"{contacts} with {counted(len(results.detectors), 'detector')}: {outcomes}; {alarms}"
+
+
+def _groups_note(evaluated: Evaluated) -> str:
+    """Return which groups have plots; empty if all have."""
+    plotted, every = plotted_groups(evaluated), {item.group for item in evaluated.summaries if item.contacts}
+    if len(plotted) == len(every):
+        return ""
+    return f"Plotted are the {len(plotted)} of {len(every)} groups with the largest share of missed contacts."
 
 
 def _tone(results: Results) -> str:

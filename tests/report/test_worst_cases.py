@@ -104,7 +104,7 @@ def test_the_note_counts_all_of_each_kind(report):
     assert re.search(rf"\d+ of {missed} missed", note) and f"of {len(results.false_alarms)} false alarms" in note
 
 
-def test_a_recording_with_a_trace_that_is_no_case_is_an_example(report):
+def test_a_recording_with_a_trace_but_without_a_case_is_an_example(report):
     names = [item for item in report.evaluated.results.recordings if item.group == "holdout"]
     quiet = next(item.recording for item in reversed(names) if item.recording not in {
         alarm.recording for alarm in report.evaluated.results.false_alarms})  # fmt: skip
@@ -140,6 +140,19 @@ def test_a_curve_of_many_steps_has_fewer_with_the_same_ends(report, monkeypatch)
     assert set(zip(fewer["times"], fewer["share"], strict=True)) <= set(
         zip(whole["times"], whole["share"], strict=True)
     )
+
+
+def test_of_many_groups_those_that_miss_the_most_are_plotted(report, monkeypatch):
+    monkeypatch.setattr(many, "MOST_GROUPS", 1)
+    shares = {group: max(item.missed_share.value for item in report.evaluated.summaries if item.group == group)
+              for group in ("stiff", "soft")}  # fmt: skip
+    worst = max(shares, key=lambda group: shares[group])
+    data = plot_data(report)
+    for kind in ("latency", "survival", "amoc"):
+        assert [panel["group"] for panel in data[kind]] == [worst]
+    text = to_html(Report(report.evaluated, report.traces))
+    assert "Plotted are the 1 of 2 groups with the largest share of missed contacts." in text
+    assert all(group in [cell.text for cell in report.model.tables["results"].cells("group")] for group in shares)
 
 
 def test_a_pull_request_states_how_many_rows_there_are(report):

@@ -21,7 +21,7 @@ from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval
 from cdtool.report.html.page_tables import short, visible
 from cdtool.report.html.traces import HEIGHTS
-from cdtool.report.many import is_many
+from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.model import AXES
 from cdtool.report.number_text import number, spoken, with_interval
 from cdtool.report.plots.style import look_of
@@ -49,6 +49,8 @@ def plot_data(report: Report) -> dict[str, Any]:
     results = report.evaluated.results
     contacts = grouped(results.scored_contacts, "group", "detector")
     many = is_many(results)
+    groups = plotted_groups(report.evaluated) if many else results.groups
+    of_groups = [item for item in report.evaluated.summaries if item.group in groups]
     return {
         "detectors": [_detector(results, name) for name in results.detectors],
         "groups": [shown(group) for group in results.groups],
@@ -56,9 +58,9 @@ def plot_data(report: Report) -> dict[str, Any]:
         "heights": HEIGHTS,
         "axes": AXES,
         "reasons": REASONS,
-        "latency": (_histograms if many else _latency)(results, report.evaluated.summaries, contacts),
-        "survival": _survival(results, contacts, MOST_STEPS if many else None),
-        "amoc": _amoc(results),
+        "latency": (_histograms if many else _latency)(results, of_groups, contacts),
+        "survival": _survival(results, groups, contacts, MOST_STEPS if many else None),
+        "amoc": _amoc(results, groups),
         "force": _force(report),
     }
 
@@ -159,9 +161,9 @@ def _median(item: Summary) -> tuple[float, ...]:
     return (median.value,) if draws_no_interval(item) else (median.value, median.low, median.high)
 
 
-def _survival(results: Results, contacts: Contacts, most: int | None) -> list[dict[str, Any]]:
+def _survival(results: Results, groups: Sequence[str], contacts: Contacts, most: int | None) -> list[dict[str, Any]]:
     found = []
-    for group in results.groups:
+    for group in groups:
         rows = []
         for i, name in enumerate(results.detectors):
             latency, censored = latencies(contacts.get((group, name), ()))
@@ -180,9 +182,9 @@ def _survival(results: Results, contacts: Contacts, most: int | None) -> list[di
     return found
 
 
-def _amoc(results: Results) -> list[dict[str, Any]]:
+def _amoc(results: Results, groups: Sequence[str]) -> list[dict[str, Any]]:
     parts: dict[str, dict[str, list[SweepResult]]] = {}
-    for item in results.sweep:
+    for item in (row for row in results.sweep if row.group in groups):
         parts.setdefault(item.group, {}).setdefault(item.detector, []).append(item)
     found = []
     for group, detectors in parts.items():

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.results_folder import KIND, holds_only_tables, require_pyarrow, write_tables
+from cdtool.evaluation.results_folder import KIND, PROVENANCE, holds_only_tables, require_pyarrow, write_tables
 from cdtool.evaluation.traces.file import TRACES_IN_FOLDER, encode_traces
 from cdtool.files import replaced_folder
 from cdtool.foreign_files import Kind
@@ -31,8 +31,9 @@ class Parquet(Writer[Report]):
     def write(self, report: Report, target: Path) -> None:
         """Write the folder; raises CdtoolError."""
         with replaced_folder(target, _may_replace) as folder:
-            text = write_tables(report.evaluated.results, folder)
-            digest = hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
+            content = write_tables(report.evaluated.results, folder).encode("utf-8", "replace")
+            (folder / PROVENANCE).write_bytes(content)
+            digest = hashlib.sha256(content).hexdigest()
             (folder / TRACES_IN_FOLDER).write_bytes(encode_traces(report.traces, results_sha256=digest))
 
 
