@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
@@ -22,6 +20,7 @@ from typing import Any
 
 from cdtool.errors import WorkerError
 from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, ended_words, limit_words
+from cdtool.workflows.execution.workers import shares_memory
 
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
@@ -165,6 +164,4 @@ def _without_interruption() -> Iterator[None]:
 
 
 def _context() -> BaseContext:
-    """Return how processes are started: a fork with other threads could keep a lock for ever."""
-    alone = threading.active_count() == 1
-    return get_context("fork" if sys.platform == "linux" and alone else "spawn")
+    return get_context("fork" if shares_memory() else "spawn")
