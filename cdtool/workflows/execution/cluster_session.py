@@ -164,10 +164,13 @@ class Session:
         if describing is not None and not describing.done():
             describing.cancel()
 
-    async def last_reports(self) -> dict[str, float]:
-        """Return when each worker has last reported to its scheduler [s], by the scheduler's clock."""
+    async def last_reports(self) -> dict[str, tuple[float, bool]]:
+        """Return when each worker has last reported to its scheduler, by its clock [s], and whether it has paused.
+
+        A worker with little free memory pauses: it begins nothing until it has more.
+        """
         known = await asyncio.wait_for(self.client.scheduler.identity(n_workers=-1), _ANSWERED_WITHIN)
-        return {address: item["last_seen"] for address, item in known["workers"].items()}
+        return {address: (item["last_seen"], item["status"] == "paused") for address, item in known["workers"].items()}
 
     def restart(self, address: str) -> None:
         """Let the nanny of a worker that does not respond end it, and start another one."""
