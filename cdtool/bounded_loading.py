@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.errors import CdtoolError
+from cdtool.remote.storage_error import StorageError
 
 MIB = 2**20
 # Text written by a person: a machine, benchmark, label or trigger file, a URDF.
@@ -75,6 +76,8 @@ def read_bytes(
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except FileNotFoundError:
         raise error(f"{path}: no such file", missing or hint) from None
+    except StorageError as fault:
+        raise error(fault.message, fault.hint) from fault
     except ValueError as fault:  # a NUL, which is not allowed in file names
         raise error(f"{str(path)!r}: is not a file name", hint) from fault
     except OSError as fault:

@@ -95,7 +95,7 @@ def _try(mine: tuple[Path, int], *, create: bool = True) -> bool:
     flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
     handle = os.open(lock, flags | (os.O_CREAT if create else 0), 0o666)
     try:
-        if _lock(handle):
+        if lock_handle(handle):
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), os.stat(lock, follow_symlinks=False)):  # noqa: PTH116
                     _handles[mine] = handle
@@ -106,7 +106,7 @@ def _try(mine: tuple[Path, int], *, create: bool = True) -> bool:
             os.close(handle)
 
 
-def _lock(handle: int) -> bool:
+def lock_handle(handle: int) -> bool:
     """Take the lock of an open file; return False if another process holds it."""
     try:
         import fcntl

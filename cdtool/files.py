@@ -5,6 +5,10 @@ Conventions: links are followed before anything is locked or written. An incompl
 dotfiles, which patterns for logs do not match, and exist only while a command writes. Files left by a killed command
 are removed by the next command that writes to the folder, once no living process holds the lock. An existing file keeps
 its mode (and owner, if permitted); a new one gets the mode set by the umask.
+
+At a URL a file is written locally, and then uploaded in one step: an object is there completely or not at all. An
+object store has no locks: of two writers, the last one wins. Only `locked` notices on S3 that another process has
+replaced the object meanwhile. Several files, or those of a folder, are uploaded one after the other.
 """
 
 from __future__ import annotations
@@ -14,13 +18,17 @@ import errno
 import os
 import shutil
 import stat
-from collections.abc import Callable, Iterator, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from cdtool.errors import CdtoolError, OutputError, UsageError
 from cdtool.file_locks import holding, release_all, temporary_name
 from cdtool.plain_text import plain
+from cdtool.remote.remote_path import is_remote
+from cdtool.remote.storage_error import StorageError
+from cdtool.remote.uploads import expecting, upload
 
 _BINARY = getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 _temporaries: set[Path] = set()
@@ -36,6 +44,10 @@ def locked(path: Path) -> Iterator[Path]:
     Files written with this module inside the block use the same lock. Raises OutputError if another process holds the
     lock for a minute, or the file system has no locks.
     """
+    if is_remote(path):
+        with _explained(path, []), expecting(path):
+            yield path
+        return
     target = resolved(path)
     with _explained(path, []), holding(target, target.parent, path, needed=True):
         yield target
@@ -43,17 +55,29 @@ def locked(path: Path) -> Iterator[Path]:
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a complete file; write to a device or pipe directly. Raises OutputError, UsageError."""
-    if _is_special(path):
-        with _explained(path, []), path.open("wb") as stream:
-            stream.write(content)
+    if is_remote(path):
+        _upload(path, content)
         return
-    with replaced(path) as (part,), part.open("wb") as stream:
-        stream.write(content)
+    _write(path, (content,))
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a complete file of UTF-8 text without changing its line ends. Raises OutputError, UsageError."""
-    write_bytes(path, text.encode("utf-8", "replace"))
+    write_pieces(path, (text,))
+
+
+def write_pieces(path: Path, pieces: Iterable[str]) -> None:
+    """Write a complete file of UTF-8 text that is made piece by piece. Raises OutputError, UsageError."""
+    _write(path, (piece.encode("utf-8", "replace") for piece in pieces))
+
+
+def _write(path: Path, contents: Iterable[bytes]) -> None:
+    if _is_special(path):
+        with _explained(path, []), path.open("wb") as stream:
+            stream.writelines(contents)
+        return
+    with replaced(path) as (part,), part.open("wb") as stream:
+        stream.writelines(contents)
 
 
 @contextmanager
@@ -63,6 +87,10 @@ def replaced(*paths: Path) -> Iterator[list[Path]]:
     Otherwise none does. Raises UsageError if a path is a folder, a device, a link to a missing file, or its folder is
     missing; OutputError if writing fails, in the block or after it.
     """
+    if any(is_remote(path) for path in paths):
+        with _uploaded(paths) as made:
+            yield made
+        return
     targets = [_checked(path) for path in paths]
     parts = [temporary_name(target, target.parent) for target in targets]
     names = list(zip(parts, paths, strict=True))
@@ -92,6 +120,10 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
     file system without exchange), each file replaces the one of the same name and the others stay. Raises as
     `replaced`.
     """
+    if is_remote(path):
+        with _uploaded_folder(path, may_replace) as made:
+            yield made
+        return
     target = resolved(path)
     if target.exists() and not target.is_dir():
         raise UsageError(f"{plain(path)}: exists and is not a folder", "choose another name")
@@ -119,6 +151,11 @@ def replaced_folder(path: Path, may_replace: Callable[[Path], bool] | None = Non
 @contextmanager
 def made_folder(path: Path) -> Iterator[Path]:
     """Create a folder with its missing parents; on exit remove those that are still empty."""
+    if is_remote(path):
+        with _explained(path, []):
+            path.mkdir(parents=True, exist_ok=True)
+        yield path
+        return
     target = resolved(path)
     made = [folder for folder in (target, *target.parents) if not folder.exists()]
     try:
@@ -133,6 +170,8 @@ def made_folder(path: Path) -> Iterator[Path]:
 
 def resolved(path: Path) -> Path:
     """Return the real path; raises UsageError for a link to a missing file."""
+    if is_remote(path):
+        return path
     if path.is_symlink() and not path.exists():
         raise UsageError(f"{plain(path)}: is a link to a missing file", "remove or repair the link")
     return Path(os.path.realpath(path))
@@ -142,6 +181,40 @@ def clean_up() -> None:
     """Remove the temporary files and locks of this process: a signal can raise an exception between any two steps."""
     _discard(list(_temporaries))
     release_all()
+
+
+@contextmanager
+def _uploaded(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Yield a local file for each path; if the block ends without error, those at URLs are uploaded.
+
+    The local ones among them are put in place first.
+    """
+    local = [path for path in paths if not is_remote(path)]
+    with tempfile.TemporaryDirectory(prefix="cdtool-") as folder, ExitStack() as stack:
+        names = {path: Path(folder) / f"{i}{path.suffix}" for i, path in enumerate(paths) if is_remote(path)}
+        with _explained(paths[0], [(name, path) for path, name in names.items()]):
+            names |= dict(zip(local, stack.enter_context(replaced(*local)) if local else (), strict=True))
+            yield [names[path] for path in paths]
+            stack.close()
+            for path in (path for path in paths if is_remote(path)):
+                _upload(path, names[path])
+
+
+@contextmanager
+def _uploaded_folder(path: Path, may_replace: Callable[[Path], bool] | None) -> Iterator[Path]:
+    """Yield a local folder whose files are uploaded if the block ends without error; other files there stay."""
+    if may_replace is not None and path.is_dir():
+        may_replace(path)
+    with tempfile.TemporaryDirectory(prefix="cdtool-") as folder, _explained(path, [(Path(folder), path)]):
+        yield Path(folder)
+        for item in sorted(Path(folder).rglob("*")):
+            if item.is_file():
+                _upload(path / item.relative_to(folder).as_posix(), item)
+
+
+def _upload(path: Path, content: bytes | Path) -> None:
+    with _explained(path, []):
+        upload(path, content)
 
 
 def _checked(path: Path) -> Path:
@@ -167,6 +240,10 @@ def _explained(path: Path, names: Sequence[tuple[Path, Path]]) -> Iterator[None]
     """Convert an OSError to one line about `path` that does not name temporary files."""
     try:
         yield
+    except StorageError as fault:
+        if fault.url != str(path):  # of a file that is read in the block
+            raise
+        raise OutputError(f"{plain(path)}: cannot be written: {fault.strerror}", fault.hint) from fault
     except CdtoolError as fault:
         message = fault.message
         for part, known in names:

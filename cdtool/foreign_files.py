@@ -13,6 +13,7 @@ from pathlib import Path
 
 from cdtool.errors import UsageError
 from cdtool.plain_text import plain
+from cdtool.remote.remote_path import is_remote
 
 _LOOKED_AT = 1 << 13
 
@@ -66,9 +67,14 @@ def refuse_foreign_figure(target: Path, *, force: bool) -> None:
 
 def refuse_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Raise UsageError if a file to write is also read by the command, under any name or link."""
-    read = [path for path in inputs if path.exists()]
+    given = list(inputs)
+    read = [path for path in given if not is_remote(path) and path.exists()]
     for target in targets:
-        if target.exists() and any(target.samefile(path) for path in read):
+        if is_remote(target):
+            is_read = target in given
+        else:
+            is_read = target.exists() and any(target.samefile(path) for path in read)
+        if is_read:
             raise UsageError(f"{plain(target)}: is read by this command", "choose another name for the output")
 
 

@@ -18,6 +18,7 @@ from cdtool.derived import StoresDerived
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.registry import Registry
+from cdtool.remote.remote_path import location
 from cdtool.tables import Table, read_toml
 
 
@@ -59,7 +60,7 @@ class MachineFile(StoresDerived):
 
 def read_machine_file(path: str | Path) -> MachineFile:
     """Read and check a machine file; raises ConfigurationError."""
-    file = Path(path)
+    file = location(path)
     values = read_toml(file, "a machine file")
     root = Table(values, str(file))
     if isinstance(values.get("machine"), str):

@@ -19,6 +19,7 @@ from cdtool.files import locked, write_text
 from cdtool.foreign_files import Kind
 from cdtool.operations import HOW_TO_CUT, RunCut
 from cdtool.plausible import PlausibleRanges
+from cdtool.remote.remote_path import location
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.fitted_signature import known
@@ -36,7 +37,7 @@ SIGNATURE = Kind(f'"kind": "{_KIND}"'.encode(), "signature")
 
 def write_signature(path: str | Path, signature: SignatureFile) -> None:
     """Write a .json file, completely or not at all (see `cdtool.files`). Raises SignatureError."""
-    file = Path(path)
+    file = location(path)
     check_name(file)
     text = json.dumps(_to_json(signature), allow_nan=False)
     with _faults():
@@ -51,7 +52,7 @@ def check_name(file: Path) -> None:
 
 def read_signature(path: str | Path) -> SignatureFile:
     """Read and check a signature file; raises SignatureError."""
-    file = Path(path)
+    file = location(path)
     content = read_bytes(file, SignatureError, most=MOST_JSON, hint="create one with cdtool learn-signature")
     try:
         values = parse_json(content)
@@ -83,7 +84,7 @@ def _no_signature(file: Path, content: bytes, why: str = "") -> SignatureError:
 
 def update_signature(path: str | Path, change: Callable[[SignatureFile], SignatureFile]) -> SignatureFile:
     """Read, change and write a file under a lock, so that no concurrent update is lost. Raises SignatureError."""
-    with _faults(), locked(Path(path)):
+    with _faults(), locked(location(path)):
         stored = read_signature(path)
         changed = change(stored)
         if changed is not stored:

@@ -23,7 +23,7 @@ from typer.core import TyperGroup
 from cdtool.cli.streams import lost_output, open_standard_streams
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.exit_status import ORDER, STATUSES, ExitStatus, Fact, status_of, statuses_words
-from cdtool.plain_text import one_line
+from cdtool.plain_text import counted, one_line
 
 COMMANDS: Mapping[str, str] = {
     "info": "cdtool.cli.info:info",
@@ -193,8 +193,12 @@ def compilation_shown() -> Iterator[None]:
 
 def main() -> None:
     """Run the app. A known error prints one line to stderr and exits with status 2."""
+    before = _transferred()
     with _ending_as_if_interrupted() as came:
-        _main(came)
+        try:
+            _main(came)
+        finally:
+            _show_transferred(before)
 
 
 def _run_app(came: list[int]) -> Any:
@@ -208,6 +212,18 @@ def _run_app(came: list[int]) -> Any:
         if came:
             raise _end_of(came[0]) from None
         raise
+
+
+def _transferred() -> tuple[int, int]:
+    """Return the bytes that this process and its workers have read from URLs, and in how many requests."""
+    staging = sys.modules.get("cdtool.remote.staging")
+    return staging.amount_read() if staging is not None else (0, 0)
+
+
+def _show_transferred(before: tuple[int, int]) -> None:
+    size, requests = (now - then for now, then in zip(_transferred(), before, strict=True))
+    if requests:
+        typer.echo(f"read from URLs: {size / 2**20:.1f} MiB in {counted(requests, 'request')}", err=True)
 
 
 def _main(came: list[int]) -> None:

@@ -20,6 +20,7 @@ from cdtool.cli.options import (
     TimeoutOption,
     listed,
 )
+from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
 from cdtool.plain_text import counted
@@ -30,7 +31,10 @@ if TYPE_CHECKING:
 
 
 def benchmark(
-    file: Annotated[Path, typer.Argument(help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE")],
+    file: Annotated[
+        Place,
+        typer.Argument(parser=location, help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE"),
+    ],
     output: OutputOption = None,
     force: ForceOption = False,
     detectors: Annotated[
@@ -50,9 +54,10 @@ def benchmark(
     timeout: TimeoutOption = None,
     retries: RetriesOption = 1,
     store: Annotated[
-        Path | None,
+        Place | None,
         typer.Option(
             "--store",
+            parser=location,
             help="Folder where outcomes are kept: only recordings for which something has changed are computed.",
         ),
     ] = None,

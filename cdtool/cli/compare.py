@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +9,7 @@ import typer
 
 from cdtool.cli.console import columns_to_fill, leave, plain, table
 from cdtool.cli.options import ForceOption, JsonOption
+from cdtool.cli.place import Place, location
 from cdtool.exit_status import Fact
 from cdtool.plain_text import shorten
 
@@ -22,8 +22,8 @@ _SHOWN = 10
 
 
 def compare(
-    old: Annotated[Path, typer.Argument(help="results.json of the old build.", metavar="OLD")],
-    new: Annotated[Path, typer.Argument(help="results.json of the new build.", metavar="NEW")],
+    old: Annotated[Place, typer.Argument(parser=location, help="results.json of the old build.", metavar="OLD")],
+    new: Annotated[Place, typer.Argument(parser=location, help="results.json of the new build.", metavar="NEW")],
     level: Annotated[
         float, typer.Option("--level", help="Family-wise error rate: chance of any wrong 'worse' or 'better'.")
     ] = 0.05,
@@ -44,8 +44,10 @@ def compare(
         ),
     ] = False,
     output: Annotated[
-        list[Path] | None,
-        typer.Option("--output", "-o", help="Output file, repeatable: .md (for a pull request), .json."),
+        list[Place] | None,
+        typer.Option(
+            "--output", "-o", parser=location, help="Output file, repeatable: .md (for a pull request), .json."
+        ),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,

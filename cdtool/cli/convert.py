@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,18 +9,30 @@ import typer
 from cdtool.cli.console import leave_with, plain, print_json, with_findings
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import FromOption, JsonOption, ToOption, section_of
+from cdtool.cli.place import Place, location
 from cdtool.plain_text import counted
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(help="The recording to read, or the folder of its parts.", metavar="IN")],
+    source: Annotated[
+        Place, typer.Argument(parser=location, help="The recording to read, or the folder of its parts.", metavar="IN")
+    ],
     output: Annotated[
-        Path,
-        typer.Argument(help="The file to write: .csv, .mcap, .parquet, .feather, .h5, .mf4 or .tdms.", metavar="OUT"),
+        Place,
+        typer.Argument(
+            parser=location,
+            help="The file to write: .csv, .mcap, .parquet, .feather, .h5, .mf4 or .tdms.",
+            metavar="OUT",
+        ),
     ],
     machine: Annotated[
-        Path | None,
-        typer.Option("--machine", "-m", help="Machine file: write its channels in SI units. Default: all columns."),
+        Place | None,
+        typer.Option(
+            "--machine",
+            "-m",
+            parser=location,
+            help="Machine file: write its channels in SI units. Default: all columns.",
+        ),
     ] = None,
     from_: FromOption = None,
     to: ToOption = None,

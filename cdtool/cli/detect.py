@@ -16,6 +16,7 @@ from cdtool.cli.detect_shown import as_rows, show_detected
 from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
+from cdtool.cli.place import Place, location
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
 from cdtool.exit_status import Fact
 
@@ -30,13 +31,14 @@ if TYPE_CHECKING:
 
 @with_options
 def detect(
-    logs: Annotated[list[Path], typer.Argument(help="Recordings to analyse.", metavar="LOG...")],
+    logs: Annotated[list[Place], typer.Argument(parser=location, help="Recordings to analyse.", metavar="LOG...")],
     options: LogOptions,
     contact_at: Annotated[
         str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z (m, in the link's frame).")
     ] = "",
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="PNG, SVG or PDF file to draw; a folder for several logs.")
+        Place | None,
+        typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw; a folder for several logs."),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -108,7 +110,7 @@ class _Run:
         for number, found in enumerate(detected.runs):
             if self.estimate_force:
                 self.forces |= {item.operation: item for item in map(self.estimate_force, found.detections)}
-            self.done.append((Path(found.recording.source) if is_cut else log, found))
+            self.done.append((location(found.recording.source) if is_cut else log, found))
             self.skipped += found.not_scored
             self.findings += [*lost(found.recording), *found.findings]
             if plots:

@@ -14,6 +14,7 @@ from cdtool.cli.console import leave, number, plain, print_json, print_not_asses
 from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
+from cdtool.cli.place import Place, location
 from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
@@ -30,11 +31,15 @@ _BLIND = "not_assessable"
 
 @with_options
 def explain(
-    log: Annotated[Path, typer.Argument(help="Recording to explain.", metavar="LOG")],
+    log: Annotated[Place, typer.Argument(parser=location, help="Recording to explain.", metavar="LOG")],
     options: LogOptions,
     plot: Annotated[
-        Path | None,
-        typer.Option("--plot", help="PNG, SVG or PDF file for the first event, or an existing folder for all events."),
+        Place | None,
+        typer.Option(
+            "--plot",
+            parser=location,
+            help="PNG, SVG or PDF file for the first event, or an existing folder for all events.",
+        ),
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,

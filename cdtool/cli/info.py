@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdtool.cli.console import leave_with, number, plain, print_error, print_json, table, with_findings
 from cdtool.cli.options import JsonOption
+from cdtool.cli.place import Place, location
 from cdtool.errors import CdtoolError
 from cdtool.exit_status import Fact
 
@@ -17,9 +17,12 @@ if TYPE_CHECKING:
 
 
 def info(
-    logs: Annotated[list[Path], typer.Argument(help="Recordings: CSV, MCAP, MAT and more.", metavar="LOG...")],
+    logs: Annotated[
+        list[Place], typer.Argument(parser=location, help="Recordings: CSV, MCAP, MAT and more.", metavar="LOG...")
+    ],
     machine: Annotated[
-        Path | None, typer.Option("--machine", "-m", help="Machine file: map the channels and check them.")
+        Place | None,
+        typer.Option("--machine", "-m", parser=location, help="Machine file: map the channels and check them."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

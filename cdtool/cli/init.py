@@ -13,6 +13,7 @@ import typer
 from cdtool.cli.console import leave, leave_with, plain, print_json, print_skipped, with_findings
 from cdtool.cli.late_progress import late_progress
 from cdtool.cli.options import JsonOption
+from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,16 +21,21 @@ if TYPE_CHECKING:
 
 
 def init(
-    logs: Annotated[list[Path], typer.Argument(help="Recordings of one machine.", metavar="LOG...")],
+    logs: Annotated[list[Place], typer.Argument(parser=location, help="Recordings of one machine.", metavar="LOG...")],
     output: Annotated[
-        Path,
+        Place,
         typer.Option(
-            "--output", "-o", help="Machine file to write (.toml); or a folder for a machine file and a benchmark file."
+            "--output",
+            "-o",
+            parser=location,
+            help="Machine file to write (.toml); or a folder for a machine file and a benchmark file.",
         ),
     ] = Path("machine.toml"),
     machine: Annotated[
-        Path | None,
-        typer.Option("--machine", "-m", help="With a folder: use this machine file, draft only the benchmark."),
+        Place | None,
+        typer.Option(
+            "--machine", "-m", parser=location, help="With a folder: use this machine file, draft only the benchmark."
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     csv: Annotated[

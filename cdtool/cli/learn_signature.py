@@ -29,15 +29,19 @@ from cdtool.cli.options import (
     listed,
     section_of,
 )
+from cdtool.cli.place import Place, location
 
 if TYPE_CHECKING:
     from cdtool.workflows.signature.learning import Learned
 
 
 def learn_signature(
-    logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings, 10 or more per class.", metavar="LOG...")],
+    logs: Annotated[
+        list[Place],
+        typer.Argument(parser=location, help="Impact-free recordings, 10 or more per class.", metavar="LOG..."),
+    ],
     machine: MachineOption,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Signature file to write (.json).")],
+    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Signature file to write (.json).")],
     detector: Annotated[
         str,
         typer.Option(

@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cdtool.cli import completions
+from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
 
 if TYPE_CHECKING:
     from cdtool.log_section import LogSection
 
-MachineOption = Annotated[Path, typer.Option("--machine", "-m", help="Machine file (TOML); see docs/machine-file.md.")]
+MachineOption = Annotated[
+    Place, typer.Option("--machine", "-m", parser=location, help="Machine file (TOML); see docs/machine-file.md.")
+]
 MachineUnlessBenchmarkOption = Annotated[
-    Path | None, typer.Option("--machine", "-m", help="Machine file (TOML); not with --benchmark.")
+    Place | None, typer.Option("--machine", "-m", parser=location, help="Machine file (TOML); not with --benchmark.")
 ]
 OperationsOption = Annotated[
     str,
@@ -43,7 +46,7 @@ HysteresisOption = Annotated[
 ]
 LatchOption = Annotated[bool | None, typer.Option("--latch/--no-latch", help="Keep an alarm until its operation ends.")]
 SignatureOption = Annotated[
-    Path | None, typer.Option("--signature", "-s", help="Signature file from cdtool learn-signature.")
+    Place | None, typer.Option("--signature", "-s", parser=location, help="Signature file from cdtool learn-signature.")
 ]
 LimitOption = Annotated[
     str, typer.Option("--limit", help="Fixed limit of |signal| instead: one value, or one per joint, as 40,inf,40.")
@@ -62,10 +65,11 @@ DetectorOption = Annotated[
     ),
 ]
 BenchmarkOption = Annotated[
-    Path | None,
+    Place | None,
     typer.Option(
         "--benchmark",
         "-b",
+        parser=location,
         help="Benchmark file: machine, threshold, onset, window and all other settings are read from it.",
     ),
 ]
@@ -87,7 +91,8 @@ OnsetSeparationOption = Annotated[
     float | None, typer.Option("--onset-separation", help="Merge contacts closer than this [s]. Default: 1.")
 ]
 LabelsOption = Annotated[
-    Path | None, typer.Option("--labels", help="Label file (CSV) with the contacts; replaces the load cell.")
+    Place | None,
+    typer.Option("--labels", parser=location, help="Label file (CSV) with the contacts; replaces the load cell."),
 ]
 LabelsClockOption = Annotated[
     Literal["recording", "source"] | None,
@@ -110,10 +115,11 @@ FromOption = Annotated[
 ]
 ToOption = Annotated[str | None, typer.Option("--to", help="Use the log up to here: a time or a distance travelled.")]
 OutputOption = Annotated[
-    list[Path] | None,
+    list[Place] | None,
     typer.Option(
         "--output",
         "-o",
+        parser=location,
         help="Output, repeatable: .json, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder for all.",
     ),
 ]
@@ -166,11 +172,15 @@ def limits_of(text: str) -> tuple[float, ...]:
 def figure_name(plot: Path, *, force: bool) -> Path:
     """Return the file of --plot; raises UsageError for a wrong suffix, a missing folder, or a file not from cdtool."""
     from cdtool.foreign_files import refuse_foreign_figure
+    from cdtool.remote.remote_path import is_remote
+    from cdtool.remote.uploads import check_place
     from cdtool.report.plots.figures import SUFFIXES
 
     if plot.suffix.lower() not in SUFFIXES:
         raise UsageError(f"--plot is '{plot}'", f"the name must end in {', '.join(SUFFIXES)}")
-    if not plot.parent.is_dir():
+    if is_remote(plot):
+        check_place(plot)
+    elif not plot.parent.is_dir():
         raise UsageError(f"--plot is '{plot}': no folder {plot.parent}", "create the folder first")
     refuse_foreign_figure(plot, force=force)
     return plot

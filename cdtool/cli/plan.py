@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cdtool.cli.console import plain, print_json
 from cdtool.cli.options import JsonOption, listed
+from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
 
 
@@ -21,7 +21,10 @@ def plan(
         float | None, typer.Option("--std-ms", help="Estimated standard deviation of the paired differences [ms].")
     ] = None,
     source: Annotated[
-        Path | None, typer.Option("--from", help="Take the standard deviation from results.json of an earlier test.")
+        Place | None,
+        typer.Option(
+            "--from", parser=location, help="Take the standard deviation from results.json of an earlier test."
+        ),
     ] = None,
     detectors: Annotated[
         str,

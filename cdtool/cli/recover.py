@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cdtool.cli.console import leave, plain
 from cdtool.cli.late_progress import late_progress
+from cdtool.cli.place import Place, location
 from cdtool.exit_status import Fact
 
 
 def recover(
-    log: Annotated[Path, typer.Argument(help="A damaged or truncated MCAP file.", metavar="LOG")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The clean MCAP file to write.")],
+    log: Annotated[Place, typer.Argument(parser=location, help="A damaged or truncated MCAP file.", metavar="LOG")],
+    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="The clean MCAP file to write.")],
     unverified: Annotated[
         bool, typer.Option("--unverified", help="Also keep messages without a checksum, marked as such.")
     ] = False,

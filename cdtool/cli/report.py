@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cdtool.cli.console import plain, print_skipped
 from cdtool.cli.options import ForceOption, OutputOption
+from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def report(
-    results: Annotated[Path, typer.Argument(help="results.json of a benchmark.", metavar="RESULTS")],
+    results: Annotated[Place, typer.Argument(parser=location, help="results.json of a benchmark.", metavar="RESULTS")],
     output: OutputOption = None,
     force: ForceOption = False,
 ) -> None:

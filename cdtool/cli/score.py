@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -17,18 +16,22 @@ from cdtool.cli.options import (
     RetriesOption,
     TimeoutOption,
 )
+from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def score(
     triggers: Annotated[
-        Path,
+        Place,
         typer.Argument(
-            help="CSV with columns recording, time_s and, for several detectors, detector.", metavar="TRIGGERS"
+            parser=location,
+            help="CSV with columns recording, time_s and, for several detectors, detector.",
+            metavar="TRIGGERS",
         ),
     ],
     benchmark: Annotated[
-        Path, typer.Option("--benchmark", "-b", help="Benchmark file: recordings, contacts and rules.")
+        Place,
+        typer.Option("--benchmark", "-b", parser=location, help="Benchmark file: recordings, contacts and rules."),
     ],
     output: OutputOption = None,
     force: ForceOption = False,

@@ -21,6 +21,7 @@ from cdtool.cli.options import (
     TimeoutOption,
     figure_name,
 )
+from cdtool.cli.place import Place, location
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
 from cdtool.errors import UsageError
 from cdtool.exit_status import Fact, statuses_words
@@ -42,7 +43,9 @@ def _signature() -> None:
     """Show a signature, check it against runs, add runs to it."""
 
 
-FileArgument = Annotated[Path, typer.Argument(help="Signature file from cdtool learn-signature.", metavar="SIGNATURE")]
+FileArgument = Annotated[
+    Place, typer.Argument(parser=location, help="Signature file from cdtool learn-signature.", metavar="SIGNATURE")
+]
 CutOption = Annotated[
     str | None,
     typer.Option(
@@ -51,7 +54,7 @@ CutOption = Annotated[
         autocompletion=completions.operations,
     ),
 ]
-PlotOption = Annotated[Path | None, typer.Option("--plot", help="PNG, SVG or PDF file to draw.")]
+PlotOption = Annotated[Place | None, typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw.")]
 
 
 @signature.command("show", epilog=statuses_words("signature show"))
@@ -86,9 +89,11 @@ def show(file: FileArgument, plot: PlotOption = None, force: ForceOption = False
 def check(
     file: FileArgument,
     logs: Annotated[
-        list[Path],
+        list[Place],
         typer.Argument(
-            help="Impact-free recordings: the runs learned from and later ones, in order.", metavar="LOG..."
+            parser=location,
+            help="Impact-free recordings: the runs learned from and later ones, in order.",
+            metavar="LOG...",
         ),
     ],
     machine: MachineOption,
@@ -97,8 +102,10 @@ def check(
         float, typer.Option("--target", help="False-alarm probability per operation that the runs must demonstrate.")
     ] = 1e-3,
     plot: Annotated[
-        Path | None,
-        typer.Option("--plot", help="PNG, SVG or PDF file of the drift; a folder for several classes."),
+        Place | None,
+        typer.Option(
+            "--plot", parser=location, help="PNG, SVG or PDF file of the drift; a folder for several classes."
+        ),
     ] = None,
     force: ForceOption = False,
     onset_above: OnsetAboveOption = None,
@@ -153,7 +160,9 @@ def check(
 @signature.command("update", epilog=statuses_words("signature update"))
 def update(
     file: FileArgument,
-    logs: Annotated[list[Path], typer.Argument(help="Impact-free recordings to add.", metavar="LOG...")],
+    logs: Annotated[
+        list[Place], typer.Argument(parser=location, help="Impact-free recordings to add.", metavar="LOG...")
+    ],
     machine: MachineOption,
     operations: CutOption = None,
     forget: Annotated[

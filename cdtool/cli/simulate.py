@@ -10,6 +10,7 @@ import typer
 
 from cdtool.cli.console import plain, print_json, progress
 from cdtool.cli.options import JsonOption
+from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError, nearest
 from cdtool.exit_status import statuses_words
 from cdtool.plain_text import counted
@@ -37,7 +38,7 @@ FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed
 ReferenceOption = Annotated[
     bool, typer.Option("--reference/--no-reference", help="Also log the references: speed, and torque or position.")
 ]
-OutputOption = Annotated[Path, typer.Option("--output", "-o", help="Output folder.")]
+OutputOption = Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")]
 
 
 @simulate.command("gate", epilog=statuses_words("simulate gate"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from datetime import datetime
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,6 +11,7 @@ from rich.filesize import decimal
 
 from cdtool.cli.console import plain, print_json, table
 from cdtool.cli.options import JsonOption
+from cdtool.cli.place import Place, location
 from cdtool.exit_status import statuses_words
 from cdtool.plain_text import counted
 
@@ -29,7 +29,9 @@ def _store() -> None:
     """Show what a store of benchmark outcomes contains, and remove what is no longer used."""
 
 
-FolderArgument = Annotated[Path, typer.Argument(help="Folder given to cdtool benchmark as --store.", metavar="DIR")]
+FolderArgument = Annotated[
+    Place, typer.Argument(parser=location, help="Folder given to cdtool benchmark as --store.", metavar="DIR")
+]
 
 
 @store.command("status", epilog=statuses_words("store status"))

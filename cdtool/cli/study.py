@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cdtool.cli.console import number, plain, print_json, table
 from cdtool.cli.options import ForceOption, JsonOption, MachineOption
+from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
 from cdtool.exit_status import statuses_words
 
@@ -31,7 +31,10 @@ def _study() -> None:
 def sensors(
     machine: MachineOption,
     file: Annotated[
-        Path | None, typer.Option("--study", help="TOML: [impact], [drive], [controller], [sensors.*]; docs/study.md.")
+        Place | None,
+        typer.Option(
+            "--study", parser=location, help="TOML: [impact], [drive], [controller], [sensors.*]; docs/study.md."
+        ),
     ] = None,
     joint: Annotated[str, typer.Option("--joint", help="Joint to study; required if there are several.")] = "",
     speed: Annotated[float | None, typer.Option("--speed", help="Load speed at contact [m/s].")] = None,
@@ -47,7 +50,9 @@ def sensors(
         float, typer.Option("--k", help="Detection limit: k sigma of the noise plus the resolution.")
     ] = 5.0,
     as_json: JsonOption = False,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="A figure: .png, .svg, .pdf.")] = None,
+    output: Annotated[
+        Place | None, typer.Option("--output", "-o", parser=location, help="A figure: .png, .svg, .pdf.")
+    ] = None,
     force: ForceOption = False,
 ) -> None:
     """Rank the sensors by when they detect an impact, with the force and the limiting factor (thesis figure 4.10).
@@ -83,7 +88,7 @@ def sensors(
 
 @study.command("figures", epilog=statuses_words("study figures"))
 def figures(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Output folder.")],
+    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")],
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
 import re
 import sys
 from collections import Counter
@@ -106,7 +107,7 @@ def _opened(asammdf: Any, path: Path) -> Any:
     """
     hook = sys.unraisablehook
     try:
-        return asammdf.MDF(path)
+        return asammdf.MDF(os.fspath(path))
     except Exception as fault:
         reason = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]
         sys.unraisablehook = lambda _: None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -77,7 +78,7 @@ class _ArrowTable:
         with path.open("rb") as file:
             self.kind = "parquet" if file.read(4) == _PARQUET else "feather"
         if self.kind == "parquet":
-            self._file = library("pyarrow.parquet", "parquet", path).ParquetFile(path)
+            self._file = library("pyarrow.parquet", "parquet", path).ParquetFile(os.fspath(path))
             self.schema, self._batches = self._file.schema_arrow, self._of_parquet
         else:
             self._file = _Feather(path, arrow, findings)
@@ -174,7 +175,7 @@ class _Feather:
         self._ipc = library("pyarrow.ipc", "parquet", path)
         check_batches(path)
         try:
-            self._whole = self._ipc.open_file(str(path))
+            self._whole = self._ipc.open_file(os.fspath(path))
             self.schema = self._whole.schema
         except arrow.ArrowInvalid:
             self._whole = None

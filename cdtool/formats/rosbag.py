@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,7 +48,7 @@ class Rosbag:
         """Return the `name` list of a topic's first message; empty if the message has no such list."""
         from rosbags.highlevel import AnyReader
 
-        with one_line_errors(path, "a ROS bag"), AnyReader([path]) as reader:
+        with one_line_errors(path, "a ROS bag"), AnyReader([Path(os.fspath(path))]) as reader:
             chosen = [connection for connection in reader.connections if connection.topic == topic]
             for connection, _, raw in reader.messages(connections=chosen):
                 names = getattr(reader.deserialize(raw, connection.msgtype), "name", ())
@@ -69,7 +70,7 @@ class _Ros1Bag(Bag):
         from rosbags.highlevel import AnyReader
 
         with one_line_errors(self.path, "a ROS bag"):
-            reader = AnyReader([self.path])
+            reader = AnyReader([Path(os.fspath(self.path))])
             reader.open()
         try:
             with one_line_errors(self.path, "a ROS bag"):

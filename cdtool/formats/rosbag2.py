@@ -10,6 +10,7 @@ closed has a journal beside it, which SQLite can only apply to a copy: both are 
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import sqlite3
@@ -32,6 +33,7 @@ from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.schemas import DEFINITIONS
 from cdtool.messages.stream import Stream
+from cdtool.remote.remote_path import location
 
 _SQLITE, _ZSTD = b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
 _FIRST_PAGE = 2**16  # SQLite's largest page size [bytes]; the first page contains the names of the tables
@@ -65,7 +67,7 @@ class Rosbag2:
             head = _first_page(path)
         if not head.startswith(_SQLITE):
             return False
-        journal = Path(f"{path}{_JOURNALS[0]}")  # of a bag that was not closed, it may have all but the first bytes
+        journal = location(f"{path}{_JOURNALS[0]}")  # of a bag that was not closed, it may have all but the first bytes
         return b"messages" in head or (_is_filled(journal) and b"messages" in _head(journal))
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
@@ -142,7 +144,7 @@ class _Ros2Bag(Bag):
     @contextmanager
     def _database(self) -> Iterator[Path]:
         """Yield the database as a file: the bag itself, or a temporary copy if it is compressed or was not closed."""
-        journals = [path for path in (Path(f"{self.path}{end}") for end in _JOURNALS) if _is_filled(path)]
+        journals = [path for path in (location(f"{self.path}{end}") for end in _JOURNALS) if _is_filled(path)]
         compressed = _head(self.path).startswith(_ZSTD)
         if not compressed and not journals:
             yield self.path
@@ -202,7 +204,7 @@ class _Ros2Bag(Bag):
 
 def _connect(file: Path, damaged: bool = False) -> sqlite3.Connection:
     """Open a database for reading tables only; with `damaged`, SQLite does not refuse it before it meets the damage."""
-    base = sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
+    base = sqlite3.connect(f"{Path(os.fspath(file)).absolute().as_uri()}?mode=ro&immutable=1", uri=True)
     base.text_factory = lambda text: text.decode("utf-8", "replace")
     base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST)
     base.execute("PRAGMA trusted_schema=OFF")

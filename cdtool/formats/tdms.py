@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -60,7 +61,7 @@ class Tdms(PiecewiseFormat):
         with (
             one_line_errors(path, "a TDMS file"),
             collect_warnings("nptdms") as warnings,
-            nptdms.TdmsFile.open(path) as file,
+            nptdms.TdmsFile.open(os.fspath(path)) as file,
         ):
             channels = _channels(file, findings)
             keys = [key for key in requested_keys(path, wanted, tuple(channels)) if some is None or key in some]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import redirect_stdout
@@ -92,7 +93,7 @@ class _EndCheck:
 
 def _check_formats(path: Path, pyulog: Any) -> None:
     """Raise RecordingError if a message has more fields than any of PX4; messages inside of messages multiply them."""
-    header = pyulog.ULog(str(path), parse_header_only=True)
+    header = pyulog.ULog(os.fspath(path), parse_header_only=True)
     formats: Mapping[str, Any] = header.message_formats
     known: dict[str, int] = {}
 

@@ -30,6 +30,7 @@ from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, uni
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
+from cdtool.remote.remote_path import RemotePath
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 # A file of at most this many bytes is read at once for its digest.
@@ -87,7 +88,12 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file's bytes, as hexadecimal digits."""
+    """Return the SHA-256 of a file's bytes, as hexadecimal digits.
+
+    Of a file at a URL that is read by ranges it is "etag:" and the digest of its ETag and size: its version.
+    """
+    if isinstance(path, RemotePath) and path.is_read_by_ranges():
+        return path.digest()
     with path.open("rb", buffering=0) as file:
         if os.fstat(file.fileno()).st_size <= _READ_AT_ONCE:
             return hashlib.sha256(file.readall()).hexdigest()

@@ -22,6 +22,7 @@ from cdtool.findings.clocks import ClocksApart, FileAligned, TriggersDiffer, Tri
 from cdtool.formats.source import Source
 from cdtool.ingest.channel_assembly import assemble_recording
 from cdtool.recording import FloatArray, Recording, Series
+from cdtool.remote.remote_path import location
 
 # A trigger rises where it comes to the upper share of its range after the lower one. It has two levels: at most this
 # share of its samples is between them, of noise most are.
@@ -88,7 +89,7 @@ class _Shift:
 def _with_file(
     recording: Recording, item: ChannelSource, own: OwnFile, beside: Recording, trigger: ReadTrigger
 ) -> Recording:
-    name, path = item.channel, Path(beside.source)
+    name, path = item.channel, location(beside.source)
     findings = [replace(found, file=path.name) for found in beside.findings if not isinstance(found.fact, ClocksApart)]
     if name not in beside:
         absent = [found.fact for found in beside.findings if isinstance(found.fact, AbsentTruth)]

@@ -20,6 +20,7 @@ from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.findings.parts import PartCompressed, PartGap, PartMissing, PartOfOtherKind, PartsOverlap, PartUnreadable
 from cdtool.formats.source import Source, TopicDetails
 from cdtool.recording import GROUND_TRUTH, Recording, Series
+from cdtool.remote.remote_path import location
 
 # First and last time [s].
 Span = tuple[float, float]
@@ -173,7 +174,7 @@ def join_recordings(parts: Sequence[Recording], name: str) -> Recording:
         time = np.concatenate([part[channel].time + (part.origin - first.origin) for part in containing])
         values = np.concatenate([part[channel].values for part in containing])
         joined[channel] = Series(time, values, containing[0][channel].unit)
-    findings = tuple(found for part in parts for found in with_file_name(Path(part.source), part.findings))
+    findings = tuple(found for part in parts for found in with_file_name(location(part.source), part.findings))
     findings += tuple(part_gap_findings(spans))
     source = ", ".join(part.source for part in parts)
     digest = join_digests([part.digest for part in parts])

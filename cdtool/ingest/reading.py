@@ -38,6 +38,7 @@ from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import Recording, Series
+from cdtool.remote.remote_path import location
 
 # The parts of a log in a folder; the first kind that is there is read.
 _PARTS = ("*.mcap", "*.db3", "*.db3.zstd", "*.db3.zst")
@@ -358,7 +359,7 @@ def _read_head(path: Path) -> bytes:
             raise RecordingError(f"{path}: is a folder", "name the recordings in it, e.g. with *.csv")
         if not path.exists():
             whole, mark, _ = str(path).rpartition("#")
-            is_run = mark and Path(whole).exists()
+            is_run = mark and location(whole).exists()
             hint = f"for a run of {whole}, state how it is cut, e.g. --operations column:NAME" if is_run else ""
             raise RecordingError(f"{path}: no such file", hint or "check the path")
         if not path.is_file():

@@ -30,6 +30,7 @@ from cdtool.machine_file import MachineFile
 from cdtool.operations import RunCut
 from cdtool.plain_text import counted, first_of
 from cdtool.recording import GROUND_TRUTH, FloatArray
+from cdtool.remote.remote_path import location
 
 # A run with fewer samples than this is left out: too few for a clock's usual step.
 FEWEST_SAMPLES = 8
@@ -71,8 +72,8 @@ def split_run(log: Path) -> tuple[Path, str]:
     if _MARK not in text or log.exists():
         return log, ""
     places = [i for i, character in enumerate(text) if character == _MARK]
-    place = next((i for i in places if Path(text[:i]).exists()), places[-1])
-    return Path(text[:place]), text[place + 1 :]
+    place = next((i for i in places if location(text[:i]).exists()), places[-1])
+    return location(text[:place]), text[place + 1 :]
 
 
 def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
@@ -122,7 +123,7 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
         try:
             runs.append(whole.recording(run, name, digest))
         except RecordingError as fault:
-            left_out.append((Path(f"{path}{_MARK}{name}"), str(fault).removeprefix(f"{path}{_MARK}{name}: ")))
+            left_out.append((location(f"{path}{_MARK}{name}"), str(fault).removeprefix(f"{path}{_MARK}{name}: ")))
     if not runs:
         raise RecordingError(f"{left_out[0][0]}: {left_out[0][1]}", "check the log with cdtool info")
     findings = [*whole.source.findings, *whole.outside()]
@@ -267,7 +268,7 @@ class _CutLog:
 
     def recording(self, run: int, name: str, digest: str) -> LoggedRecording:
         """Return a run as logged; raises RecordingError if a channel has no sample in it."""
-        path = Path(f"{self.path}{_MARK}{name}")
+        path = location(f"{self.path}{_MARK}{name}")
         source, first_row = self.source, self.source.first_row
         columns: dict[str, Column] = {}
         known: dict[int, FloatArray] = {}

@@ -74,7 +74,7 @@ def _pinocchio(path: Path) -> Any:
 def _build(pinocchio: Any, path: Path) -> Any:
     with _error_stream() as said:
         try:
-            return pinocchio.buildModelFromUrdf(str(path))
+            return pinocchio.buildModelFromUrdf(os.fspath(path))
         except (ValueError, RuntimeError) as fault:
             lines = [line.strip() for line in said().splitlines() if line.startswith("Error:")]
             reason = lines[0].removeprefix("Error:").strip() if lines else str(fault).partition("\n")[0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,6 +14,7 @@ from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_reader import read_urdf
 from cdtool.recording import FloatArray
+from cdtool.remote.remote_path import joined, location
 from cdtool.tables import Table
 
 # Joints of both kinds: a channel has one unit for all of them, so that each is in its own SI unit.
@@ -44,7 +44,7 @@ class UrdfRobot(CoupledMachine):
         count = len(keys["joints"])
         drives = np.array(table.numbers("drive_inertia", count, 0.0, minimum=0.0))
         drives += np.array(keys["motor_inertia"]) / np.array(keys["transmission_ratio"]) ** 2
-        path = Path(table.where).parent / table.text("urdf")
+        path = joined(location(table.where).parent, table.text("urdf"))
         names = _urdf_names(table, keys["joints"])
         tree = read_urdf(path, names, _values(table, "locked"), drives.tolist(), _gravity(table))
         return cls(**keys, tree=tree, home=table.numbers("home", count, 0.0))

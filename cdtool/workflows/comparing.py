@@ -9,6 +9,7 @@ from cdtool.evaluation.builds.rows import RELEVANT_CHANGE
 from cdtool.evaluation.comparison import SIGNIFICANT
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import read_results
+from cdtool.remote.remote_path import location
 
 
 def compare(
@@ -55,4 +56,4 @@ def compare(
 
 
 def _results(source: str | Path | Results) -> Results:
-    return source if isinstance(source, Results) else read_results(Path(source))
+    return source if isinstance(source, Results) else read_results(location(source))

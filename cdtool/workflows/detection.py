@@ -25,6 +25,7 @@ from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
+from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.baseline import Baseline
 from cdtool.thresholds.limit import Limit
@@ -159,7 +160,7 @@ def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
     >>> [run.detections[0].verdict.outcome for run in found.runs]
     ['alarm']
     """
-    path = Path(log)
+    path = location(log)
     if benchmark := options.prepared():
         return _detect_prepared(path, benchmark)
     cut = RunCut.of(options.operations)
@@ -171,9 +172,9 @@ def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
     skipped, findings = reported(logged, path)
     found: list[Detected] = []
     for item in logged.runs:
-        name = shown_path(Path(item.recording.source))
+        name = shown_path(location(item.recording.source))
         try:
-            whole = named_on_load_side(item, Path(name), run.machine_file, None, run.ranges, run.rules.onset)
+            whole = named_on_load_side(item, location(name), run.machine_file, None, run.ranges, run.rules.onset)
             found.append(run.detect(whole))
         except RecordingError as fault:
             skipped.append(Skipped(name, str(fault).removeprefix(f"{name}: ")))

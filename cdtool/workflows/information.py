@@ -24,6 +24,7 @@ from cdtool.ingest.clock_guess import ReadColumn, TableClock, is_clock_name
 from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Recording, Series
+from cdtool.remote.remote_path import location
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.log_checks.log_findings import log_findings
@@ -99,8 +100,8 @@ def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) ->
     ('csv', 't', 7200)
     """
     if machine is None:
-        return _survey(Path(log))
-    return _mapped(Path(log), machine if isinstance(machine, MachineFile) else read_machine_file(machine))
+        return _survey(location(log))
+    return _mapped(location(log), machine if isinstance(machine, MachineFile) else read_machine_file(machine))
 
 
 def _survey(log: Path) -> Info:

@@ -12,6 +12,7 @@ from cdtool.evaluation.truth.named_rows import by_recording
 from cdtool.ingest.run_reading import split_run
 from cdtool.log_section import MARK_HINT, LogSection, Mark
 from cdtool.machine_file import MachineFile
+from cdtool.remote.remote_path import joined
 from cdtool.tables import Table
 from cdtool.value_words import value_in_words
 from cdtool.workflows.runs import find_logs, resolve_all, shown_path
@@ -123,7 +124,7 @@ def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Seque
                 raise onset.fault(key, "is only for a label file", "name one: labels")
         return None
     base = logs.base
-    path = base / onset.text("labels")
+    path = joined(base, onset.text("labels"))
     labels = read_labels(path, not_contacts=not_contacts, **settings)  # type: ignore[arg-type]  # a checked choice
     runs = logs.runs
     recordings, others = (

@@ -22,6 +22,7 @@ from cdtool.evaluation.statistics.sample_size import (
 from cdtool.evaluation.statistics.spread import Spread, spread_of
 from cdtool.evaluation.summary import campaigns
 from cdtool.plain_text import counted, digits
+from cdtool.remote.remote_path import location
 from cdtool.workflows.keyword_options import by_keywords
 
 
@@ -162,7 +163,7 @@ def measured_std(
     full or short names; `group` is required if there are several. Raises UsageError for an unknown name, a wrong number
     of detectors or fewer than two recordings; RecordingError if the file is not a results file.
     """
-    known = results if isinstance(results, Results) else read_results(Path(results))
+    known = results if isinstance(results, Results) else read_results(location(results))
     names = _detectors(known, detectors, unpaired)
     chosen = _group(known, group)
     rows = [{(item.recording, item.contact): item for item in _contacts(known, name, chosen)} for name in names]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,9 @@ from typing import IO, TYPE_CHECKING
 from cdtool.errors import RecordingError, UsageError
 from cdtool.files import replaced
 from cdtool.findings import Finding
+from cdtool.ingest.channel_assembly import file_digest
+from cdtool.remote.remote_path import is_remote
+from cdtool.remote.uploads import check_place
 
 if TYPE_CHECKING:
     from cdtool.formats.mcap.container.clean_file import CleanFile
@@ -131,7 +133,7 @@ def _write(
     _copy_extras(log, clean)
     lost = [str(finding) for finding in result.findings if finding.severity == "loss"]
     told = {
-        "source_sha256": _digest(source),
+        "source_sha256": file_digest(source),
         "messages": str(result.messages),
         "lost": "\n".join(lost) or "nothing",
         "unverified": f"{result.unverified} messages in chunks without a checksum, {result.left_out} left out",
@@ -159,18 +161,15 @@ def _copy_extras(log: Log, clean: CleanFile) -> None:
 def _check_names(source: Path, output: Path, force: bool) -> None:
     if not source.is_file():
         raise RecordingError(f"{source}: no such file", "check the path")
-    if not os.access(source, os.R_OK):
+    if not is_remote(source) and not os.access(source, os.R_OK):
         raise RecordingError(f"{source}: cannot be read", "check the file's permissions")
     if output.suffix.lower() != ".mcap":
         raise UsageError(f"{output}: must end in .mcap", "choose another name")
-    if not output.parent.is_dir():
+    if is_remote(output):
+        check_place(output)
+    elif not output.parent.is_dir():
         raise UsageError(f"{output}: no folder {output.parent}", "create the folder first")
     if output.exists() and output.samefile(source):
         raise UsageError(f"{output}: is the file to recover", "choose another name")
     if output.exists() and not force:
         raise UsageError(f"{output}: already exists", "choose another name, or overwrite it with --force")
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -20,6 +20,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, Recording
+from cdtool.remote.remote_path import joined, location
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.log_checks.log_findings import log_warnings
@@ -52,7 +53,7 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
     """
     found: dict[Path, None] = {}
     for pattern in patterns:
-        matches = _matches(base / pattern)
+        matches = _matches(joined(base, pattern))
         of_runs = [] if matches else _runs_matching(pattern, base)
         if not matches and not (runs and of_runs):
             hint = 'to name runs of a file, set operations = "column:NAME"' if of_runs else "check the path"
@@ -68,8 +69,8 @@ def _matches(path: Path) -> list[Path]:
 def _runs_matching(pattern: str, base: Path) -> list[Path]:
     """Return FILE#IDS for each file that the part before a # names; a file name may contain the mark, too."""
     for place in (i for i, character in enumerate(pattern) if character == "#"):
-        if files := _matches(base / pattern[:place]):
-            return [Path(f"{file}{pattern[place:]}") for file in files]
+        if files := _matches(joined(base, pattern[:place])):
+            return [location(f"{file}{pattern[place:]}") for file in files]
     return []
 
 
@@ -104,7 +105,7 @@ def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: Plausib
     ((7200, 1), 'm/s')
     """
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
-    return _with_channels(Path(log), read_recording(Path(log), machine_file, ranges))
+    return _with_channels(location(log), read_recording(location(log), machine_file, ranges))
 
 
 def load_operations(
@@ -252,7 +253,7 @@ def load_runs(
         elif cut is None:
             logged += [(path, path, item) for item in log.runs]
         else:
-            logged += [(path, Path(item.recording.source), item) for item in log.runs]
+            logged += [(path, location(item.recording.source), item) for item in log.runs]
             of_log, about_log = reported(log, path, base)
             skipped += of_log
             findings += about_log
@@ -378,8 +379,8 @@ def absent_truth(recording: Recording) -> list[Finding]:
 
 
 def _glob(path: Path) -> Iterator[Path]:
-    root = Path(path.anchor) if path.is_absolute() else Path()
-    pattern = str(path.relative_to(root)) if path.is_absolute() else str(path)
+    root = location(path.anchor) if path.is_absolute() else Path()
+    pattern = path.relative_to(root).as_posix() if path.is_absolute() else str(path)
     # As in a shell, a name that begins with a dot must be matched explicitly. Incomplete files have such names.
     written_out = set(path.parts)
     return (

@@ -24,6 +24,7 @@ from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
+from cdtool.remote.remote_path import location
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, Wanted, outcome_of
@@ -100,7 +101,7 @@ def score(
     >>> [(row.group, row.detected, row.missed, row.false_alarms) for row in scored.evaluated.summaries]
     [('stiff', 4, 0, 0), ('soft', 2, 1, 0), ('holdout', 0, 0, 1)]
     """
-    given, workers = read_triggers(Path(triggers)), workers or Workers(jobs)
+    given, workers = read_triggers(location(triggers)), workers or Workers(jobs)
     setup = read_benchmark_file(benchmark, learning=False, also_known=tuple(given.rows))
     with workers.ready(to_be_seen([path for item in setup.impacts.values() for path in item.logs])):
         return _run(setup, given, workers, clock, listed_only, progress)

@@ -13,6 +13,8 @@ ROOT = Path(__file__).parents[2]
 BLOCKS = {"replaced", "replaced_folder", "TemporaryDirectory"}
 WRITES = {"write_text", "write_bytes", "rename", "renames", "touch", "mkstemp", "NamedTemporaryFile", "savefig"}
 ELSEWHERE = {
+    "cdtool/remote/staging.py": "locks a temporary folder of its own",
+    "cdtool/remote/transferred.py": "writes into that folder",
     "cdtool/cli/streams.py": "opens the null device",
     "cdtool/workflows/execution/in_worker.py": "opens the null device",
     "cdtool/workflows/store/journal.py": "appends to a file that the next run takes over if this one is killed",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import warnings
 import zipfile
@@ -138,7 +139,7 @@ def _opened(openpyxl: Any, path: Path, with_values: bool) -> Iterator[Any]:
     """Yield the workbook: its values, or its formulas."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about parts of a workbook that are not data
-        workbook = openpyxl.load_workbook(path, read_only=True, data_only=with_values, keep_links=False)
+        workbook = openpyxl.load_workbook(os.fspath(path), read_only=True, data_only=with_values, keep_links=False)
         try:
             yield workbook
         finally:

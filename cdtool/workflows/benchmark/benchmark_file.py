@@ -25,6 +25,7 @@ from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import RunCut
 from cdtool.plain_text import counted, digits
+from cdtool.remote.remote_path import joined, location
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.base import Threshold, is_per_run
 from cdtool.thresholds.signature import Signature
@@ -172,7 +173,7 @@ class BenchmarkFile:
     def inputs(self) -> tuple[Path, ...]:
         """Return every file that is read for the benchmark; none of them may be overwritten."""
         logs = (*self.learn, *(path for group in self.impacts.values() for path in group.logs))
-        labels = (Path(self.labels.source),) if self.labels else ()
+        labels = (location(self.labels.source),) if self.labels else ()
         files = tuple(dict.fromkeys(split_run(log)[0] if self.has_runs else log for log in logs))
         beside = (path for log in files for path in self.machine_file.files_beside(log))
         return (self.path, self.machine_file.path, *files, *labels, *beside)
@@ -197,13 +198,13 @@ def read_benchmark_file(
     external alarms, the file needs neither detectors nor logs to learn from, and [limits] may be set for the detectors
     `also_known`.
     """
-    file = Path(path)
+    file = location(path)
     root = Table(read_toml(file, "a benchmark file"), str(file))
     if isinstance(root.raw("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
     base = file.parent
-    machine_file = read_machine_file(base / root.text("machine"))
+    machine_file = read_machine_file(joined(base, root.text("machine")))
     wanted = root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
@@ -339,7 +340,7 @@ def _groups(
         raise tables.fault(
             HOLDOUT, "is the name of the impact-free group", "choose another name for the group of impacts"
         )
-    profiles = read_force_limits(found.base / force.text("limits") if "limits" in force else None)
+    profiles = read_force_limits(joined(found.base, force.text("limits")) if "limits" in force else None)
     profile = force.text("profile", "")
     if profile:
         _profile(profiles, force, "profile", force)
@@ -409,7 +410,7 @@ def _under_scored_paths(learn: Mapping[Path, LogSection], scored: Sequence[Path]
     for path, section in learn.items():
         file, ids = split_run(path)
         known = files.get(file.resolve(), file)
-        found[Path(f"{known}#{ids}") if ids else known] = section
+        found[location(f"{known}#{ids}") if ids else known] = section
     return found
 
 

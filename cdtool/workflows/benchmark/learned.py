@@ -10,7 +10,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -21,6 +20,7 @@ from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges, PlausibleRanges
+from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.normal_motion import NormalMotion
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict
@@ -136,7 +136,7 @@ class Teaching:
             calibration=tuple(made.calibration),
             unusable=made.unusable,
             names=tuple(operation.name for operation in used),
-            digests={shown_path(Path(item.recording.source), base): item.recording.digest for item in used},
+            digests={shown_path(location(item.recording.source), base): item.recording.digest for item in used},
             sources={item.recording.digest: item.whole.name for item in runs.operations},
         )
         normals = normals_for(runs.operations, self.setup.rule)

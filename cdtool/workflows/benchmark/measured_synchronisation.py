@@ -17,6 +17,7 @@ from cdtool.findings.synchronisation import MeasuredSynchronisation
 from cdtool.log_section import LogSection
 from cdtool.operations import RunCut
 from cdtool.plain_text import counted
+from cdtool.remote.remote_path import location
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.execution.workers import Workers, in_order
@@ -52,7 +53,7 @@ class _LogAudit:
             return []  # left out with its reason when it is scored
         audited = []
         for logged in runs:
-            run = path if cut is None else Path(logged.recording.source)
+            run = path if cut is None else location(logged.recording.source)
             try:
                 whole = named_on_load_side(logged, run, setup.machine_file, setup.path.parent, None, setup.onset)
                 section = setup.sections.get(path, LogSection())

@@ -10,6 +10,7 @@ from time import perf_counter
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.ingest.run_reading import split_run
+from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, LogRows, TheseTraces, Wanted, WantedTraces
 from cdtool.workflows.runs import shown_path
@@ -71,8 +72,10 @@ class PieceScoring:
         before = state_of(files)
         outcomes = self.score(piece.group, piece.path, piece.wanted, piece.detectors)
         sources = self._sources(piece, files, before, outcomes) if self.with_sources else None
-        if state_of(files) != before or sources == ():
-            changed = Skipped(shown_path(piece.path, self.setup.path.parent), "changed while it was read")
+        after = state_of(files)
+        if after != before or sources == ():
+            why = "changed while it was read" if after is not None else "was removed, or cannot be reached, meanwhile"
+            changed = Skipped(shown_path(piece.path, self.setup.path.parent), why)
             return PieceOutcome((LogOutcome(LogRows(None, skipped=(changed,), unread=True), lasts=False),))
         lasting = sources if all(item.lasts for item in outcomes) else None
         return PieceOutcome(tuple(outcomes), lasting, perf_counter() - begin)
@@ -86,6 +89,8 @@ class PieceScoring:
         known = piece.sources
         if known is not None and tuple((item.size, item.modified) for item in known) != before:
             known = None
+        if is_remote(piece.path):  # what was read is known by its SHA-256, a file at a URL by its version
+            return known or read_sources(files)
         recording = outcomes[0].recording
         if recording is None or not recording.sha256 or len(files) > 1 or self.setup.has_runs or piece.path.is_dir():
             return known or read_sources(files)

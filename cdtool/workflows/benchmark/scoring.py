@@ -28,6 +28,7 @@ from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, FloatArray, Recording
+from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.force_rows import force_rows
@@ -176,7 +177,7 @@ def score_runs(
     about_log.skipped, about_log.findings = reported(runs, path, setup.path.parent)
     scored = [about_log]
     for logged in runs.runs:
-        run = Path(logged.recording.source)
+        run = location(logged.recording.source)
         detect, untaught = detection_of(run)
         scored.append(_score(setup, group, path, detect, factors, _OneRun(setup, run, logged, ranges)))
         scored[-1].untaught = untaught
@@ -305,6 +306,7 @@ def _recording_result(
         contacts=contacts,
         campaign=setup.campaigns.get(path),
         point=setup.points.get(path),
+        began_s=recording.began,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from cdtool.ingest.reading import LogFolder, log_parts
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
 from cdtool.recording import UNITLESS
+from cdtool.remote.remote_path import joined, location, relative_name
 from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
 from cdtool.workflows.convert.section_rows import Rows, SectionRows
@@ -108,7 +108,7 @@ def convert(
     >>> converted.files, converted.columns
     (('stiff-03.mcap',), 7)
     """
-    log, target = Path(source), Path(output)
+    log, target = location(source), location(output)
     writer = _writer(target)
     parts = log_parts(log)
     _check_apart(target, log, parts)
@@ -229,8 +229,8 @@ def _converted_machine(
         kept = f"# Put [machine] of {machine_file.path.name} here.\n"
     urdf = _stated_urdf(text)
     if urdf and machine_file.path.parent.resolve() != target.parent.resolve():
-        place = os.path.relpath(machine_file.path.parent / urdf, target.parent)
-        kept = _URDF.sub(lambda match: f"{match[1]}{_text(Path(place).as_posix())}", kept)
+        place = relative_name(joined(machine_file.path.parent, urdf), target.parent)
+        kept = _URDF.sub(lambda match: f"{match[1]}{_text(place)}", kept)
     mapped = machine_file.topics if machine_file.topics.sources else machine_file.columns
     kinds = next((item.kinds for item in mapped.sources if item.channel == "label"), ())
     return f"{kept.rstrip()}\n\n{_channels(log, groups, names, mapped.speed_low_pass, kinds)}"

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cdtool.errors import UsageError, WorkerError
+from cdtool.remote.staging import release
 from cdtool.workflows.execution.in_worker import Failed, keep_freed_memory
 
 Item = TypeVar("Item")
@@ -172,7 +173,7 @@ def in_order(
     workers = workers or Workers()
     if total > 1:
         keep_freed_memory()
-    made = _made(work, items, total, workers, of_lost, together)
+    made = _made(_Releasing(work), items, total, workers, of_lost, together)
     with _without_earlier_garbage():
         for number, result in enumerate(made, 1):
             yield result
@@ -215,6 +216,20 @@ def _on_cluster(
     with session_of(workers.cluster, workers.jobs) as session:
         pool = ClusterWorkers(session, work, workers.timeout)
         yield from _Ordered(pool, total, workers.retries, of_lost, together).results(items)
+
+
+@dataclass(frozen=True)
+class _Releasing:
+    """Does the work on one item, and then removes the local copies of files at URLs that were made for it."""
+
+    work: Callable[[Any], Any]
+
+    def __call__(self, item: Any) -> Any:
+        """Return the result of the item."""
+        try:
+            return self.work(item)
+        finally:
+            release()
 
 
 @contextmanager

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from cdtool.operations import operations_of
 from cdtool.pipeline import run_detector
 from cdtool.plain_text import counted, digits
 from cdtool.recording import GROUND_TRUTH, Recording
+from cdtool.remote.remote_path import relative_name
 from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
@@ -108,7 +108,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         beside["labels.csv"] = _label_file(impacts, folder)
     lines = [
         f"# Draft by cdtool init from {counted(len(known), 'log')}: check each line marked CHECK.",
-        f"machine = {json.dumps(_relative(machine_file.path, folder), ensure_ascii=False)}",
+        f"machine = {json.dumps(relative_name(machine_file.path, folder), ensure_ascii=False)}",
         f"detectors = {_listed(usable)}",
         *([f"# With inertia and friction in the machine file also: {', '.join(others)}"] if others else []),
         *_learning(impacts, free, folder, "position" in first),
@@ -213,12 +213,12 @@ def _comments(unknown: Sequence[_Log], folder: Path) -> list[str]:
     if not unknown:
         return []
     return ["", "# Not used: without load cell, label or event it is unknown whether they contain an impact:"] + [
-        f"#   {_relative(log.path, folder)}" for log in unknown
+        f"#   {relative_name(log.path, folder)}" for log in unknown
     ]
 
 
 def _label_file(logs: Sequence[_Log], folder: Path) -> str:
-    rows = [f"{_relative(log.path, folder)},," for log in logs]
+    rows = [f"{relative_name(log.path, folder)},," for log in logs]
     return "\n".join(["recording,start_s,end_s", *rows]) + "\n"
 
 
@@ -258,7 +258,7 @@ def patterns(logs: Sequence[Path], folder: Path) -> list[str]:
         wanted = {path.resolve() for path in members}
         fitting = [each for each in candidates if {path.resolve() for path in parent.glob(each)} == wanted]
         names = fitting[:1] if fitting and len(members) > 1 else [path.name for path in members]
-        found += [_relative(parent / name, folder) for name in names]
+        found += [relative_name(parent / name, folder) for name in names]
     return found
 
 
@@ -267,7 +267,3 @@ def _listed(texts: Iterable[str]) -> str:
     quoted = [json.dumps(text, ensure_ascii=False) for text in texts]
     line = f"[{', '.join(quoted)}]"
     return line if len(line) < 100 else "[\n" + "".join(f"    {text},\n" for text in quoted) + "]"
-
-
-def _relative(path: Path, folder: Path) -> str:
-    return Path(os.path.relpath(path, folder)).as_posix()

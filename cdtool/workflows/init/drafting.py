@@ -20,6 +20,7 @@ from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.source import Format, Source
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
+from cdtool.remote.remote_path import location
 from cdtool.tables import Table
 from cdtool.workflows.information import info
 from cdtool.workflows.init.benchmark_draft import draft_benchmark
@@ -95,9 +96,9 @@ def init(
     >>> "[machine]" in draft.text, "CHECK" in draft.text, "speed" in draft.channels
     (True, True, True)
     """
-    target = Path(output)
+    target = location(output)
     _refuse_existing(force, target)
-    drafted = replace(_settled(Path(log), _drafted(Path(log), csv or {})), path=str(target))
+    drafted = replace(_settled(location(log), _drafted(location(log), csv or {})), path=str(target))
     write_text(target, drafted.text)
     return drafted
 
@@ -161,12 +162,12 @@ def init_study(
     >>> "[impacts.stiff]" in study.text, "above_n" in study.text
     (True, True)
     """
-    target, paths = Path(folder), [Path(log) for log in logs]
+    target, paths = location(folder), [location(log) for log in logs]
     file = target / "benchmark.toml"
     _refuse_existing(force, file, *([target / "machine.toml"] if machine is None else []))
     target.mkdir(parents=True, exist_ok=True)
     drafted = None if machine is not None else init(paths[0], target / "machine.toml", force=force, csv=csv)
-    machine_path = Path(machine) if machine is not None else target / "machine.toml"
+    machine_path = location(machine) if machine is not None else target / "machine.toml"
     made = draft_benchmark(paths, read_machine_file(machine_path), target)
     _refuse_existing(force, *(target / name for name in made.beside))
     write_text(file, made.text)

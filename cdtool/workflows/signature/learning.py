@@ -15,6 +15,7 @@ from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, machine_parameters, read_machine_file
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
+from cdtool.remote.remote_path import location
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.signature import Signature
@@ -133,7 +134,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
     _refuse_by_hand(wanted, budget)
     instance = machine_file.detector(options.detector)
-    paths = [Path(log) for log in logs]
+    paths = [location(log) for log in logs]
     part = _part(paths, options)
     workers = options.workers or Workers(options.jobs)
     reading = RunReading(operations, onset=options.onset, part=part, workers=workers, progress=options.progress)

@@ -20,6 +20,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
 from cdtool.plain_text import counted
+from cdtool.remote.remote_path import location
 from cdtool.signature_file import SignatureFile, with_run
 from cdtool.signature_store import read_signature, update_signature
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
@@ -132,7 +133,7 @@ class SeasonOptions:
         operations = _cut(file, self.operations)
         workers = self.workers or Workers(self.jobs)
         reading = RunReading(operations, onset=self.onset, workers=workers, progress=self.progress)
-        return load_runs([Path(log) for log in self.logs], machine_file, reading, file.plausible)
+        return load_runs([location(log) for log in self.logs], machine_file, reading, file.plausible)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cdtool.remote.remote_path import RemotePath
+
 # Read at a time [bytes].
 _PIECE = 1 << 20
 
@@ -16,7 +18,10 @@ State = tuple[tuple[int, int], ...] | None
 
 @dataclass(frozen=True)
 class SourceFile:
-    """One file of a log: its size [bytes], when it was last changed [ns], and the SHA-256 of its content."""
+    """One file of a log: its size [bytes], when it was last changed [ns], and the SHA-256 of its content.
+
+    Of a file at a URL the digest is that of its ETag and size, so that its content need not be read.
+    """
 
     size: int
     modified: int
@@ -44,7 +49,7 @@ def read_sources(files: Sequence[Path]) -> tuple[SourceFile, ...] | None:
     if before is None:
         return None
     try:
-        digests = [file_sha256(path) for path in files]
+        digests = [path.digest() if isinstance(path, RemotePath) else file_sha256(path) for path in files]
     except OSError:
         return None
     if state_of(files) != before:

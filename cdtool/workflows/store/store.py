@@ -6,7 +6,7 @@
     *.journal                 entries of a run that is under way
 
 Several processes may write at the same time: each writes files of its own. An entry that two of them compute is there
-twice, which changes nothing.
+twice, which changes nothing. At a URL there is no journal: parts are written more often.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ import numpy.typing as npt
 from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.files import write_bytes, write_text
+from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
 from cdtool.workflows.store.journal import Journal, left_behind
@@ -37,6 +38,9 @@ _KIND, _SCHEMA = "cdtool store", 1
 _MARK = "store.json"
 # A part is written when it has so many entries, or characters of content.
 _MOST_ENTRIES, _MOST_CONTENT = 4000, 32 << 20
+# Of a store at a URL, which has no journal, so many entries are lost at most with a process that is killed, or what was
+# computed in this time [s].
+_MOST_AT_RISK, _AT_RISK_SECONDS = 200, 30.0
 # A place is the number of a part, and that of a row in these bits.
 _ROW_BITS = 32
 _ROW = (1 << _ROW_BITS) - 1
@@ -63,6 +67,7 @@ class Store:
         self._journal: Journal | None = None
         self._waiting: list[Entry] = []
         self._content = 0
+        self._flushed = time.monotonic()
         self._parts: OrderedDict[Path, dict[str, list[Any]]] = OrderedDict()
         if writes:
             for path, entries in left_behind(folder):
@@ -118,13 +123,19 @@ class Store:
         """Add entries: they outlive this process when it returns, except on an object store."""
         if not self.writes:
             return
-        if self._journal is None:
+        if self._journal is None and not is_remote(self.folder):
             self._journal = Journal(self.folder)
-        self._journal.add(entries)
+        if self._journal is not None:
+            self._journal.add(entries)
         self._waiting += entries
         self._content += sum(len(item.content) for item in entries)
-        if len(self._waiting) >= _MOST_ENTRIES or self._content >= _MOST_CONTENT:
+        is_enough = len(self._waiting) >= _MOST_ENTRIES or self._content >= _MOST_CONTENT
+        if is_enough or (self._journal is None and self._is_due()):
             self.flush()
+
+    def _is_due(self) -> bool:
+        """Return whether a part is written without a journal: what is not in a part is lost with this process."""
+        return len(self._waiting) >= _MOST_AT_RISK or time.monotonic() - self._flushed >= _AT_RISK_SECONDS
 
     def flush(self) -> None:
         """Write the entries that were added to a part."""
@@ -133,6 +144,7 @@ class Store:
         if self._journal is not None:
             self._journal.clear()
         self._waiting, self._content = [], 0
+        self._flushed = time.monotonic()
 
     @contextmanager
     def writing(self) -> Iterator[Store]:

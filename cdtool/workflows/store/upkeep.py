@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cdtool.errors import UsageError
+from cdtool.remote.remote_path import location
 from cdtool.workflows.store.entry import Entry
 from cdtool.workflows.store.store import RunRecord, Store, read_columns, read_keys, read_runs, require_store, write_part
 
@@ -47,7 +48,7 @@ class Collected:
 
 def store_status(folder: str | Path) -> StoreStatus:
     """Return what a store contains; raises ConfigurationError if the folder is not a store."""
-    store = Store(Path(folder), writes=False)
+    store = Store(location(folder), writes=False)
     runs = read_runs(store.folder)
     used: set[bytes] = set()
     for path, _ in runs:
@@ -105,8 +106,8 @@ def collect_garbage(folder: str | Path, *, keep_runs: int = 10, older_than_days:
     """
     if keep_runs < 0 or older_than_days < 0.0:
         raise UsageError("a number of runs or days is negative", "give 0 or more")
-    require_store(Path(folder))
-    store = Store(Path(folder))
+    require_store(location(folder))
+    store = Store(location(folder))
     before = _size(store.folder)
     runs = read_runs(store.folder)
     used: set[bytes] = set()

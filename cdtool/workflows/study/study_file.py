@@ -22,6 +22,7 @@ from cdtool.machine_file import MachineFile
 from cdtool.machines.axis import Axis
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.joint_machine import LINEAR_UNITS, ROTARY_UNITS, JointMachine
+from cdtool.remote.remote_path import location
 from cdtool.tables import Table, read_toml
 
 _DRIVE_FREQUENCY = 10.0
@@ -51,7 +52,7 @@ def read_study(
     for name, value in options.items():
         if not 0.0 < value < math.inf:
             raise UsageError(f"{name} is {value:g}", "give a number above 0")
-    root = Table(_merged(read_toml(Path(file), "a study file") if file else {}, options), str(file or "study"))
+    root = Table(_merged(read_toml(location(file), "a study file") if file else {}, options), str(file or "study"))
     reader = StudyReader(root)
     part = _studied_joint(machine, joint, reader)
     case = _case(part, reader)

@@ -10,12 +10,14 @@ from cdtool.formats.mcap.container.serialisation import string, uint64
 _LONGEST_TEXT = 1 << 16
 
 
-def check_attachment(file: FileBytes, at: int, length: int) -> None:
-    """Check the attachment record of `length` bytes at byte `at`; raises DamageError."""
+def check_attachment(file: FileBytes, at: int, length: int, *, with_crc: bool = True) -> None:
+    """Check the attachment record of `length` bytes at byte `at`, its content `with_crc`; raises DamageError."""
     index, end = _read(file, at, length)
     end += index.data_size
     if end + 4 > at + length:
         raise DamageError("the declared data size of an attachment exceeds its record")
+    if not with_crc:
+        return
     stated = int.from_bytes(file.read(end, 4), "little")
     if stated and stated != file.crc(at + PREFIX, end):
         raise DamageError("the checksum of an attachment does not match")

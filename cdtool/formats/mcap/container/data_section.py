@@ -42,7 +42,7 @@ from cdtool.formats.mcap.container.records import (
     Metadata,
     Schema,
 )
-from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
+from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes, only_message_indexes_between
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.fast_path import ChunkReader, ChunkRows
@@ -220,8 +220,18 @@ class DataSection:
             following, length = self._following.get(header.at), index.message_index_length
             # An entry is smaller than its message: longer indexes are read one by one.
             if following == end + length and length <= index.uncompressed_size:
-                return following if only_message_indexes(self._file.read(end, length)) else end
+                return following if self._only_message_indexes(header.at, end, length) else end
         return end
+
+    def _only_message_indexes(self, chunk: int, at: int, length: int) -> bool:
+        if chunk in self._skip and self._file.remote is not None:
+            return only_message_indexes_between(self._file, at, at + length)
+        return only_message_indexes(self._file.read(at, length))
+
+    @property
+    def is_partly_read(self) -> bool:
+        """Return whether parts of a file at a URL are not read: a checksum of more than a chunk is not checked."""
+        return self._file.remote is not None and bool(self._skip)
 
     def _cut_chunk(self, header: ChunkHeader) -> Iterator[MessageBlock]:
         """Yield the messages before the cut of a chunk that the end of the file cuts off."""
@@ -282,7 +292,7 @@ class DataSection:
         elif opcode in (Attachment.opcode, Metadata.opcode):
             try:
                 if opcode == Attachment.opcode:
-                    check_attachment(self._file, at, length)
+                    check_attachment(self._file, at, length, with_crc=not self.is_partly_read)
                 else:
                     Metadata.read(self._file.read(body, min(length - PREFIX, LARGEST)))
             except DamageError as fault:

@@ -1,4 +1,4 @@
-"""Random access to the bytes of a file, by reading.
+"""Random access to the bytes of a file, by reading; of a large one at a URL, by ranges of it.
 
 If the file shrinks or the drive fails, this raises an error; with a memory-mapped file the process would crash.
 """
@@ -6,6 +6,7 @@ If the file shrinks or the drive fails, this raises an error; with a memory-mapp
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -15,6 +16,8 @@ import numpy as np
 from cdtool.formats.mcap.container.checksums import crc32
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.walk_kernel import Bytes
+from cdtool.remote.ranges import RangedBytes
+from cdtool.remote.remote_path import RemotePath
 
 _PIECE, _SMALL = 1 << 20, 1 << 12
 _POSITIONED = hasattr(os, "preadv")  # reading from a position without moving to it first; not on Windows
@@ -25,8 +28,9 @@ class FileBytes:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._file = path.open("rb", buffering=0)
-        self.size = self._file.seek(0, 2)
+        self.remote = RangedBytes(str(path)) if isinstance(path, RemotePath) and path.is_read_by_ranges() else None
+        self._file = path.open("rb", buffering=0) if self.remote is None else None
+        self.size = self._file.seek(0, 2) if self._file is not None else self._ranges.size
         self._scratch = np.empty(0, np.uint8)
 
     def __enter__(self) -> Self:
@@ -39,7 +43,23 @@ class FileBytes:
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
+
+    @property
+    def _ranges(self) -> RangedBytes:
+        assert self.remote is not None, "a file is open, or at a URL"
+        return self.remote
+
+    def expect(self, ranges: Iterable[tuple[int, int]]) -> None:
+        """Read these ranges of a file at a URL together, from where they are needed soon; raises OSError."""
+        if self.remote is not None:
+            self.remote.expect(ranges)
+
+    def check_unchanged(self) -> None:
+        """Raise OSError if a file at a URL was replaced since it was opened."""
+        if self.remote is not None:
+            self.remote.check_unchanged()
 
     def read(self, at: int, length: int) -> memoryview:
         """Return up to `length` bytes from `at`, fewer only at the file's end."""
@@ -73,12 +93,18 @@ class FileBytes:
             filled += count
 
     def _read_small(self, length: int, at: int) -> bytes:
+        if self._file is None:
+            return self._ranges.read(at, length)
         if _POSITIONED:
             return os.pread(self._file.fileno(), length, at)
         self._file.seek(at)
         return self._file.read(length)
 
     def _fill(self, view: memoryview, at: int) -> int:
+        if self._file is None:
+            content = self._ranges.read(at, len(view))
+            view[: len(content)] = content
+            return len(content)
         if _POSITIONED:
             return os.preadv(self._file.fileno(), [view], at)
         self._file.seek(at)

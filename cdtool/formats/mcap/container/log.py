@@ -159,6 +159,7 @@ class Log:
             yield Messages(stream, batch, covered, parts)
 
     def _finish(self) -> None:
+        self._file.check_unchanged()
         section = self.section
         for at in self._skip.keys() & section.chunks.keys():
             self.counts.update(self._skip[at])
@@ -176,7 +177,7 @@ class Log:
 
     def _check_data_crc(self) -> None:
         stated = self.section.end.data_section_crc if self.section.end is not None else 0
-        if not stated:
+        if not stated or (self.section.is_partly_read and not self.unverified):
             return
         if self._file.crc(0, self.section.end_at) == stated:
             self.unverified = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, chunk_header
 from cdtool.formats.mcap.container.file_bytes import FileBytes
@@ -21,6 +21,8 @@ from cdtool.formats.mcap.container.records import (
 )
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 
+# The message indexes of a chunk that are read as a whole [bytes].
+_SHORT = 1 << 12
 _OPCODE_AND_LENGTH = struct.Struct("<BQ")
 
 
@@ -37,6 +39,7 @@ def skippable_chunks(file: FileBytes, summary: Summary, wanted: Callable[[str], 
     unwanted.discard(min(summary.chunks))
     if not unwanted:
         return {}
+    file.expect(_between_chunks(summary))
     indexed = _indexed_messages(file, summary)
     if indexed is None:
         return {}
@@ -47,11 +50,37 @@ def skippable_chunks(file: FileBytes, summary: Summary, wanted: Callable[[str], 
     return {at: indexed[at] for at in unwanted} if dict(total) == stated else {}
 
 
+def _between_chunks(summary: Summary) -> Iterator[tuple[int, int]]:
+    """Yield the ranges that show what is between the data of the chunks: their headers, and the message indexes.
+
+    Of a long message index only the beginning is needed. The end of the last one is followed by the end of the data.
+    """
+    for at, index in summary.chunks.items():
+        yield at, at + HEADER_LENGTH
+        end, length = at + index.chunk_length, index.message_index_length
+        if length <= _SHORT:
+            yield end, end + length + HEADER_LENGTH
+            continue
+        for start in index.message_index_offsets.values():
+            yield start, start + HEADER_LENGTH
+        yield end + length, end + length + HEADER_LENGTH
+
+
 def only_message_indexes(content: memoryview, at: int = 0) -> bool:
     """Return whether the bytes from `at` on are only message indexes, and no chunk that the summary omits."""
     end = len(content)
     while at <= end - PREFIX:
         opcode, length = _OPCODE_AND_LENGTH.unpack_from(content, at)
+        if opcode != MessageIndex.opcode:
+            return False
+        at += PREFIX + length
+    return at == end
+
+
+def only_message_indexes_between(file: FileBytes, at: int, end: int) -> bool:
+    """Return the same for the bytes of a file, reading only the beginning of each record."""
+    while at <= end - PREFIX:
+        opcode, length = _OPCODE_AND_LENGTH.unpack(file.read(at, PREFIX))
         if opcode != MessageIndex.opcode:
             return False
         at += PREFIX + length
