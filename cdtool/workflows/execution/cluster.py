@@ -29,12 +29,15 @@ from cdtool.workflows.execution.on_cluster import GRACE, Done, begin, do, leave
 _EACH = 2
 # Time between two looks at the workers of the cluster, and at those that do not respond [s].
 _LOOK, _LOOK_CLOSELY = 0.5, 5.0
-# A worker that has not reported to its scheduler for the time limit and this long is ended [s].
+# A worker that has not reported for the time limit and this long, or has paused for this long, is ended [s].
 _SILENT = 20.0
 # So long a run waits for another worker after the last one has ended [s].
 _WITHOUT_WORKERS = 60.0
 # Within this time the nanny of a worker that has ended reports why, mostly by its next worker [s].
 _REASON_WITHIN = 20.0
+
+
+_MEMORY_WORDS = "its worker process was ended: the memory was not enough"
 
 
 class WorkerLostError(Exception):
@@ -93,7 +96,8 @@ class ClusterWorkers:
         self._queue: deque[_Sent] = deque()
         self._fault: CdtoolError | None = None
         self._closed = False
-        self._silent: dict[str, tuple[float, float]] = {}
+        # Of each worker: its last report, when it was noticed, and when it was last not paused.
+        self._idle: dict[str, tuple[float, float, float]] = {}
         self._looked_closely = monotonic()
         self._last_worker = monotonic()
         self._watching: Future[None] | None = None
@@ -212,7 +216,7 @@ class ClusterWorkers:
     def _drop(self, address: str) -> None:
         """Forget a worker that has ended: its batches are lost."""
         self.session.forget(address)
-        self._silent.pop(address, None)
+        self._idle.pop(address, None)
         has = self._has.pop(address, None)
         if has is None:
             return
@@ -246,20 +250,30 @@ class ClusterWorkers:
             self._last_worker = now
         elif now - self._last_worker > _WITHOUT_WORKERS:
             raise self.session.without_workers()
-        if self._limit is not None and now - self._looked_closely > _LOOK_CLOSELY:
+        if now - self._looked_closely > _LOOK_CLOSELY:
             self._looked_closely = now
-            await self._end_silent(now)
+            await self._end_idle(now)
 
-    async def _end_silent(self, now: float) -> None:
-        """End workers with batches that do not report to their scheduler: a stopped process does not end itself."""
-        assert self._limit is not None
-        for address, last in (await self.session.last_reports()).items():
-            before, since = self._silent.get(address, (last, now))
-            self._silent[address] = (last, now if last != before else since)
+    async def _end_idle(self, now: float) -> None:
+        """End workers that have batches and do nothing: a stopped process beyond the time limit, or one without memory.
+
+        Neither ends itself, and no other worker may take what is bound to it.
+        """
+        for address, (last, is_paused) in (await self.session.last_reports()).items():
+            before, reported, worked = self._idle.get(address, (last, now, now))
+            reported, worked = now if last != before else reported, worked if is_paused else now
+            self._idle[address] = last, reported, worked
             has = self._has.get(address)
-            if has is not None and has.sent and now - since > self._limit + GRACE + _SILENT:
+            if has is None or not has.sent:
+                continue
+            reason = ""
+            if self._limit is not None and now - reported > self._limit + GRACE + _SILENT:
+                reason = limit_words(self._limit)
+            elif now - worked > _SILENT:
+                reason = _MEMORY_WORDS
+            if reason:
                 for sent in has.sent:
-                    sent.reason = limit_words(self._limit)
+                    sent.reason = reason
                 self._drop(address)
                 self.session.restart(address)
 
@@ -289,7 +303,7 @@ class ClusterWorkers:
                 break
             threading.Event().wait(0.2)
         if worker.address in self.session.over_memory:
-            return "its worker process was ended: the memory was not enough"
+            return _MEMORY_WORDS
         if self._limit is not None and code in (None, 1) and seconds >= self._limit:
             return limit_words(self._limit)
         return "its worker process ended" if code is None else ended_words(code)

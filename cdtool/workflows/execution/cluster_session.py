@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -22,6 +23,7 @@ from typing import Any
 from cdtool.errors import CdtoolError, UsageError, WorkerError
 from cdtool.plain_text import one_line, shorten
 from cdtool.workflows.execution.environment import difference, environment
+from cdtool.workflows.execution.interruption import without_interruption
 from cdtool.workflows.execution.on_cluster import Described, Sight, describe
 
 LOCAL = "local"
@@ -162,10 +164,13 @@ class Session:
         if describing is not None and not describing.done():
             describing.cancel()
 
-    async def last_reports(self) -> dict[str, float]:
-        """Return when each worker has last reported to its scheduler [s], by the scheduler's clock."""
+    async def last_reports(self) -> dict[str, tuple[float, bool]]:
+        """Return when each worker has last reported to its scheduler, by its clock [s], and whether it has paused.
+
+        A worker with little free memory pauses: it begins nothing until it has more.
+        """
         known = await asyncio.wait_for(self.client.scheduler.identity(n_workers=-1), _ANSWERED_WITHIN)
-        return {address: item["last_seen"] for address, item in known["workers"].items()}
+        return {address: (item["last_seen"], item["status"] == "paused") for address, item in known["workers"].items()}
 
     def restart(self, address: str) -> None:
         """Let the nanny of a worker that does not respond end it, and start another one."""
@@ -252,22 +257,26 @@ def _local(jobs: int) -> Iterator[Any]:
     import distributed
 
     start: Any = distributed.LocalCluster
-    cluster = start(
-        n_workers=jobs,
-        threads_per_worker=1,
-        host="127.0.0.1",
-        dashboard_address=None,
-        # Its other pages have a free port.
-        scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-        silence_logs=logging.CRITICAL + 1,
-        # Dask calls its function dask_setup.
-        preload=["cdtool.workflows.execution.local_worker"],
-    )
+    resource_tracker.ensure_running()  # its start would end the block below for the thread that starts processes
+    cluster = None
     try:
+        with without_interruption():
+            cluster = start(
+                n_workers=jobs,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,
+                # Its other pages have a free port.
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                silence_logs=logging.CRITICAL + 1,
+                # Dask calls its function dask_setup.
+                preload=["cdtool.workflows.execution.local_worker"],
+            )
         yield cluster
     finally:
-        with suppress(Exception):
-            cluster.close(timeout=10)
+        if cluster is not None:
+            with suppress(Exception):
+                cluster.close(timeout=10)
 
 
 @contextmanager

@@ -20,6 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.workflows.execution.interruption import ignore_interruption
+
 # A worker that another process ends exits with this status.
 TOLD_TO_END = 143
 # Entries of a claim: the process, the number of the piece counted from 1 (0: none), when it began, and when the process
@@ -76,9 +78,7 @@ def begin(work: Callable[[Any], Any], claims: Any, free_claims: Any, limit: floa
     _claim = memoryview(claims).cast("B").cast("q")[first : first + CLAIM]
     _claim[0] = os.getpid()
     keep_freed_memory()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(signal, "pthread_sigmask"):  # see processes.py
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    ignore_interruption()
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

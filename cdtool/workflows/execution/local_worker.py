@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import signal
 from typing import Any
+
+from cdtool.workflows.execution.interruption import ignore_interruption
 
 
 def dask_setup(_: Any) -> None:
     """Ignore Ctrl-C, which a terminal sends to every process; called by Dask's `preload`."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_interruption()

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
@@ -22,6 +20,8 @@ from typing import Any
 
 from cdtool.errors import WorkerError
 from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, ended_words, limit_words
+from cdtool.workflows.execution.interruption import without_interruption
+from cdtool.workflows.execution.workers import shares_memory
 
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
@@ -65,7 +65,7 @@ class Processes:
     def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:  # noqa: ARG002
         """Return the future results of some numbered pieces; a pool whose process has ended gives a failed one."""
         try:
-            with _without_interruption():  # it starts processes
+            with without_interruption():  # it starts processes
                 future = self._pool.submit(do, batch)
         except BrokenProcessPool as fault:
             future = Future()
@@ -148,23 +148,5 @@ class Processes:
         self._pool.shutdown(wait=True)
 
 
-@contextmanager
-def _without_interruption() -> Iterator[None]:
-    """Let Ctrl-C wait until the block has ended; processes that it starts do not receive it before `begin` ignores it.
-
-    Otherwise Python prints where a process was interrupted while it started.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _context() -> BaseContext:
-    """Return how processes are started: a fork with other threads could keep a lock for ever."""
-    alone = threading.active_count() == 1
-    return get_context("fork" if sys.platform == "linux" and alone else "spawn")
+    return get_context("fork" if shares_memory() else "spawn")
