@@ -58,7 +58,7 @@ def test_a_file_larger_than_the_bound_is_refused_before_it_is_read(memory, monke
 
 
 @pytest.mark.parametrize("text", ["", "many", "-3", "0", "nan"])
-def test_a_bound_that_is_no_number_is_the_usual_one(monkeypatch, text):
+def test_an_invalid_bound_is_the_usual_one(monkeypatch, text):
     monkeypatch.setenv("CDTOOL_CACHE_MIB", text)
     assert staging.bound() == 4096 * MIB
 
