@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,21 @@ def test_a_file_is_copied_once_and_removed_after_use(memory, monkeypatch):
     assert len(fetched) == 1 and [str(item) for item in copies()] == [first]
     staging.release()
     assert not copies()
+
+
+def test_a_thread_keeps_the_copies_of_another_one_that_is_at_work(memory):
+    memory.pipe_file("/logs/a.csv", b"1")
+    with staging.copies_in_use():
+        mine = Path(os.fspath(location("memory://logs/a.csv")))
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(_use_copies).result()
+        assert mine.exists()
+    assert not mine.exists()
+
+
+def _use_copies() -> None:
+    with staging.copies_in_use():
+        os.fspath(location("memory://logs/a.csv"))
 
 
 def test_the_copies_are_bounded(memory, monkeypatch):

@@ -18,7 +18,7 @@ from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from cdtool.errors import UsageError, WorkerError
-from cdtool.remote.staging import release
+from cdtool.remote.staging import copies_in_use
 from cdtool.workflows.execution.in_worker import Failed, keep_freed_memory
 
 Item = TypeVar("Item")
@@ -162,10 +162,8 @@ class _Releasing:
 
     def __call__(self, item: Any) -> Any:
         """Return the result of the item."""
-        try:
+        with copies_in_use():
             return self.work(item)
-        finally:
-            release()
 
 
 @contextmanager
