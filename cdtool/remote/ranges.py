@@ -24,7 +24,8 @@ _SMALLEST_BLOCK, _LARGEST_BLOCK = 1 << 13, 4 << 20
 _MOST_BLOCKS = 16
 # Expected ranges: so many bytes of them are kept, and those that are nearer than this are one range.
 _MOST_EXPECTED, _NEAR = 64 << 20, 1 << 12
-_TOGETHER = 64
+# Requests at the same time.
+_TOGETHER = 4
 
 
 class RangedBytes:

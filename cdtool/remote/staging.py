@@ -16,7 +16,8 @@ import tempfile
 import threading
 import time
 from collections import OrderedDict
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -54,7 +55,7 @@ class _Session:
         self.owned: IO[bytes] | None = None
         self.copies: OrderedDict[str, _Copy] = OrderedDict()
         self.answers: dict[str, tuple[float, ObjectInfo | None]] = {}
-        self.number = 0
+        self.number = self.users = 0
 
     def own_folder(self) -> Path:
         """Return the folder of this process; make it at the first call."""
@@ -140,6 +141,20 @@ def staged(url: str) -> Path:
 def is_staged(url: str) -> bool:
     """Return whether a file has a local copy."""
     return url in _session.copies
+
+
+@contextmanager
+def copies_in_use() -> Iterator[None]:
+    """Remove all copies after the block, unless another thread is in such a block, too."""
+    with _session.lock:
+        _session.users += 1
+    try:
+        yield
+    finally:
+        with _session.lock:
+            _session.users -= 1
+            if not _session.users:
+                release()
 
 
 def release() -> None:

@@ -23,12 +23,21 @@ def check_place(path: Path) -> None:
     if scheme_of(str(path)) not in _BUCKETS:
         return
     try:
-        storage.info(path.anchor)
+        if not _is_known(path.anchor):
+            storage.names_in(path.anchor)
     except FileNotFoundError:
         raise UsageError(f"{path}: no bucket {path.anchor}", "create the bucket first") from None
     except StorageError as fault:
         if fault.errno != errno.EACCES:  # whoever may write to a bucket need not be allowed to ask about it
             raise
+
+
+def _is_known(bucket: str) -> bool:
+    """Return whether a bucket has something in it; some versions of s3fs do not find an empty one."""
+    try:
+        return storage.info(bucket).is_folder
+    except FileNotFoundError:
+        return False
 
 
 def upload(path: Path, content: bytes | Path) -> None:

@@ -111,7 +111,7 @@ def test_a_missing_object_or_bucket_is_one_line(bucket):
     for url, words in [
         (f"{bucket.url}/none.csv", "no such file"),
         ("s3://no-such-bucket/a.csv", "no such file"),
-        (f"{bucket.url}", "is a folder"),
+        (bucket.put("a/b.csv", b"").rpartition("/")[0], "is a folder"),
     ]:
         done = cdtool("info", url)
         assert done.status != 0 and f"{url}: {words}" in done.err and len(done.err.splitlines()) == 1

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,21 @@ def test_a_file_is_copied_once_and_removed_after_use(memory, monkeypatch):
     assert not copies()
 
 
+def test_a_thread_keeps_the_copies_of_another_one_that_is_at_work(memory):
+    memory.pipe_file("/logs/a.csv", b"1")
+    with staging.copies_in_use():
+        mine = Path(os.fspath(location("memory://logs/a.csv")))
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(_use_copies).result()
+        assert mine.exists()
+    assert not mine.exists()
+
+
+def _use_copies() -> None:
+    with staging.copies_in_use():
+        os.fspath(location("memory://logs/a.csv"))
+
+
 def test_the_copies_are_bounded(memory, monkeypatch):
     monkeypatch.setenv("CDTOOL_CACHE_MIB", "2.5")
     for name in "abc":
@@ -58,7 +74,7 @@ def test_a_file_larger_than_the_bound_is_refused_before_it_is_read(memory, monke
 
 
 @pytest.mark.parametrize("text", ["", "many", "-3", "0", "nan"])
-def test_a_bound_that_is_no_number_is_the_usual_one(monkeypatch, text):
+def test_an_invalid_bound_is_the_usual_one(monkeypatch, text):
     monkeypatch.setenv("CDTOOL_CACHE_MIB", text)
     assert staging.bound() == 4096 * MIB
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cdtool.errors import UsageError, WorkerError
-from cdtool.remote.staging import release
+from cdtool.remote.staging import copies_in_use
 from cdtool.workflows.execution.in_worker import Failed, keep_freed_memory
 
 Item = TypeVar("Item")
@@ -226,10 +226,8 @@ class _Releasing:
 
     def __call__(self, item: Any) -> Any:
         """Return the result of the item."""
-        try:
+        with copies_in_use():
             return self.work(item)
-        finally:
-            release()
 
 
 @contextmanager
