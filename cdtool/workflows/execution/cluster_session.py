@@ -10,6 +10,7 @@ import asyncio
 import logging
 import pickle
 import re
+import socket
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -19,6 +20,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
+from urllib.parse import urlsplit
 
 from cdtool.errors import CdtoolError, UsageError, WorkerError
 from cdtool.plain_text import one_line, shorten
@@ -234,6 +236,8 @@ def session_of(cluster: str, jobs: int, inputs: Iterable[Path] = ()) -> Iterator
         connect: Any = distributed.Client
         address: Any = stack.enter_context(_local(jobs)) if cluster == LOCAL else cluster
         try:
+            if cluster != LOCAL:
+                _refuse_unreachable(cluster)
             client = connect(address, timeout=_CONNECTED_WITHIN, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as fault:
             hint = "check the address, or start one: dask scheduler"
@@ -244,6 +248,12 @@ def session_of(cluster: str, jobs: int, inputs: Iterable[Path] = ()) -> Iterator
         _open[cluster, jobs] = session
         stack.callback(_open.pop, (cluster, jobs))
         yield session
+
+
+def _refuse_unreachable(address: str) -> None:
+    """Raise OSError if nothing answers at an address: a client of Dask would leave a thread behind."""
+    place = urlsplit(address)
+    socket.create_connection((place.hostname or "", place.port or 0), _CONNECTED_WITHIN).close()
 
 
 def _closed(client: Any) -> None:

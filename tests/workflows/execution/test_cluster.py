@@ -11,6 +11,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import threading
 import time
 import warnings
 from contextlib import suppress
@@ -148,13 +149,14 @@ def test_wrong_addresses_are_refused_without_repeating_a_password():
 
 
 @needs_dask
-def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch):
-    monkeypatch.setattr(cluster_session, "_CONNECTED_WITHIN", 0.5)
+def test_a_scheduler_that_does_not_answer_is_one_line():
+    threads = set(threading.enumerate())
     done = cdtool("benchmark", ROOT / "sample_logs/gate/benchmark.toml", "--cluster", "tcp://127.0.0.1:9")
     assert done.status == 2 and done.out == ""
     assert done.err == (
         "error: --cluster tcp://127.0.0.1:9: no scheduler answers (check the address, or start one: dask scheduler)\n"
     )
+    assert set(threading.enumerate()) == threads, "with more of them, later processes would not be forked"
 
 
 def test_without_the_package_one_line_names_the_extra(monkeypatch):
