@@ -19,7 +19,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -58,17 +58,26 @@ def write_bytes(path: Path, content: bytes) -> None:
     if is_remote(path):
         _upload(path, content)
         return
-    if _is_special(path):
-        with _explained(path, []), path.open("wb") as stream:
-            stream.write(content)
-        return
-    with replaced(path) as (part,), part.open("wb") as stream:
-        stream.write(content)
+    _write(path, (content,))
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a complete file of UTF-8 text without changing its line ends. Raises OutputError, UsageError."""
-    write_bytes(path, text.encode("utf-8", "replace"))
+    write_pieces(path, (text,))
+
+
+def write_pieces(path: Path, pieces: Iterable[str]) -> None:
+    """Write a complete file of UTF-8 text that is made piece by piece. Raises OutputError, UsageError."""
+    _write(path, (piece.encode("utf-8", "replace") for piece in pieces))
+
+
+def _write(path: Path, contents: Iterable[bytes]) -> None:
+    if _is_special(path):
+        with _explained(path, []), path.open("wb") as stream:
+            stream.writelines(contents)
+        return
+    with replaced(path) as (part,), part.open("wb") as stream:
+        stream.writelines(contents)
 
 
 @contextmanager

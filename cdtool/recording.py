@@ -112,6 +112,10 @@ class TableRows:
         return float(self.time[at]), float(self.time[at if is_kept else at - 1])
 
 
+# Times since 1970 [s] between which a log was recorded.
+_IN_2001, _IN_2100 = 1e9, 4.1e9
+
+
 @dataclass(frozen=True)
 class Recording(StoresDerived):
     """One log: its channels as Series, on the load side, each at its own rate.
@@ -173,6 +177,12 @@ class Recording(StoresDerived):
     def duration(self) -> float:
         """Return the time from the first sample to the last [s]."""
         return self.end - self.start
+
+    @property
+    def began(self) -> float | None:
+        """Return the time of the first sample since 1970 [s]; None if the log's clock does not count from there."""
+        began = self.origin + self.start
+        return began if _IN_2001 <= began < _IN_2100 else None
 
     def between(self, start: float, end: float) -> Recording:
         """Return the recording cut to start <= time <= end [s], without channels that have no sample there."""

@@ -15,7 +15,7 @@ import pytest
 
 from cdtool import file_locks, files
 from cdtool.errors import CdtoolError, OutputError, UsageError
-from cdtool.files import clean_up, locked, replaced, replaced_folder, write_bytes, write_text
+from cdtool.files import clean_up, locked, replaced, replaced_folder, write_bytes, write_pieces, write_text
 
 ROOT = Path(__file__).parents[1]
 posix_only = pytest.mark.skipif(os.name != "posix", reason="links, modes and signals as POSIX has them")
@@ -29,6 +29,20 @@ def test_a_file_is_written_completely_and_nothing_else_remains(tmp_path):
     write_text(tmp_path / "a.md", "ä\n")
     write_bytes(tmp_path / "a.md", b"new")
     assert names(tmp_path) == {"a.md"} and (tmp_path / "a.md").read_bytes() == b"new"
+
+
+def test_a_file_is_made_of_its_pieces_or_stays_as_it_was(tmp_path):
+    write_pieces(tmp_path / "a.md", (text for text in ("ä", "", "\n", "\ud800")))
+    assert (tmp_path / "a.md").read_bytes() == b"\xc3\xa4\n?"
+
+    def broken():
+        yield "new"
+        raise ValueError("a fault")
+
+    with pytest.raises(ValueError, match="a fault"):
+        write_pieces(tmp_path / "a.md", broken())
+    assert (tmp_path / "a.md").read_bytes() == b"\xc3\xa4\n?"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.md"]
 
 
 def test_while_writing_only_dotfiles_in_tmp_or_lock_exist(tmp_path):

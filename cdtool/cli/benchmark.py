@@ -10,7 +10,16 @@ import typer
 
 from cdtool.cli import completions
 from cdtool.cli.console import plain, print_json, print_skipped, progress
-from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption, listed
+from cdtool.cli.options import (
+    ClusterOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    OutputOption,
+    RetriesOption,
+    TimeoutOption,
+    listed,
+)
 from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
@@ -41,6 +50,9 @@ def benchmark(
         typer.Option("--false-alarm-budget", help="Set each safety factor for this rate, as 1/1000op or 0.1/h."),
     ] = None,
     jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
     store: Annotated[
         Place | None,
         typer.Option(
@@ -74,9 +86,10 @@ def benchmark(
 
     if store is None and (trust_mtime or retry_failed):
         raise UsageError(f"{'--trust-mtime' if trust_mtime else '--retry-failed'} needs --store", "add --store DIR")
+    workers = Workers(jobs, timeout, retries, cluster)
     use = None if store is None else StoreUse(store, trust_times=trust_mtime, retry_failed=retry_failed)
     if dry_run:
-        _show_dry_run(file, _named(detectors), false_alarm_budget, Workers(jobs), use, as_json=as_json)
+        _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
         return
     targets = output or []
     check_outputs(targets, force=force)
@@ -85,7 +98,7 @@ def benchmark(
             file,
             detectors=_named(detectors),
             false_alarm_budget=false_alarm_budget,
-            jobs=jobs,
+            workers=workers,
             store=use,
             progress=advance,
         )

@@ -22,8 +22,12 @@ _SHOWN = 10
 
 
 def compare(
-    old: Annotated[Place, typer.Argument(parser=location, help="results.json of the old build.", metavar="OLD")],
-    new: Annotated[Place, typer.Argument(parser=location, help="results.json of the new build.", metavar="NEW")],
+    old: Annotated[
+        Place, typer.Argument(parser=location, help="results.json or results.parquet of the old build.", metavar="OLD")
+    ],
+    new: Annotated[
+        Place, typer.Argument(parser=location, help="results.json or results.parquet of the new build.", metavar="NEW")
+    ],
     level: Annotated[
         float, typer.Option("--level", help="Family-wise error rate: chance of any wrong 'worse' or 'better'.")
     ] = 0.05,

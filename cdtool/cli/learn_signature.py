@@ -11,6 +11,7 @@ import typer
 from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress, table
 from cdtool.cli.options import (
+    ClusterOption,
     DebounceOption,
     FromOption,
     HysteresisOption,
@@ -22,6 +23,8 @@ from cdtool.cli.options import (
     OnsetAboveOption,
     OperationsOption,
     RearmOption,
+    RetriesOption,
+    TimeoutOption,
     ToOption,
     listed,
     section_of,
@@ -110,6 +113,9 @@ def learn_signature(
         bool, typer.Option("--force", help="Learn from fewer than 10 runs; the limits are less certain.")
     ] = False,
     jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Learn the normal behaviour for a detector from impact-free runs: a signature or any other threshold.
@@ -123,6 +129,7 @@ def learn_signature(
     from cdtool.plain_text import counted
     from cdtool.signature_store import SIGNATURE, check_name, write_signature
     from cdtool.thresholds.signature import ENOUGH_RUNS
+    from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.signature.learning import learn_signature as learn
     from cdtool.workflows.signature.threshold_settings import rule_of
 
@@ -146,7 +153,7 @@ def learn_signature(
             activation={"debounce": debounce, "rearm": rearm, "hysteresis": hysteresis, "latch": latch},
             false_alarm_budget=false_alarm_budget,
             onset=OnsetRule(above=onset_above),
-            jobs=jobs,
+            workers=Workers(jobs, timeout, retries, cluster),
             progress=advance,
         )
     write_signature(output, learned.signature)

@@ -120,11 +120,21 @@ OutputOption = Annotated[
         "--output",
         "-o",
         parser=location,
-        help="Output, repeatable: .json, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder for all.",
+        help="Output, repeatable: .json, .parquet, .html, .md, .xml (JUnit), .csv, .png, .svg, .pdf; or a folder.",
     ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Also replace files that cdtool did not write.")]
 JobsOption = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of logs to process in parallel.")]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option("--cluster", help="Let a Dask cluster do the work: tcp://host:8786, or local (with --jobs workers)."),
+]
+TimeoutOption = Annotated[
+    float | None, typer.Option("--timeout", help="Leave out a log that takes longer than this [s]. Default: no limit.")
+]
+RetriesOption = Annotated[
+    int, typer.Option("--retries", min=0, help="How often a log that took too long or ended its worker is tried again.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 

@@ -13,7 +13,10 @@ from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
 
 def report(
-    results: Annotated[Place, typer.Argument(parser=location, help="results.json of a benchmark.", metavar="RESULTS")],
+    results: Annotated[
+        Place,
+        typer.Argument(parser=location, help="results.json or results.parquet of a benchmark.", metavar="RESULTS"),
+    ],
     output: OutputOption = None,
     force: ForceOption = False,
 ) -> None:

@@ -7,7 +7,15 @@ from typing import Annotated, Literal
 import typer
 
 from cdtool.cli.console import plain, print_skipped, progress
-from cdtool.cli.options import ForceOption, JobsOption, JsonOption, OutputOption
+from cdtool.cli.options import (
+    ClusterOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    OutputOption,
+    RetriesOption,
+    TimeoutOption,
+)
 from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 
@@ -37,6 +45,9 @@ def score(
         bool, typer.Option("--listed-only", help="Skip recordings without a row instead of counting them as no alarm.")
     ] = False,
     jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Score the trigger times of any controller or program by the same rules as `cdtool benchmark`.
@@ -46,12 +57,14 @@ def score(
     from cdtool.evaluation.results_file import to_json
     from cdtool.report.outputs import check_outputs, write_outputs
     from cdtool.report.writers.base import Report
+    from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.score_triggers import score as run
 
+    workers = Workers(jobs, timeout, retries, cluster)
     targets = output or []
     check_outputs(targets, force=force)
     with progress("scoring") as advance:
-        done = run(triggers, benchmark, clock=clock, listed_only=listed_only, jobs=jobs, progress=advance)
+        done = run(triggers, benchmark, clock=clock, listed_only=listed_only, workers=workers, progress=advance)
     results = done.evaluated.results
     written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
     print_skipped(results.skipped, results.findings)

@@ -10,7 +10,17 @@ import typer
 
 from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
-from cdtool.cli.options import ForceOption, JobsOption, JsonOption, MachineOption, OnsetAboveOption, figure_name
+from cdtool.cli.options import (
+    ClusterOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    MachineOption,
+    OnsetAboveOption,
+    RetriesOption,
+    TimeoutOption,
+    figure_name,
+)
 from cdtool.cli.place import Place, location
 from cdtool.cli.signature_shown import checked_as_json, file_as_json, show_class, show_file
 from cdtool.errors import UsageError
@@ -100,6 +110,9 @@ def check(
     force: ForceOption = False,
     onset_above: OnsetAboveOption = None,
     jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Check whether a signature was learned from enough runs and whether the machine has drifted since.
@@ -110,6 +123,7 @@ def check(
     Example: cdtool signature check gate.feekf.json free/*.csv april.mcap -m machine.toml --plot drift.png
     """
     from cdtool.evaluation.truth.onset import OnsetRule
+    from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.signature.normal_runs import notes_on
     from cdtool.workflows.signature.upkeep import check_signature
 
@@ -123,7 +137,7 @@ def check(
             operations=operations,
             target=target,
             onset=OnsetRule(above=onset_above),
-            jobs=jobs,
+            workers=Workers(jobs, timeout, retries, cluster),
             progress=advance,
         )
     names = _plot_names(plot, checked, force=force)
@@ -162,6 +176,9 @@ def update(
     ] = None,
     onset_above: OnsetAboveOption = None,
     jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Add impact-free runs to a signature without learning a slowly growing fault.
@@ -170,6 +187,7 @@ def update(
     """
     from cdtool.evaluation.truth.onset import OnsetRule
     from cdtool.thresholds.guarded_update import CAP, RESERVE
+    from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.signature.normal_runs import notes_on
     from cdtool.workflows.signature.upkeep import update_with_runs
 
@@ -183,7 +201,7 @@ def update(
             cap=CAP if cap is None else cap,
             reserve=RESERVE if reserve is None else reserve,
             onset=OnsetRule(above=onset_above),
-            jobs=jobs,
+            workers=Workers(jobs, timeout, retries, cluster),
             progress=advance,
         )
     print_skipped(done.refused, [*done.findings, *notes_on(done.file)])

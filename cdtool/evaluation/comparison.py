@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.results import ContactResult, Results
+from cdtool.evaluation.rows import grouped, values_of
 from cdtool.evaluation.statistics.paired import Difference, holm, mcnemar_p, paired_difference
 from cdtool.evaluation.summary import campaigns
 
@@ -18,6 +20,17 @@ SIGNIFICANT = 0.05
 _LEAST_LEVEL = 1e-9
 
 Key = tuple[str, int]
+
+
+class Seen(NamedTuple):
+    """What a comparison needs of a contact."""
+
+    recording: str
+    outcome: str
+    latency_ms: float | None
+
+
+Pair = tuple[Seen, Seen]
 
 
 def check_significance(level: float) -> None:
@@ -79,29 +92,30 @@ class Comparison:
 def compare_detectors(results: Results) -> list[Comparison]:
     """Return every pair of detectors in every group of impacts, in the order of the benchmark file."""
     clusters = campaigns(results)
-    rows: dict[tuple[str, str], dict[Key, ContactResult]] = {}
-    for contact in results.scored_contacts:
-        rows.setdefault((contact.group, contact.detector), {})[contact.recording, contact.contact] = contact
+    of_group = grouped(results.scored_contacts, "group", "detector")
     found: list[Comparison] = []
     for group in results.groups:
-        known = [name for name in results.detectors if (group, name) in rows]
+        rows = {name: _seen_by(of_group[group, name]) for name in results.detectors if (group, name) in of_group}
         made = [
-            _compare(group, first, second, rows[group, first], rows[group, second], clusters)
-            for first, second in combinations(known, 2)
+            _compare(group, first, second, rows[first], rows[second], clusters)
+            for first, second in combinations(rows, 2)
         ]
         found += _corrected([item for item in made if item.contacts])
     return found
 
 
-def pairs_of(
-    first: Mapping[Key, ContactResult], second: Mapping[Key, ContactResult]
-) -> list[tuple[ContactResult, ContactResult]]:
+def _seen_by(contacts: Sequence[ContactResult]) -> dict[Key, Seen]:
+    columns = (values_of(contacts, name) for name in ("contact", *Seen._fields))
+    return {(seen[0], number): Seen(*seen) for number, *seen in zip(*columns, strict=True)}
+
+
+def pairs_of(first: Mapping[Key, Seen], second: Mapping[Key, Seen]) -> list[tuple[Seen, Seen]]:
     """Return the contacts that both could assess."""
     both = [(first[key], second[key]) for key in first if key in second]
     return [pair for pair in both if all(item.outcome != "not_assessable" for item in pair)]
 
 
-def latency_difference(pairs: Sequence[tuple[ContactResult, ContactResult]], clusters: Mapping[str, str]) -> Difference:
+def latency_difference(pairs: Sequence[Pair], clusters: Mapping[str, str]) -> Difference:
     """Return the latency [ms] of the first minus that of the second, over the contacts that both detected."""
     differences, labels = [], []
     for first, second in pairs:
@@ -111,7 +125,7 @@ def latency_difference(pairs: Sequence[tuple[ContactResult, ContactResult]], clu
     return paired_difference(differences, labels)
 
 
-def only_one_missed(pairs: Sequence[tuple[ContactResult, ContactResult]]) -> tuple[int, int]:
+def only_one_missed(pairs: Sequence[Pair]) -> tuple[int, int]:
     """Return how many contacts only the first missed, and how many only the second."""
     missed = [(first.outcome == "missed", second.outcome == "missed") for first, second in pairs]
     return missed.count((True, False)), missed.count((False, True))
@@ -121,8 +135,8 @@ def _compare(
     group: str,
     first: str,
     second: str,
-    rows: Mapping[Key, ContactResult],
-    others: Mapping[Key, ContactResult],
+    rows: Mapping[Key, Seen],
+    others: Mapping[Key, Seen],
     clusters: Mapping[str, str],
 ) -> Comparison:
     pairs = pairs_of(rows, others)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 from cdtool.evaluation.limits import not_met
 from cdtool.evaluation.recording_outcomes import MISSES
-from cdtool.evaluation.results import ConclusionResult, ContactResult, ForceResult, PointResult, Results
+from cdtool.evaluation.results import ConclusionResult, ContactResult, ForceResult, Results
+from cdtool.evaluation.rows import grouped, values_of
 from cdtool.evaluation.summary import Summary
 from cdtool.exit_status import Fact, status_of
 from cdtool.plain_text import counted, plain
@@ -26,7 +27,7 @@ Pair = tuple[str, str]
 """Detector and group."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ForceCheck:
     """The verdict of one contact, or of one test point, that decides about a group's force profile.
 
@@ -38,7 +39,7 @@ class ForceCheck:
     name: str
     verdict: str
     reason: str
-    row: ForceResult | PointResult | None
+    is_point: bool = False
 
 
 def force_checks(results: Results) -> list[ForceCheck]:
@@ -60,31 +61,39 @@ def force_checks(results: Results) -> list[ForceCheck]:
     `cdtool.benchmark` returns the results.
     """
     found = []
+    forces, scored = grouped(results.forces, "group"), grouped(results.scored_contacts, "group")
     for group, profile in _profiles(results).items():
         points = [item for item in results.points if item.group == group]
         named = {item.point for item in points}
-        rows = [item for item in results.forces if item.group == group]
-        alone = [item for item in rows if item.point not in named]
+        rows, contacts = forces.get((group,), ()), scored.get((group,), ())
         found += [
-            ForceCheck(group, item.profile, f"test point {item.point}", item.verdict, item.reason or "", item)
+            ForceCheck(group, item.profile, f"test point {item.point}", item.verdict, item.reason or "", is_point=True)
             for item in points
         ]
         found += [
             ForceCheck(
-                group, item.profile, f"{item.recording}, contact {item.contact}", item.verdict, item.reason or "", item
+                group, item.profile, f"{item.recording}, contact {item.contact}", item.verdict, item.reason or ""
             )
-            for item in alone
+            for item in rows
+            if item.point not in named
         ]
-        known = {(item.recording, item.contact) for item in rows}
-        contacts = {(item.recording, item.contact) for item in results.scored_contacts if item.group == group}
-        why = "no load-cell force"
-        unseen = [f"{name}, contact {number}" for name, number in sorted(contacts - known)]
+        known, why = set(_numbers(rows)), "no load-cell force"
+        unseen = [_name_of(*contact) for contact in sorted(set(_numbers(contacts)) - known)]
         if not contacts and not rows and not points:
             unseen, why = [""], "no contact of the group was scored: its recordings were left out, or show none"
-            if any(item.group == group for item in results.contacts):
+            if group in values_of(results.contacts, "group"):
                 why = "every contact was in progress when its recording began: its onset is not recorded"
-        found += [ForceCheck(group, profile, name, "not_assessable", why, None) for name in unseen]
+        found += [ForceCheck(group, profile, name, "not_assessable", why) for name in unseen]
     return found
+
+
+def _name_of(recording: str, contact: int) -> str:
+    return f"{recording}, contact {contact}"
+
+
+def _numbers(rows: Sequence[ContactResult] | Sequence[ForceResult]) -> Iterator[tuple[str, int]]:
+    """Return recording and number of the contacts."""
+    return zip(values_of(rows, "recording"), values_of(rows, "contact"), strict=True)
 
 
 def missed_unasked(results: Results, summaries: Sequence[Summary]) -> list[Summary]:
@@ -206,10 +215,10 @@ def partly_unassessed(results: Results, summaries: Sequence[Summary]) -> list[st
     []
     """
     partly = [item for item in summaries if 0 < item.not_assessable < item.contacts]
-    lines = []
+    lines, reasons = [], _reasons_of_contacts(results) if partly else {}
     for item in partly:
         what = f"{item.not_assessable} of {counted(item.contacts, 'contact')} not assessable"
-        lines.append(plain(f"{item.detector}, {item.group}: {what}: {_reasons_in_words(results, item)}"))
+        lines.append(plain(f"{item.detector}, {item.group}: {what}: {_reasons_in_words(results, item, reasons)}"))
     return lines
 
 
@@ -230,7 +239,7 @@ def limits_words(results: Results) -> str:
 def _profiles(results: Results) -> dict[str, str]:
     """The name of the profile of each group that has one: of the provenance, which a file may hold anything in."""
     listed = results.provenance.get("force_profiles")
-    found = {item.group: item.profile for item in results.forces}
+    found = dict(zip(values_of(results.forces, "group"), values_of(results.forces, "profile"), strict=True))
     if isinstance(listed, Mapping):
         named = {str(group): item for group, item in listed.items() if isinstance(item, Mapping)}
         found |= {group: str(item.get("name", "")) for group, item in named.items() if group in results.groups}
@@ -253,7 +262,7 @@ def _force_words(verdicts: Counter[str], checks: Sequence[ForceCheck]) -> Iterat
 
 
 def _things(checks: Sequence[ForceCheck]) -> str:
-    points = sum(isinstance(item.row, PointResult) for item in checks)
+    points = sum(item.is_point for item in checks)
     contacts = sum(bool(item.name) for item in checks) - points
     if points and not contacts:
         return counted(points, "test point")
@@ -301,22 +310,29 @@ def _reasons(
     for each in missed:
         why = "where a force profile is set" if each in forbidden else "and no limit on misses is set"
         yield plain(f"{each.detector}, {each.group}: {each.missed} of {each.assessable} contacts missed, {why}")
+    reasons = _reasons_of_contacts(results) if unassessed else {}
     for each in unassessed:
-        yield plain(f"{each.detector}, {each.group}: {_why_unassessed(results, each)}")
+        yield plain(f"{each.detector}, {each.group}: {_why_unassessed(results, each, reasons)}")
 
 
-def _why_unassessed(results: Results, item: Summary) -> str:
+def _why_unassessed(results: Results, item: Summary, reasons: Mapping[Pair, Sequence[str]]) -> str:
     what = f"{item.contacts} contacts" if item.contacts else f"{item.operations} operations"
-    return f"none of {what} could be assessed: {_reasons_in_words(results, item)}"
+    return f"none of {what} could be assessed: {_reasons_in_words(results, item, reasons)}"
 
 
-def _reasons_in_words(results: Results, item: Summary) -> str:
-    own: list[ContactResult] = [
-        row for row in results.contacts if (row.detector, row.group) == (item.detector, item.group)
-    ]
+def _reasons_of_contacts(results: Results) -> dict[Pair, Sequence[str]]:
+    """Return the different reasons in the rows of the contacts, by detector and group."""
+    found: dict[Pair, dict[str, None]] = {}
+    columns = (values_of(results.contacts, name) for name in ("detector", "group", "reason"))
+    for detector, group, reason in zip(*columns, strict=True):
+        if reason:
+            found.setdefault((detector, group), {})[reason] = None
+    return {pair: list(reasons) for pair, reasons in found.items()}
+
+
+def _reasons_in_words(results: Results, item: Summary, of_contacts: Mapping[Pair, Sequence[str]]) -> str:
     exposures = [row for row in results.exposure if (row.detector, row.group) == (item.detector, item.group)]
-    reasons = list(dict.fromkeys(row.reason for row in own if row.reason))
-    reasons = reasons or [
+    reasons = of_contacts.get((item.detector, item.group)) or [
         f"{name} {100.0 * share:.0f} %" for row in exposures for name, share in row.not_judged.items()
     ]
     more = f"; and {len(reasons) - _REASONS} more reasons" if len(reasons) > _REASONS else ""

@@ -49,7 +49,8 @@ def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     summaries, kinds = tuple(summarise(results)), tuple(summarise_kinds(results))
     if limits:
         lost = any(item.onset_holes or item.force_holes for item in summaries)
-        worst = [*summarise(at_worst(results)), *summarise_kinds(at_worst(results))] if lost else ()
+        largest = at_worst(results) if lost else None
+        worst = [*summarise(largest), *summarise_kinds(largest)] if largest else ()
         results = replace(results, limits=check_limits(limits, summaries, worst, kinds))
     results = replace(results, conclusion=conclude(results, summaries))
     return Evaluated(results, summaries, tuple(compare_detectors(results)), kinds)

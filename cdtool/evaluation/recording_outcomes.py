@@ -10,7 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from cdtool.evaluation.results import ContactResult, FalseAlarmResult, LimitResult, Results
+from cdtool.evaluation.results import (
+    ContactResult,
+    FalseAlarmResult,
+    ForceResult,
+    LimitResult,
+    RecordingResult,
+    Results,
+)
+from cdtool.evaluation.rows import grouped, values_of
 
 # Figures of [limits] by what of a recording counts in them; in the others nothing of a single recording does.
 MEANS = frozenset(("mean_ms", "mean_ms_upper"))
@@ -27,7 +35,7 @@ FALSE_ALARMS = frozenset(
 )
 FORCES_AT_ALARM = frozenset(("force_at_alarm_n", "force_at_alarm_max_n"))
 
-Key = tuple[str, str, str]
+Pair = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -52,8 +60,8 @@ class RecordingOutcome:
         return not self.judged or (unseen and not self.false_alarms)
 
 
-def recording_outcomes(results: Results) -> list[RecordingOutcome]:
-    """Return the outcome of every scored recording with every detector.
+def recording_outcomes(results: Results) -> Iterator[RecordingOutcome]:
+    """Yield the outcome of every scored recording with every detector, group by group and detector by detector.
 
     Parameters
     ----------
@@ -62,39 +70,51 @@ def recording_outcomes(results: Results) -> list[RecordingOutcome]:
 
     Returns
     -------
-    list of RecordingOutcome
+    iterator of RecordingOutcome
         In the order of the benchmark file.
 
     Examples
     --------
     `cdtool.benchmark` returns the results.
     """
-    contacts: dict[Key, list[ContactResult]] = {}
-    for contact in results.contacts:
-        contacts.setdefault((contact.group, contact.detector, contact.recording), []).append(contact)
-    true_contacts = {(item.group, item.recording): item.contacts for item in results.recordings}
+    contacts = grouped(results.contacts, "group", "detector")
+    true_contacts = _by_log(results.recordings, "contacts")
     logs: dict[str, dict[str, None]] = {group: {} for group in results.groups}
-    for group, name in (*true_contacts, *((group, name) for group, _, name in contacts)):
+    for group, name in (*true_contacts, *_by_log(results.contacts, "contact")):
         logs.setdefault(group, {})[name] = None
-    alarms: dict[Key, list[FalseAlarmResult]] = {}
+    alarms: dict[Pair, dict[str, list[FalseAlarmResult]]] = {}
     for alarm in results.false_alarms:
         name = _log_of(alarm.recording, logs.setdefault(alarm.group, {}))
         logs[alarm.group][name] = None
-        alarms.setdefault((alarm.group, alarm.detector, name), []).append(alarm)
+        alarms.setdefault((alarm.group, alarm.detector), {}).setdefault(name, []).append(alarm)
     ran = {(item.group, item.detector) for item in results.exposure}
     exceeded = _exceeded(results.limits)
-    failed = {(item.group, item.recording, item.contact) for item in results.forces if item.verdict == "fail"}
-    found = []
+    failed = _failed(results.forces)
     for group, names in logs.items():
         for detector in results.detectors:
             limits = exceeded.get((group, detector), [])
+            of_log: dict[str, list[ContactResult]] = {}
+            for contact in contacts.get((group, detector), ()):
+                of_log.setdefault(contact.recording, []).append(contact)
+            false_of_log = alarms.get((group, detector), {})
             for name in names:
-                seen, false = contacts.get((group, detector, name), []), alarms.get((group, detector, name), [])
+                seen, false = of_log.get(name, []), false_of_log.get(name, [])
                 breaks = tuple(words for limit in limits for words in _part_in(limit, seen, false, failed))
                 silent = (group, detector) in ran and not true_contacts.get((group, name), 0)
                 judged = bool(seen or false or silent)
-                found.append(RecordingOutcome(name, group, detector, tuple(seen), tuple(false), breaks, judged))
-    return found
+                yield RecordingOutcome(name, group, detector, tuple(seen), tuple(false), breaks, judged)
+
+
+def _by_log(rows: Sequence[RecordingResult] | Sequence[ContactResult], field: str) -> dict[Pair, int]:
+    """Return a field of rows by group and recording."""
+    columns = (values_of(rows, name) for name in ("group", "recording", field))
+    return {(group, recording): value for group, recording, value in zip(*columns, strict=True)}
+
+
+def _failed(forces: Sequence[ForceResult]) -> set[tuple[str, str, int]]:
+    """Return group, recording and number of the contacts that fail their force profile."""
+    columns = (values_of(forces, name) for name in ("verdict", "group", "recording", "contact"))
+    return {(group, name, number) for verdict, group, name, number in zip(*columns, strict=True) if verdict == "fail"}
 
 
 def _log_of(operation: str, logs: Mapping[str, None]) -> str:

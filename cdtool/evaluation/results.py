@@ -6,17 +6,19 @@ together with its meaning, from which the published schema is made.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import PureWindowsPath
 from typing import Any, Self
 
+from cdtool.evaluation.rows import picked, values_of
 from cdtool.findings import Finding
 from cdtool.frozen import frozen
 
 SCHEMA_VERSION = 4
 # How reports introduce what is lost of a recording that was used.
 DAMAGED = "damaged, used as far as it goes"
+_LOSS, _IN_PROGRESS = "loss", "in_progress"
 
 
 def meant(meaning: str, **default: Any) -> Any:
@@ -59,6 +61,9 @@ class RecordingResult:
     contacts: int = meant("true contacts in it")
     campaign: str | None = meant("test campaign: recordings of one campaign are resampled together", default=None)
     point: str | None = meant("test point: its force figures are averaged", default=None)
+    began_s: float | None = meant(
+        "first sample, in seconds since 1970-01-01 UTC; null: the log's clock does not count from there", default=None
+    )
 
 
 @frozen
@@ -111,7 +116,7 @@ class ContactResult:
     @property
     def in_progress(self) -> bool:
         """Whether the contact was in progress when the recording began: it has no onset, and is not scored."""
-        return self.outcome == "in_progress"
+        return self.outcome == _IN_PROGRESS
 
 
 @frozen
@@ -271,43 +276,50 @@ class RecordingFinding:
     @property
     def is_loss(self) -> bool:
         """True where part of the recording is lost."""
-        return self.severity == "loss"
+        return self.severity == _LOSS
 
 
 @frozen
 class Results:
-    """All of it, in the order of the benchmark file."""
+    """All of it, in the order of the benchmark file; rows of which there may be many are tuples, or `Rows`."""
 
     provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the figures")
     detectors: tuple[str, ...] = meant("full names")
     groups: tuple[str, ...] = meant("groups of impacts, then the impact-free hold-out")
-    contacts: tuple[ContactResult, ...] = meant("one row per contact and detector")
-    false_alarms: tuple[FalseAlarmResult, ...] = meant("one row an alarm without a contact")
+    contacts: Sequence[ContactResult] = meant("one row per contact and detector")
+    false_alarms: Sequence[FalseAlarmResult] = meant("one row an alarm without a contact")
     exposure: tuple[ExposureResult, ...] = meant("one row per group and detector")
-    recordings: tuple[RecordingResult, ...] = meant("one row a log that was scored", default=())
-    forces: tuple[ForceResult, ...] = meant("one row per contact with a force profile", default=())
+    recordings: Sequence[RecordingResult] = meant("one row a log that was scored", default=())
+    forces: Sequence[ForceResult] = meant("one row per contact with a force profile", default=())
     points: tuple[PointResult, ...] = meant("one row a test point with a force profile", default=())
     sweep: tuple[SweepResult, ...] = meant("latency against false alarms with all limits moved", default=())
     calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
-    skipped: tuple[Skipped, ...] = meant("what was left out", default=())
-    findings: tuple[RecordingFinding, ...] = meant("findings about recordings that were used", default=())
+    skipped: Sequence[Skipped] = meant("what was left out", default=())
+    findings: Sequence[RecordingFinding] = meant("findings about recordings that were used", default=())
     conclusion: ConclusionResult = field(
         default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
 
     @property
-    def losses(self) -> tuple[RecordingFinding, ...]:
+    def losses(self) -> Sequence[RecordingFinding]:
         """The findings about recordings of which a part is lost."""
-        return tuple(item for item in self.findings if item.is_loss)
+        return picked(
+            self.findings, [i for i, item in enumerate(values_of(self.findings, "severity")) if item == _LOSS]
+        )
 
     @property
-    def warnings(self) -> tuple[RecordingFinding, ...]:
+    def warnings(self) -> Sequence[RecordingFinding]:
         """The other findings."""
-        return tuple(item for item in self.findings if not item.is_loss)
+        return picked(
+            self.findings, [i for i, item in enumerate(values_of(self.findings, "severity")) if item != _LOSS]
+        )
 
     @property
-    def scored_contacts(self) -> tuple[ContactResult, ...]:
+    def scored_contacts(self) -> Sequence[ContactResult]:
         """The contacts that have an onset, and so a latency or a reason for none."""
-        return tuple(item for item in self.contacts if not item.in_progress)
+        outcomes = values_of(self.contacts, "outcome")
+        if _IN_PROGRESS not in outcomes:
+            return self.contacts
+        return picked(self.contacts, [i for i, outcome in enumerate(outcomes) if outcome != _IN_PROGRESS])

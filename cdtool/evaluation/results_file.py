@@ -10,7 +10,7 @@ import inspect
 import json
 import re
 import types
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -21,7 +21,7 @@ from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, ConclusionResult, ContactResult, LimitResult, Results
 from cdtool.evaluation.summary import kind_group
 from cdtool.file_kinds import kind_of
-from cdtool.strict_json import strict_json
+from cdtool.strict_json import flat_strict_json, strict_json
 from cdtool.value_words import value_in_words
 
 Row = TypeVar("Row")
@@ -69,16 +69,80 @@ def to_json(results: Results) -> str:
     >>> json.loads(to_json(empty))["schema_version"] == SCHEMA_VERSION
     True
     """
-    return strict_json(asdict(results)) + "\n"
+    return "".join(json_pieces(results))
+
+
+def json_pieces(results: Results) -> Iterator[str]:
+    """Yield the text of `to_json` in pieces, so that many rows are never in memory as text.
+
+    Parameters
+    ----------
+    results : Results
+        The results.
+
+    Returns
+    -------
+    iterator of str
+        The pieces.
+
+    Examples
+    --------
+    >>> empty = Results(provenance={}, detectors=(), groups=(), contacts=(), false_alarms=(), exposure=())
+    >>> "".join(json_pieces(empty)) == to_json(empty)
+    True
+    """
+    before = "{"
+    for item in fields(results):
+        yield f'{before}\n "{item.name}": '
+        before = ","
+        value = getattr(results, item.name)
+        if _are_rows(value):
+            yield from _rows_in_json(value)
+        else:
+            yield strict_json(asdict(value) if is_dataclass(value) else value).replace("\n", "\n ")  # type: ignore[arg-type]
+    yield "\n}\n"
+
+
+def _are_rows(value: Any) -> bool:
+    """Whether a value has rows; a tuple also has names."""
+    if isinstance(value, tuple):
+        return bool(value) and is_dataclass(value[0])
+    return isinstance(value, Sequence) and not isinstance(value, str)
+
+
+def _rows_in_json(rows: Sequence[Any], depth: int = 2) -> Iterator[str]:
+    """Yield rows as `strict_json` lays them out at a depth."""
+    if not rows:
+        yield "[]"
+        return
+    before, line = "[", "\n" + " " * depth
+    for row in rows:
+        yield f"{before}{line}{{{line} {_fields_in_json(row, depth)}{line}}}"
+        before = ","
+    yield f"{line[:-1]}]"
+
+
+def _fields_in_json(row: Any, depth: int) -> str:
+    values, between = row.__dict__, ",\n " + " " * depth
+    if not any(isinstance(value, tuple | Mapping) for value in values.values()):
+        return flat_strict_json(values, between)[1:-1]
+    parts = []
+    for name, value in values.items():
+        if _are_rows(value):
+            text = "".join(_rows_in_json(value, depth + 2))
+        else:
+            text = strict_json(value).replace("\n", between[1:])
+        parts.append(f'"{name}": {text}')
+    return between.join(parts)
 
 
 def read_results(path: Path) -> Results:
-    """Read a results.json.
+    """Read a results.json, or the folder results.parquet.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The file or folder.
 
     Returns
     -------
@@ -89,6 +153,8 @@ def read_results(path: Path) -> Results:
     ------
     RecordingError
         The file is not a results file, is damaged, or is of an unknown version.
+    UsageError
+        It is a folder, and pyarrow is not installed.
 
     Examples
     --------
@@ -97,6 +163,10 @@ def read_results(path: Path) -> Results:
     >>> read_results(Path("results.json")) == empty
     True
     """
+    if path.is_dir():
+        from cdtool.evaluation.results_folder import read_tables
+
+        return read_tables(path)
     content = read_bytes(path, RecordingError, most=MOST_JSON)
     try:
         values = parse_json(content)
@@ -216,7 +286,7 @@ def _value(kind: Any, value: Any, where: str) -> Any:
             return None
         kind = next(item for item in get_args(kind) if item is not type(None))
         return _value(kind, value, where)
-    if origin is tuple:
+    if origin in (tuple, Sequence):
         if not isinstance(value, list):
             raise ValueError(f"{where} is not a list")
         item_kind = get_args(kind)[0]
@@ -295,7 +365,7 @@ def _schema(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin in (Union, types.UnionType):
         (known,) = (item for item in inner if item is not type(None))
         return {"type": [_SCHEMA_TYPES[known], "null"]}
-    if origin is tuple:
+    if origin in (tuple, Sequence):
         return {"type": "array", "items": _schema(inner[0], parts)}
     if origin is Mapping:
         return {"type": "object", "additionalProperties": _schema(inner[1], parts)}

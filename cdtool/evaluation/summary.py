@@ -7,12 +7,14 @@ and false alarms: a detector that misses its slow cases looks fast. Median and P
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdtool.evaluation.results import ContactResult, ExposureResult, ForceResult, Results
+from cdtool.evaluation.rows import Rows, grouped, values_of
 from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
@@ -154,23 +156,22 @@ COUNTED_ALWAYS = frozenset(
 
 def summarise(results: Results) -> list[Summary]:
     """Return one Summary for each detector and group, in the order of the benchmark file; hold-out last."""
-    contacts: dict[tuple[str, str], list[ContactResult]] = {}
-    for contact in results.contacts:
-        contacts.setdefault((contact.detector, contact.group), []).append(contact)
-    false_alarms: dict[tuple[str, str], int] = {}
-    for alarm in results.false_alarms:
-        false_alarms[alarm.detector, alarm.group] = false_alarms.get((alarm.detector, alarm.group), 0) + 1
+    contacts = grouped(results.contacts, "detector", "group")
+    forces = {group: _failed(items) for (group,), items in grouped(results.forces, "group").items()}
+    false_alarms = Counter(
+        zip(values_of(results.false_alarms, "detector"), values_of(results.false_alarms, "group"), strict=True)
+    )
     exposures = {(item.detector, item.group): item for item in results.exposure}
     clusters = campaigns(results)
     return [
         _summary(
             detector,
             group,
-            contacts.get((detector, group), []),
-            false_alarms.get((detector, group), 0),
+            contacts.get((detector, group), ()),
+            false_alarms[detector, group],
             exposures.get((detector, group)),
             clusters,
-            [item for item in results.forces if item.group == group],
+            forces.get(group, math.nan),
         )
         for group in results.groups
         for detector in results.detectors
@@ -217,19 +218,28 @@ def summarise_kinds(results: Results) -> list[Summary]:
     `evaluate` adds them to the results.
     """
     kinds: dict[str, dict[str, None]] = {}
-    for item in results.contacts:
-        kinds.setdefault(item.group, {})[item.kind or ""] = None
+    for group, kind in zip(values_of(results.contacts, "group"), values_of(results.contacts, "kind"), strict=True):
+        kinds.setdefault(group, {})[kind or ""] = None
+    if not any(any(known) for known in kinds.values()):
+        return []
     clusters = campaigns(results)
+    contacts, forces = grouped(results.contacts, "group", "kind", "detector"), grouped(results.forces, "group")
     made = []
     for group in results.groups:
         known = kinds.get(group, {})
         for kind in known if any(known) else ():
-            of_kind = [item for item in results.contacts if item.group == group and (item.kind or "") == kind]
-            numbers = {(item.recording, item.contact) for item in of_kind}
-            forces = [item for item in results.forces if (item.recording, item.contact) in numbers]
-            for detector in results.detectors:
-                contacts = [item for item in of_kind if item.detector == detector]
-                made.append(_summary(detector, kind_group(group, kind), contacts, 0, None, clusters, forces))
+            rows = {
+                name: [
+                    *contacts.get((group, kind, name), ()),
+                    *(contacts.get((group, None, name), ()) if not kind else ()),
+                ]
+                for name in results.detectors
+            }
+            numbers = {(item.recording, item.contact) for items in rows.values() for item in items}
+            of_kind = [item for item in forces.get((group,), ()) if (item.recording, item.contact) in numbers]
+            failed = _failed(of_kind)
+            for name, items in rows.items():
+                made.append(_summary(name, kind_group(group, kind), items, 0, None, clusters, failed))
     return made
 
 
@@ -260,7 +270,7 @@ def later_ms(item: ContactResult) -> float:
 
 def at_worst(results: Results) -> Results:
     """Return the results with the longest latencies and the largest forces that missing load-cell samples allow."""
-    return replace(results, contacts=tuple(_at_worst(item) for item in results.contacts))
+    return replace(results, contacts=Rows(ContactResult, map(_at_worst, results.contacts)))
 
 
 def _at_worst(item: ContactResult) -> ContactResult:
@@ -292,7 +302,8 @@ def campaigns(results: Results) -> dict[str, str]:
     --------
     `cdtool.benchmark` returns the results.
     """
-    return {item.recording: item.campaign or item.recording for item in results.recordings}
+    names, named = values_of(results.recordings, "recording"), values_of(results.recordings, "campaign")
+    return {name: campaign or name for name, campaign in zip(names, named, strict=True)}
 
 
 def latencies(contacts: Sequence[ContactResult]) -> tuple[np.ndarray, np.ndarray]:
@@ -326,10 +337,11 @@ def _summary(
     false_alarms: int,
     exposure: ExposureResult | None,
     clusters: Mapping[str, str],
-    forces: Sequence[ForceResult],
+    force_failed: float,
 ) -> Summary:
-    in_progress = sum(item.in_progress for item in contacts)
-    contacts = [item for item in contacts if not item.in_progress]
+    every = list(contacts)
+    contacts = [item for item in every if not item.in_progress]
+    in_progress = len(every) - len(contacts)
     detected = [item for item in contacts if item.latency_ms is not None]
     values = np.array([item.latency_ms for item in detected], dtype=np.float64)
     labels = [clusters.get(item.recording, item.recording) for item in detected]
@@ -366,7 +378,7 @@ def _summary(
         force_at_alarm=float(np.median(at_alarm)) if at_alarm else math.nan,
         force_at_alarm_max=math.inf if at_alarm and missed else max(at_alarm, default=math.nan),
         peak_force=float(np.median(peaks)) if peaks else math.nan,
-        force_failed=_failed(forces),
+        force_failed=force_failed,
         clipped=sum(item.clipped for item in detected),
         in_progress=in_progress,
         onset_holes=sum(item.onset_hole_ms is not None for item in contacts),
@@ -377,6 +389,6 @@ def _summary(
 
 def _failed(forces: Sequence[ForceResult]) -> float:
     """Contacts above their force limits; NaN where none was judged, or none failed and one could not be assessed."""
-    failed = sum(item.verdict == "fail" for item in forces)
-    unknown = any(item.verdict == "not_assessable" for item in forces)
-    return math.nan if not forces or (unknown and not failed) else float(failed)
+    verdicts = Counter(values_of(forces, "verdict"))
+    failed, unknown = verdicts["fail"], verdicts["not_assessable"]
+    return math.nan if not verdicts or (unknown and not failed) else float(failed)

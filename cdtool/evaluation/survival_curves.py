@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cdtool.evaluation.results import ContactResult, Results
+from cdtool.evaluation.rows import grouped
 from cdtool.evaluation.statistics.kaplan_meier import Survival, survival
 from cdtool.evaluation.summary import latencies
 from cdtool.recording import FloatArray
@@ -48,9 +50,7 @@ def survival_curves(results: Results) -> tuple[SurvivalCurve, ...]:
     --------
     `survival` computes a curve; `cdtool.benchmark` returns the results.
     """
-    rows: dict[tuple[str, str], list[ContactResult]] = {}
-    for contact in results.scored_contacts:
-        rows.setdefault((contact.group, contact.detector), []).append(contact)
+    rows = grouped(results.scored_contacts, "group", "detector")
     return tuple(
         _curve(detector, group, rows[group, detector])
         for group in results.groups
@@ -59,7 +59,7 @@ def survival_curves(results: Results) -> tuple[SurvivalCurve, ...]:
     )
 
 
-def _curve(detector: str, group: str, contacts: list[ContactResult]) -> SurvivalCurve:
+def _curve(detector: str, group: str, contacts: Sequence[ContactResult]) -> SurvivalCurve:
     latency, censored = latencies(contacts)
     return SurvivalCurve(
         detector=detector,

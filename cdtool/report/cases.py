@@ -7,9 +7,10 @@ assessed and a detector that could not assess anything of a group; other outcome
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import chain, groupby, islice
 
 from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
 from cdtool.evaluation.evaluated import Evaluated
@@ -19,6 +20,11 @@ from cdtool.evaluation.summary import Summary, later_ms
 from cdtool.plain_text import counted
 from cdtool.report.number_text import number, spoken
 from cdtool.report.tables.results import required, value_of
+
+# A CI system keeps every case in memory and in its database: of more cases than this a suite has those that did not
+# pass, so many of each kind, and one that counts the others.
+MOST_CASES, MOST_OF_KIND = 5000, 1000
+_MORE = {"": "that passed", "failure": "more that fail", "error": "more errors", "skipped": "more not assessable"}
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Suite:
-    """The test cases of one subject."""
+    """The test cases of one subject, at most `MOST_CASES` and those that count the others."""
 
     name: str
     cases: tuple[Case, ...]
@@ -43,24 +49,44 @@ def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
     """Yield limits, force profiles, what was left out or damaged, recordings by detector and group, and kinds."""
     results = evaluated.results
     if results.limits:
-        yield Suite("limits", tuple(_limit(item) for item in results.limits))
+        yield Suite("limits", _bounded(map(_limit, results.limits)))
     checks = force_checks(results)
     if checks:
-        yield Suite("force", tuple(_force(item) for item in checks))
+        yield Suite("force", _bounded(map(_force, checks)))
     if results.skipped:
-        yield Suite("left out", tuple(Case(item.recording, "error", item.reason) for item in results.skipped))
+        yield Suite("left out", _bounded(Case(item.recording, "error", item.reason) for item in results.skipped))
     if results.losses:
-        yield Suite("damaged", tuple(_damaged(item) for item in results.losses))
+        yield Suite("damaged", _bounded(map(_damaged, results.losses)))
     silent = {(item.detector, item.group) for item in nothing_assessed(evaluated.summaries)}
     forbidden = {(item.detector, item.group) for item in force_missed(results, evaluated.summaries)}
-    outcomes = recording_outcomes(results)
-    for pair, items in groupby(outcomes, key=lambda item: (item.detector, item.group)):
-        cases = (_recording(item, pair in silent, pair in forbidden) for item in items)
-        yield Suite(".".join(pair), tuple(cases))
+    none = True
+    for pair, items in groupby(recording_outcomes(results), key=lambda item: (item.detector, item.group)):
+        none = False
+        yield Suite(".".join(pair), _bounded(_recording(item, pair in silent, pair in forbidden) for item in items))
     if evaluated.kinds:
-        yield Suite("kinds", tuple(_kind(item) for item in evaluated.kinds))
-    if not outcomes:
+        yield Suite("kinds", _bounded(map(_kind, evaluated.kinds)))
+    if none:
         yield Suite("benchmark", (Case("scored", "error", "nothing was scored"),))
+
+
+def _bounded(cases: Iterable[Case]) -> tuple[Case, ...]:
+    """Return all cases; of more than `MOST_CASES` the first of each kind that did not pass, and how many others."""
+    remaining = iter(cases)
+    kept = list(islice(remaining, MOST_CASES))
+    if (more := next(remaining, None)) is None:
+        return tuple(kept)
+    of_kind: dict[str, list[Case]] = {}
+    counts: Counter[str] = Counter()
+    for case in chain(kept, (more,), remaining):
+        counts[case.kind] += 1
+        if case.kind and counts[case.kind] <= MOST_OF_KIND:
+            of_kind.setdefault(case.kind, []).append(case)
+    listed = [case for items in of_kind.values() for case in items]
+    for kind, count in counts.items():
+        if others := count - len(of_kind.get(kind, ())):
+            words = f"{others} {_MORE[kind]}: all of them are in results.json"
+            listed.append(Case(f"{others} {_MORE[kind]}", kind, words if kind else "", () if kind else (words,)))
+    return tuple(listed)
 
 
 def _limit(item: LimitResult) -> Case:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from io import StringIO
 
 from cdtool.plain_text import plain
@@ -15,13 +15,17 @@ from cdtool.plain_text import plain
 _RUN_BY_SPREADSHEETS = re.compile(r"(^|;)(\s*)(?=[=+\-@＝＋－＠])")
 
 
-def csv_text(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a line of names and a line per row; empty = no value."""
+def csv_lines(names: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
+    """Yield a line of names and a line per row; empty = no value."""
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
-    writer.writerows([_cell(value) for value in row] for row in rows)
-    return text.getvalue()
+    for row in rows:
+        yield text.getvalue()
+        text.seek(0)
+        text.truncate()
+        writer.writerow([_cell(value) for value in row])
+    yield text.getvalue()
 
 
 def _cell(value: object) -> object:

@@ -1,20 +1,21 @@
-"""What every report of a benchmark shows, computed once as plain values: headline, tables, notes and test cases.
+"""What every report of a benchmark shows, computed once as plain values: headline, tables and notes.
 
-Renderers (HTML, Markdown, JUnit) add markup, choose what fits, and neither compute, format nor word anything.
+Renderers (HTML, Markdown) add markup, choose what fits, and neither compute, format nor word anything.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import Results, onset_words
+from cdtool.evaluation.rows import values_of
 from cdtool.plain_text import counted, shorten
-from cdtool.report.cases import Suite, suites_of
 from cdtool.report.few_contacts import explained
+from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
-from cdtool.report.table import Table
+from cdtool.report.table import Log, Table
 from cdtool.report.tables import forces, recordings
 from cdtool.report.tables.provenance import provenance_tables
 from cdtool.report.tables.results import (
@@ -27,6 +28,7 @@ from cdtool.report.tables.results import (
     part_of,
     results_table,
 )
+from cdtool.report.tables.worst_cases import worst_cases_table
 
 NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
 UNCHECKED = "Values to be checked against the standard."
@@ -45,11 +47,15 @@ TITLES = {
     "comparisons": "Comparisons",
     "force": "Force",
     "recordings": "Recordings",
+    "cases": "Worst and failed cases",
     "not_assessable": "Not assessable",
     "left_out": "Left out and warnings",
     "calibration": "False-alarm budget",
     "provenance": "Provenance",
 }
+_CONTACT = ("group", "recording", "contact")
+# Where only the worst and the failed cases are listed.
+TITLES_OF_MANY = {"latency": "Distribution of the latency", "recordings": TITLES["cases"]}
 # A text from a file that is part of a sentence is cut to this length.
 _LONGEST = 200
 
@@ -86,6 +92,18 @@ _NOTES = {
     "provenance": "All results with all their digits, and the hash of every recording, are in results.json.",
 }
 
+_NOTES_OF_MANY = {
+    "latency": (
+        "Bars: number of contacts in each class of latency, by detector; the highest bar of each has the same height. "
+        "Vertical line and bar below: median and its interval; dotted if its end is not reached. A missed contact has "
+        "no latency."
+    ),
+}
+_ALL_OF_THEM = (
+    "These are the worst of each detector and group, those with a trigger plot first; all recordings are in "
+    "results.json and results.parquet."
+)
+
 
 @dataclass(frozen=True)
 class ProfileText:
@@ -116,7 +134,6 @@ class Model:
     provenance: tuple[Table, ...]
     profiles: Mapping[str, ProfileText]
     notes: Mapping[str, str]
-    suites: tuple[Suite, ...]
 
     def first_reasons(self, most: int) -> list[str]:
         """Return the first reasons behind the headline, and how many more there are."""
@@ -124,9 +141,14 @@ class Model:
         return [*self.reasons[:most], *([f"and {more} more"] if more > 0 else [])]
 
 
-def report_model(evaluated: Evaluated) -> Model:
-    """Return everything that the reports of a benchmark show."""
+def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
+    """Return everything that the reports of a benchmark show; `traced` are the recordings with a trace.
+
+    Of very many recordings only the worst and the failed cases are listed.
+    """
     results, summaries = evaluated.results, evaluated.summaries
+    many = is_many(results)
+    cases, counts = worst_cases_table(results, traced) if many else (None, "")
     provenance = results.provenance
     version = provenance.get("tool_version")
     scope = (
@@ -144,9 +166,8 @@ def report_model(evaluated: Evaluated) -> Model:
         differences_table(evaluated),
         forces.groups_table(results),
         forces.points_table(results),
-        forces.contacts_table(results),
+        *([cases] if cases else [forces.contacts_table(results), recordings.recordings_table(results)]),
         forces.contacts_table(results, only_exceptions=True),
-        recordings.recordings_table(results),
         recordings.scored_table(results),
         *recordings.contact_tables(results),
         recordings.false_alarms_table(results),
@@ -169,10 +190,12 @@ def report_model(evaluated: Evaluated) -> Model:
         profiles=_profiles(results),
         notes={
             **_NOTES,
+            **(_NOTES_OF_MANY if many else {}),
+            "groups": _groups_note(evaluated) if many else "",
+            "cases": f"{counts} {_ALL_OF_THEM}" if many else "",
             "results": _results_note(evaluated),
             "differences": differences_note(evaluated) if evaluated.comparisons else "",
         },
-        suites=tuple(suites_of(evaluated)),
     )
 
 
@@ -181,7 +204,10 @@ def counts_text(evaluated: Evaluated) -> str:
     summaries, results = evaluated.summaries, evaluated.results
     if not any(item.contacts or item.operations for item in summaries):
         return "nothing was scored"
-    contacts = len({(item.group, item.recording, item.contact) for item in results.scored_contacts})
+    columns = tuple(values_of(results.contacts, name) for name in ("outcome", "onset_hole_ms", *_CONTACT))
+    seen = {(outcome == "in_progress", *contact) for outcome, _, *contact in zip(*columns, strict=True)}
+    begun = sum(is_begun for is_begun, *_ in seen)
+    contacts = counted(len(seen) - begun, "contact")
     counts = (
         ("detected", sum(item.detected for item in summaries)),
         ("missed", sum(item.missed for item in summaries)),
@@ -190,16 +216,24 @@ def counts_text(evaluated: Evaluated) -> str:
     outcomes = ", ".join(f"{count} {outcome}" for outcome, count in counts)
     if clipped := sum(item.clipped for item in summaries):
         outcomes += f" ({clipped} before the onset, counted as 0 ms)"
-    if holes := len(
-        {(item.group, item.recording, item.contact) for item in results.contacts if item.onset_hole_ms is not None}
-    ):
+    if holes := len({tuple(contact) for _, hole, *contact in zip(*columns, strict=True) if hole is not None}):
         outcomes += f"; {counted(holes, 'contact')} may have begun where load-cell samples are missing"
-    if begun := len({(item.group, item.recording, item.contact) for item in results.contacts if item.in_progress}):
+    if begun := len(
+        {tuple(contact) for outcome, _, *contact in zip(*columns, strict=True) if outcome == "in_progress"}
+    ):
         outcomes += f"; {counted(begun, 'contact')} in progress at the start, not scored"
     assessed = any(item.watched and item.judged_operations for item in summaries)
     count = counted(sum(item.false_alarms for item in summaries), "false alarm")
     alarms = count if assessed else f"false alarms {NOT_ASSESSABLE}"
-    return f"{counted(contacts, 'contact')} with {counted(len(results.detectors), 'detector')}: {outcomes}; {alarms}"
+    return f"{contacts} with {counted(len(results.detectors), 'detector')}: {outcomes}; {alarms}"
+
+
+def _groups_note(evaluated: Evaluated) -> str:
+    """Return which groups have plots; empty if all have."""
+    plotted, every = plotted_groups(evaluated), {item.group for item in evaluated.summaries if item.contacts}
+    if len(plotted) == len(every):
+        return ""
+    return f"Plotted are the {len(plotted)} of {len(every)} groups with the largest share of missed contacts."
 
 
 def _tone(results: Results) -> str:
@@ -215,7 +249,7 @@ def _results_note(evaluated: Evaluated) -> str:
     """Return how to read the results: from when to when, what is in brackets, what counts where."""
     results = evaluated.results
     onset = shorten(onset_words(results.provenance), _LONGEST)
-    resolutions = [item.resolution_ms for item in results.contacts if item.resolution_ms is not None]
+    resolutions = [value for value in values_of(results.contacts, "resolution_ms") if value is not None]
     resolution = f"; resolution up to {number(max(resolutions))} ms" if resolutions else ""
     note = (
         f"Latency: from the onset of the contact ({onset}) to the sample that raised the alarm, debounce "

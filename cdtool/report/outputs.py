@@ -34,11 +34,13 @@ def check_outputs(targets: Sequence[Path], *, force: bool = False, subject: Subj
         resolved(target)
         if target == Path():
             raise UsageError("--output is empty", "give a name, such as report or results.json")
-        if _is_folder(target) and _has_folders(subject):
+        if _is_folder(target, subject) and _has_folders(subject):
             _check_folder(target, force=force)
-        else:
-            writer = _writer_of(target, subject)
-            _check_parent(target)
+            continue
+        writer = _writer_of(target, subject)
+        _check_parent(target)
+        writer.check(target)
+        if not writer.writes_folder:
             for path in writer.files(target):
                 refuse_other_kind(path, writer.kinds[path.suffix.lower()], force=force)
 
@@ -63,7 +65,7 @@ def write_outputs(
         report = replace(report, traces=as_read(report.traces))
     written = []
     for target in targets:
-        if _is_folder(target):
+        if _is_folder(target, subject):
             written.append(_write_folder(report, target, force=force))
         else:
             _write_file(_writer_of(target, subject), report, target)
@@ -87,8 +89,8 @@ def _write_file(writer: Writer[Any], report: Any, target: Path) -> None:
 
 
 def _writer_of(target: Path, subject: Subject) -> Writer[Any]:
-    writer = writer_of(target, subject) if not target.is_dir() else None
-    if writer is None:
+    writer = writer_of(target, subject)
+    if writer is None or (target.is_dir() and not writer.writes_folder):
         *others, last = known_suffixes(subject)
         known = f"{', '.join(others)} or {last}" if others else last
         folder = "a folder, or " if _has_folders(subject) else ""
@@ -137,8 +139,11 @@ def _kind_in_folder(name: str) -> Kind | None:
     return None
 
 
-def _is_folder(target: Path) -> bool:
-    return target.is_dir() or not target.suffix
+def _is_folder(target: Path, subject: Subject) -> bool:
+    """Return whether all reports are written into a folder of that name."""
+    if not target.suffix:
+        return True
+    return target.is_dir() and not ((writer := writer_of(target, subject)) and writer.writes_folder)
 
 
 def _check_folder(target: Path, *, force: bool) -> None:

@@ -66,6 +66,7 @@ class Table:
     """A table under its title; `source` names its rows in results.json.
 
     `marks`: by a property that readers may select, whether each row has it. `logs`: the recording of each row.
+    `more` rows are not shown, because there are too many.
     """
 
     name: str
@@ -75,11 +76,12 @@ class Table:
     source: str = ""
     marks: Mapping[str, Sequence[bool]] = field(default_factory=dict)
     logs: Sequence[Log] = ()
+    more: int = 0
 
     @property
     def counted_title(self) -> str:
-        """The title with the number of rows."""
-        return f"{self.title} ({len(self.rows)})"
+        """The title with the number of rows, also those that are not shown."""
+        return f"{self.title} ({len(self.rows) + self.more})"
 
     def cells(self, heading: str) -> list[Cell]:
         """Return the cells below a heading."""
@@ -103,11 +105,18 @@ class Table:
 
 
 def tabulate(
-    name: str, title: str, fields: Fields[Item], items: Sequence[Item], source: str = "", logs: Sequence[Log] = ()
+    name: str,
+    title: str,
+    fields: Fields[Item],
+    items: Sequence[Item],
+    source: str = "",
+    logs: Sequence[Log] = (),
+    most: int | None = None,
 ) -> Table:
-    """Return the table with a row per item and a column per field."""
-    rows = [[make(item) for _, make in fields] for item in items]
-    return Table(name, title, [column for column, _ in fields], rows, source, logs=logs)
+    """Return the table with a row per item, up to `most`, and a column per field."""
+    rows = [[make(item) for _, make in fields] for item in items[:most]]
+    columns = [column for column, _ in fields]
+    return Table(name, title, columns, rows, source, logs=logs[:most], more=len(items) - len(rows))
 
 
 def count_cell(count: int, tone: str = "") -> Cell:

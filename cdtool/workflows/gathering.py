@@ -10,7 +10,17 @@ from typing import Any
 
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.evaluation.force.verdict import ForceVerdict
-from cdtool.evaluation.results import CalibrationResult, RecordingFinding, RecordingResult, Results, Skipped
+from cdtool.evaluation.results import (
+    CalibrationResult,
+    ContactResult,
+    FalseAlarmResult,
+    ForceResult,
+    RecordingFinding,
+    RecordingResult,
+    Results,
+    Skipped,
+)
+from cdtool.evaluation.rows import Rows
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.findings import Finding, Remark
@@ -75,10 +85,16 @@ class Gathering:
         self.setup = setup
         self.names = tuple(names)
         self.learned = learned
-        self.outcomes: list[LogOutcome] = []
-        self.skipped: list[Skipped] = []
-        self.findings = [RecordingFinding.of(str(setup.path), Finding(Remark(words))) for words in setup.migrated]
+        self.recordings = Rows(RecordingResult)
+        self.contacts = Rows(ContactResult)
+        self.false_alarms = Rows(FalseAlarmResult)
+        self.forces = Rows(ForceResult)
+        self.skipped = Rows(Skipped)
+        self.findings = Rows(RecordingFinding)
+        self.findings += (RecordingFinding.of(str(setup.path), Finding(Remark(words))) for words in setup.migrated)
         self.findings += setup.rules_of("").findings
+        # SHA-256 of the files beside the logs.
+        self._beside: dict[str, str] = {}
         # By detector: the unit of the value compared with the limits, which may differ from that of the signal.
         self.units: dict[str, str] = {}
         self._exposure: dict[tuple[str, str], Exposure] = {}
@@ -203,7 +219,11 @@ class Gathering:
                 self._exposure[group, detector.detector].recordings += 1
         if outcome.recording.point:
             self._tests.setdefault((group, outcome.recording.point), []).extend(outcome.rows.verdicts)
-        self.outcomes.append(replace(outcome, traces=()))
+        self.recordings.append(outcome.recording)
+        self.contacts += outcome.contacts
+        self.false_alarms += outcome.false_alarms
+        self.forces += outcome.rows.forces
+        self._beside |= {f"{outcome.recording.recording}, {name}": digest for name, digest in outcome.rows.beside}
 
     def _offer(self, log: int, group: str, outcomes: OfOperation, trace: Trace | None) -> None:
         number = self._choice.offer(log, group, len(outcomes), striking_of(outcomes), slowest_of(outcomes))
@@ -234,39 +254,32 @@ class Gathering:
         if self._choice.left_out:
             left_out = Finding(PlotsLeftOut(self._choice.left_out))
             self.findings.append(RecordingFinding.of(str(self.setup.path), left_out))
-        beside = {
-            f"{item.recording.recording}, {name}": digest
-            for item in self.outcomes
-            if item.recording
-            for name, digest in item.rows.beside
-        }
         profiles = {name: group.force for name, group in self.setup.impacts.items()}
         return Results(
-            provenance={**provenance, "load_cell_sha256": beside} if beside else provenance,
+            provenance={**provenance, "load_cell_sha256": self._beside} if self._beside else provenance,
             detectors=self.names,
             groups=self.setup.groups,
-            recordings=tuple(item.recording for item in self.outcomes if item.recording),
-            contacts=tuple(row for item in self.outcomes for row in item.contacts),
-            false_alarms=tuple(row for item in self.outcomes for row in item.false_alarms),
+            recordings=self.recordings,
+            contacts=self.contacts,
+            false_alarms=self.false_alarms,
             exposure=tuple(item.result(group, name) for (group, name), item in self._exposure.items()),
-            forces=tuple(row for item in self.outcomes for row in item.rows.forces),
+            forces=self.forces,
             points=tuple(point_rows(self._tests, profiles)),
             sweep=tuple(self._sweep.rows(self.names, self.setup.groups)),
             calibration=tuple(calibration),
-            skipped=tuple(self.skipped),
+            skipped=self.skipped,
             findings=self._findings(),
         )
 
-    def _findings(self) -> tuple[RecordingFinding, ...]:
+    def _findings(self) -> Rows[RecordingFinding]:
         """Return all findings; one about a file of which several groups have runs is the same in each of them."""
-        findings = (*self.findings, *unchecked(self._unchecked))
-        return tuple(dict.fromkeys(findings)) if self.setup.has_runs else findings
+        self.findings += unchecked(self._unchecked)
+        return Rows(RecordingFinding, dict.fromkeys(self.findings)) if self.setup.has_runs else self.findings
 
     @property
     def scored(self) -> frozenset[str]:
         """Return the names of the recordings that were scored or left out by name."""
-        skipped = {item.recording for item in self.skipped}
-        return frozenset(skipped.union(item.recording.recording for item in self.outcomes if item.recording))
+        return frozenset((*self.skipped.values("recording"), *self.recordings.values("recording")))
 
     def _refuse_learned(self, recording: RecordingResult) -> None:
         before = self._scored.get(recording.sha256, "") if recording.sha256 else ""

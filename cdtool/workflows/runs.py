@@ -25,6 +25,9 @@ from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, wit
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.log_checks.log_findings import log_warnings
 
+# Folders of which every worker of a cluster must see a log, before it reads others.
+_FOLDERS = 50
+
 
 @dataclass(frozen=True)
 class Runs:
@@ -241,7 +244,8 @@ def load_runs(
 
     cut = RunCut.of(reading.operations)
     read = _AsLogged(machine_file, cut)
-    logs = list(in_order(read, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_lost_run))
+    with reading.workers.ready(to_be_seen(paths)):
+        logs = list(in_order(read, paths, len(paths), reading.workers, progress=reading.progress, of_lost=_lost_run))
     logged: list[tuple[Path, Path, LoggedRecording | CdtoolError]] = []  # as listed, the log or its run
     for path, log in zip(paths, logs, strict=True):
         if isinstance(log, _NotRead):
@@ -284,6 +288,14 @@ def load_runs(
         findings.extend(log_warnings(recording, contacts, rule))
         without.extend((recording.name, item) for item in absent_truth(recording))
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known, lasts)
+
+
+def to_be_seen(paths: Iterable[Path]) -> list[Path]:
+    """Return one log of each folder, of the first folders: who sees these is likely to see all."""
+    by_folder: dict[Path, Path] = {}
+    for path in paths:
+        by_folder.setdefault(path.parent, path)
+    return list(by_folder.values())[:_FOLDERS]
 
 
 def _ranges_of(

@@ -32,7 +32,7 @@ from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisa
 from cdtool.workflows.benchmark.scoring import Scored, score_runs
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.gathering import Gathering
-from cdtool.workflows.runs import shown_path
+from cdtool.workflows.runs import shown_path, to_be_seen
 
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
@@ -58,6 +58,7 @@ def score(
     clock: Literal["recording", "source"] = "recording",
     listed_only: bool = False,
     jobs: int = 1,
+    workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Score:
     """Score the trigger times of any program against the contacts of a benchmark file's recordings.
@@ -75,6 +76,8 @@ def score(
         Leave out a recording without a row for a detector; else it counts as monitored without an alarm.
     jobs : int, optional
         Number of logs processed at a time; the results do not depend on it.
+    workers : Workers, optional
+        In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
     progress : callable, optional
         Called after each log with the number done and the total.
 
@@ -98,9 +101,21 @@ def score(
     >>> [(row.group, row.detected, row.missed, row.false_alarms) for row in scored.evaluated.summaries]
     [('stiff', 4, 0, 0), ('soft', 2, 1, 0), ('holdout', 0, 0, 1)]
     """
-    given, workers = read_triggers(location(triggers)), Workers(jobs)
+    given, workers = read_triggers(location(triggers)), workers or Workers(jobs)
+    setup = read_benchmark_file(benchmark, learning=False, also_known=tuple(given.rows))
+    with workers.ready(to_be_seen([path for item in setup.impacts.values() for path in item.logs])):
+        return _run(setup, given, workers, clock, listed_only, progress)
+
+
+def _run(
+    setup: BenchmarkFile,
+    given: TriggerFile,
+    workers: Workers,
+    clock: str,
+    listed_only: bool,
+    progress: Progress | None,
+) -> Score:
     names = tuple(given.rows)
-    setup = read_benchmark_file(benchmark, learning=False, also_known=names)
     setup, measured = with_synchronisation(setup, workers)
     base = setup.path.parent
     work = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
@@ -120,7 +135,7 @@ def score(
         gathered.skipped += _without_run(said, known, gathered.scored)
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
-    return Score(evaluate(results, rules), gathered.traces, (location(triggers), *setup.inputs))
+    return Score(evaluate(results, rules), gathered.traces, (given.path, *setup.inputs))
 
 
 @dataclass(frozen=True)

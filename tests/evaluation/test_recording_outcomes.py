@@ -140,12 +140,12 @@ def test_a_detector_without_results_differs_from_one_without_alarms():
 def test_a_log_whose_own_name_ends_like_an_operation_is_found_first():
     alarm = replace(RESULTS.false_alarms[0], recording="cut#2")
     log = RecordingResult("cut#2", "holdout", "", 7.0, 1, 0)
-    found = recording_outcomes(replace(RESULTS, false_alarms=(alarm,), recordings=(*RESULTS.recordings, log)))
+    found = list(recording_outcomes(replace(RESULTS, false_alarms=(alarm,), recordings=(*RESULTS.recordings, log))))
     assert [item.recording for item in found if item.false_alarms] == ["cut#2"]
 
 
 def test_contacts_of_results_without_rows_of_recordings_are_found_too():
-    found = recording_outcomes(replace(RESULTS, recordings=()))
+    found = list(recording_outcomes(replace(RESULTS, recordings=())))
     assert {item.recording for item in found if item.contacts} == {"quick", "steady", "slow", "late", "blind"}
     assert [item.recording for item in found if item.false_alarms] == ["cut#2"]
 

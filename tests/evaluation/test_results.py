@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 import pytest
@@ -17,9 +17,13 @@ from cdtool.evaluation.results import (
     Skipped,
     onset_words,
 )
-from cdtool.evaluation.results_file import read_results, to_json
+from cdtool.evaluation.results_file import json_pieces, read_results, to_json
+from cdtool.evaluation.rows import Rows
 from cdtool.evaluation.summary import summarise
+from cdtool.strict_json import strict_json
 from tests.evaluation.full_results import FULL, RESULTS, STEP
+from tests.report.html.html_case import case
+from tests.synthetic.many_results import many_results
 
 
 def test_a_summary_counts_contacts_not_in_its_mean():
@@ -34,6 +38,14 @@ def test_the_json_is_strict_with_null_for_missing_values():
     values = json.loads(to_json(RESULTS), parse_constant=lambda name: pytest.fail(name))
     assert values["contacts"][0]["peak_force_n"] is None and values["contacts"][3]["latency_ms"] is None
     assert values["provenance"]["gain"] is None and values["schema_version"] == SCHEMA_VERSION
+
+
+@pytest.mark.parametrize("results", [FULL, RESULTS, many_results(30, 3), case()[0].results], ids=range(4))
+def test_the_json_is_laid_out_as_strict_json_lays_out_all_of_it(results):
+    rows = {item.name: getattr(results, item.name) for item in fields(results)}
+    plain = replace(results, **{name: tuple(held) for name, held in rows.items() if isinstance(held, Rows)})
+    assert to_json(results) == to_json(plain) == strict_json(asdict(plain)) + "\n"
+    assert max(map(len, json_pieces(many_results(300)))) < 4000
 
 
 def test_results_survive_writing_and_reading(tmp_path):

@@ -10,12 +10,20 @@ from dataclasses import fields, replace
 import pytest
 
 from cdtool.evaluation.results import ContactResult, ForceResult, ForceStepResult, Results
-from cdtool.report.writers.contacts import contacts_csv
-from cdtool.report.writers.forces import forces_csv
+from cdtool.report.writers.contacts import contacts_lines
+from cdtool.report.writers.forces import forces_lines
 from tests.report.bench import contact
 from tests.report.hostile import HOSTILE
 
 RUN = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
+
+
+def contacts_csv(results: Results) -> str:
+    return "".join(contacts_lines(results))
+
+
+def forces_csv(results: Results) -> str:
+    return "".join(forces_lines(results))
 
 
 def read(text: str, delimiter: str = ",") -> list[dict[str, str]]:

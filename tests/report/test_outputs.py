@@ -16,7 +16,7 @@ from cdtool.report.markdown.report import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.plots.figures import slug
 from cdtool.report.writers.base import Report
-from cdtool.report.writers.contacts import contacts_csv
+from cdtool.report.writers.contacts import contacts_lines
 from cdtool.report.writers.junit import to_junit
 from tests.report.bench import Bench
 from tests.report.hostile import HOSTILE
@@ -58,7 +58,7 @@ def test_each_suffix_gets_its_content(done, tmp_path):
     assert json.loads(targets[0].read_text(encoding="utf-8"))["schema_version"] == SCHEMA_VERSION
     assert encode_traces(read_traces(tmp_path / "a.traces.json.gz")) == encode_traces(done.traces)
     assert targets[1].read_text(encoding="utf-8") == to_markdown(Report(done.evaluated))
-    assert targets[2].read_text(encoding="utf-8") == contacts_csv(done.evaluated.results)
+    assert targets[2].read_text(encoding="utf-8") == "".join(contacts_lines(done.evaluated.results))
     assert targets[3].read_text(encoding="utf-8") == to_junit(done)
     assert ElementTree.parse(targets[3]).getroot().tag == "testsuites"
     assert targets[4].read_text(encoding="utf-8").lower().startswith("<!doctype html>")

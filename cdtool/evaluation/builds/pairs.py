@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.results import ContactResult, RecordingResult, Results
+from cdtool.evaluation.rows import grouped, values_of
 
 # An onset in seconds since 1970 is stored to some 2e-7 s.
 _CLOCK = 1e-6
@@ -38,7 +39,8 @@ def pair_recordings(old: Results, new: Results) -> dict[str, Pairing]:
     """
     onsets = (_onsets(old), _onsets(new))
     shared = [group for group in old.groups if group in new.groups]
-    return {group: _pair(group, _of(old, group), _of(new, group), *onsets) for group in shared}
+    before, after = (grouped(results.recordings, "group") for results in (old, new))
+    return {group: _pair(group, before.get((group,), ()), after.get((group,), ()), *onsets) for group in shared}
 
 
 def _pair(
@@ -109,13 +111,11 @@ def _agree(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 def _onsets(results: Results) -> Onsets:
     found: dict[tuple[str, str], dict[int, tuple[float, float]]] = defaultdict(dict)
-    for item in results.contacts:
-        found[item.group, item.recording][item.contact] = (item.onset_s, item.onset_uncertainty_s or 0.0)
+    names = ("group", "recording", "contact", "onset_s", "onset_uncertainty_s")
+    columns = (values_of(results.contacts, name) for name in names)
+    for group, recording, contact, onset, uncertainty in zip(*columns, strict=True):
+        found[group, recording][contact] = (onset, uncertainty or 0.0)
     return found
-
-
-def _of(results: Results, group: str) -> list[RecordingResult]:
-    return [item for item in results.recordings if item.group == group]
 
 
 def pairs_of_contacts(

@@ -16,6 +16,8 @@ from cdtool.errors import UsageError
 from cdtool.recording import FloatArray
 
 IntArray = npt.NDArray[np.intp]
+# More clusters than this are put together before they are resampled, flipped or exchanged.
+MOST_CLUSTERS = 2000
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,20 @@ class Clusters:
     def sums(self, values: FloatArray) -> FloatArray:
         """Return the sum over each cluster (k,) of a quantity given for each value (n,)."""
         return np.bincount(self.number, weights=values, minlength=len(self)).astype(np.float64)
+
+    def merged(self, most: int, seed: int) -> Clusters:
+        """Return at most so many clusters, by putting random ones together; unchanged if there are no more.
+
+        A mean of independent clusters that are put together varies as much as that of the clusters: an interval or a
+        test needs no more of them than its resamples can tell apart, and its time would grow with their square.
+        """
+        k = len(self)
+        if k <= most:
+            return self
+        place = np.random.default_rng(seed).permutation(k) % most
+        number = place[self.number]
+        order = np.argsort(number, kind="stable")
+        return Clusters(self.values[order], number[order], np.bincount(number, minlength=most))
 
 
 def clusters_of(values: npt.ArrayLike, labels: Iterable[Hashable]) -> Clusters:

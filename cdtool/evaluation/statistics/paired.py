@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.statistics.bootstrap import BATCH, RESAMPLES, bca, bca_bounds, resampled_mean
-from cdtool.evaluation.statistics.clusters import Clusters, IntArray, clusters_of
+from cdtool.evaluation.statistics.clusters import MOST_CLUSTERS, Clusters, IntArray, clusters_of
 from cdtool.evaluation.statistics.interval import Interval, check_level
 from cdtool.evaluation.statistics.rates import check_count
 from cdtool.evaluation.statistics.small_sample import FEWEST, too_few
@@ -98,8 +98,8 @@ def paired_difference(
     n, k = len(groups.values), len(groups)
     if k < 2:
         return Difference(mean, math.nan, math.nan, n, k)
-    sums = groups.sums(groups.values)
-    return Difference(mean, _flipped_p(sums, seed), _signed_rank_p(sums / groups.counts), n, k)
+    drawn = groups.merged(MOST_CLUSTERS, seed)
+    return Difference(mean, _flipped_p(drawn.sums(drawn.values), seed), _signed_rank_p(_means(groups)), n, k)
 
 
 def unpaired_difference(
@@ -147,8 +147,9 @@ def unpaired_difference(
     (-10.0, 0.0286)
     """
     check_level(level)
-    first, second = clusters_of(a, clusters_a), clusters_of(b, clusters_b)
-    n, k = len(first.values) + len(second.values), len(first) + len(second)
+    all_of_a, all_of_b = clusters_of(a, clusters_a), clusters_of(b, clusters_b)
+    n, k = len(all_of_a.values) + len(all_of_b.values), len(all_of_a) + len(all_of_b)
+    first, second = (side.merged(MOST_CLUSTERS, seed) for side in (all_of_a, all_of_b))
     mean_a, mean_b = resampled_mean(first), resampled_mean(second)
 
     def difference(*drawn: IntArray, axis: int = -1) -> FloatArray:
@@ -164,7 +165,7 @@ def unpaired_difference(
         return Difference(mean, math.nan, math.nan, n, k)
     from scipy import stats
 
-    ranks = stats.mannwhitneyu(_means(first), _means(second))
+    ranks = stats.mannwhitneyu(_means(all_of_a), _means(all_of_b))
     return Difference(mean, _exchanged_p(first, second, seed), float(ranks.pvalue), n, k)
 
 

@@ -28,6 +28,8 @@ SCHEMA_VERSION = 3
 # The version before: "not assessable", where results.json has had "not_assessable" since its version 3.
 _SPACED_WORDS = 2
 NO_LIMIT = 1_000_000_000
+# The name of the file in a results.parquet.
+TRACES_IN_FOLDER = "results.traces.json.gz"
 
 # Steps over the range of a panel; a plot has fewer pixels.
 _LEVELS = 8000
@@ -42,7 +44,7 @@ def traces_path(results: Path) -> Path:
     Parameters
     ----------
     results : Path
-        The results file.
+        The results file, or the folder results.parquet.
 
     Returns
     -------
@@ -54,10 +56,10 @@ def traces_path(results: Path) -> Path:
     >>> traces_path(Path("results.json")).name
     'results.traces.json.gz'
     """
-    return results.with_name(f"{results.stem}.traces.json.gz")
+    return results / TRACES_IN_FOLDER if results.is_dir() else results.with_name(f"{results.stem}.traces.json.gz")
 
 
-def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
+def encode_traces(traces: Sequence[Trace], results: str = "", results_sha256: str = "") -> bytes:
     """Return traces as gzipped JSON.
 
     Parameters
@@ -66,6 +68,8 @@ def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
         The traces of a benchmark.
     results : str
         The text of the results file that they belong to.
+    results_sha256 : str
+        Its hash, in place of the text.
 
     Returns
     -------
@@ -79,7 +83,7 @@ def encode_traces(traces: Sequence[Trace], results: str = "") -> bytes:
     """
     values = {
         "schema_version": SCHEMA_VERSION,
-        "results_sha256": _digest(results),
+        "results_sha256": results_sha256 or _digest(results),
         "traces": [trace_values(trace) for trace in traces],
     }
     return gzip.compress(strict_json(values, compact=True).encode("utf-8"), compresslevel=6, mtime=0)

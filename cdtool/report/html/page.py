@@ -17,7 +17,7 @@ from cdtool.plain_text import counted
 from cdtool.report.html.page_tables import PageTable, classes, visible
 from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.traces import plot_height, trace_data
-from cdtool.report.model import NO_CERTIFICATE, TITLES
+from cdtool.report.model import NO_CERTIFICATE, TITLES, TITLES_OF_MANY
 from cdtool.report.writers.base import Report
 
 if TYPE_CHECKING:
@@ -29,12 +29,15 @@ _FOLDER = Path(__file__).with_name("page_files")
 _REASONS = 10
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
-    *("not_met", "met", "results", "kinds", "comparisons", "force", "points", "forces", "recordings", "not_assessable"),
-    *("skipped", "damaged", "findings", "calibration"),
+    *("not_met", "met", "results", "kinds", "comparisons", "force", "points", "forces", "recordings", "cases"),
+    *("not_assessable", "skipped", "damaged", "findings", "calibration"),
 )
 _TEMPLATE, _STYLE = "report.html.j2", "report.css"
 # In the order in which they use one another.
-_SCRIPTS = ("scales.js", "chart.js", "legend.js", "plots.js", "forces.js", "trace.js", "tables.js", "report.js")
+_SCRIPTS = (
+    *("scales.js", "chart.js", "legend.js", "plots.js", "histogram.js", "forces.js", "trace.js", "tables.js"),
+    "report.js",
+)
 # JSON inside a page must not end its script element, nor its line where a script is read.
 _ESCAPES = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&\u2028\u2029"})
 
@@ -58,7 +61,7 @@ def to_html(report: Report) -> str:
         trace_height=plot_height(traces[0]) if traces else 0,
         kept=f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
         model=model,
-        titles=TITLES,
+        titles=TITLES | (TITLES_OF_MANY if "cases" in model.tables else {}),
         certificate=NO_CERTIFICATE,
         tables=tables,
         provenance=[PageTable(table, {}) for table in model.provenance],

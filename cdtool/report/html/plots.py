@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from cdtool.detection import REASONS
 from cdtool.evaluation.results import ContactResult, Results, SweepResult
+from cdtool.evaluation.rows import grouped, picked, values_of
 from cdtool.evaluation.statistics.kaplan_meier import survival
 from cdtool.evaluation.statistics.rates import poisson_at_most
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary, latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
+from cdtool.recording import FloatArray
 from cdtool.report.few_contacts import draws_no_interval
 from cdtool.report.html.page_tables import short, visible
 from cdtool.report.html.traces import HEIGHTS
+from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.model import AXES
 from cdtool.report.number_text import number, spoken, with_interval
 from cdtool.report.plots.style import look_of
@@ -28,8 +31,15 @@ from cdtool.report.tables.recordings import log_of, logs_of
 from cdtool.report.tables.results import part_of
 from cdtool.report.writers.base import Report
 
+Row = TypeVar("Row")
 # Heights [px] of a detector's lane in the latency plot and of the other plots.
 LANE_HEIGHT, LANES_AXIS_HEIGHT, PLOT_HEIGHT = 66, 44, 300
+HISTOGRAM_HEIGHT = 96
+
+# Classes of a histogram, and the most points of a curve.
+CLASSES, MOST_STEPS = 60, 400
+# A plot of latencies has no mark below this [ms].
+_FLOOR_MS = 1.0
 
 Contacts = Mapping[tuple[str, str], Sequence[ContactResult]]
 
@@ -37,19 +47,20 @@ Contacts = Mapping[tuple[str, str], Sequence[ContactResult]]
 def plot_data(report: Report) -> dict[str, Any]:
     """Return everything that the plots need except the traces themselves."""
     results = report.evaluated.results
-    contacts: dict[tuple[str, str], list[ContactResult]] = {}
-    for item in results.scored_contacts:
-        contacts.setdefault((item.group, item.detector), []).append(item)
+    contacts = grouped(results.scored_contacts, "group", "detector")
+    many = is_many(results)
+    groups = plotted_groups(report.evaluated) if many else results.groups
+    of_groups = [item for item in report.evaluated.summaries if item.group in groups]
     return {
         "detectors": [_detector(results, name) for name in results.detectors],
         "groups": [shown(group) for group in results.groups],
-        "recordings": [shown(item.recording) for item in results.recordings],
+        "recordings": [] if many else [shown(item.recording) for item in results.recordings],
         "heights": HEIGHTS,
         "axes": AXES,
         "reasons": REASONS,
-        "latency": _latency(results, report.evaluated.summaries, contacts),
-        "survival": _survival(results, contacts),
-        "amoc": _amoc(results),
+        "latency": (_histograms if many else _latency)(results, of_groups, contacts),
+        "survival": _survival(results, groups, contacts, MOST_STEPS if many else None),
+        "amoc": _amoc(results, groups),
         "force": _force(report),
     }
 
@@ -109,15 +120,50 @@ def _latency(results: Results, summaries: Sequence[Summary], contacts: Contacts)
     return [{**group, "height": LANE_HEIGHT * len(group["rows"]) + LANES_AXIS_HEIGHT} for group in found.values()]
 
 
+def _histograms(results: Results, summaries: Sequence[Summary], contacts: Contacts) -> list[dict[str, Any]]:
+    """Return for each group the numbers of contacts in classes of latency, which all its detectors share."""
+    detectors = {name: i for i, name in enumerate(results.detectors)}
+    found = []
+    for group in results.groups:
+        items = [item for item in summaries if item.group == group and item.contacts]
+        if not items:
+            continue
+        values = [values_of(contacts[group, item.detector], "latency_ms") for item in items]
+        latency = [np.array([value for value in column if value is not None], dtype=np.float64) for column in values]
+        edges = _edges(np.concatenate(latency))
+        rows = [
+            {
+                "detector": detectors[item.detector],
+                "median": [short(value) for value in _median(item)],
+                "words": f"median {with_interval(item.median)} ms",
+                "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
+                "numbers": np.histogram(np.clip(of_detector, edges[0], edges[-1]), edges)[0].tolist(),
+            }
+            for item, of_detector in zip(items, latency, strict=True)
+        ]
+        height = HISTOGRAM_HEIGHT * len(rows) + LANES_AXIS_HEIGHT
+        found.append({"group": shown(group), "rows": rows, "edges": _numbers(edges), "height": height})
+    return found
+
+
+def _edges(latency: FloatArray) -> FloatArray:
+    """Return the edges of the classes of all latencies [ms]: of equal width, or of equal ratio over a wide range."""
+    highest = float(latency.max(initial=_FLOOR_MS))
+    lowest = max(float(latency.min(initial=highest)), _FLOOR_MS)
+    if highest > 10.0 * lowest:
+        return np.geomspace(lowest, highest * 1.0001, CLASSES + 1)
+    return np.linspace(0.0, highest * 1.0001, CLASSES + 1)
+
+
 def _median(item: Summary) -> tuple[float, ...]:
     """Return the median with its interval; only the median if a plot draws none."""
     median = item.median
     return (median.value,) if draws_no_interval(item) else (median.value, median.low, median.high)
 
 
-def _survival(results: Results, contacts: Contacts) -> list[dict[str, Any]]:
+def _survival(results: Results, groups: Sequence[str], contacts: Contacts, most: int | None) -> list[dict[str, Any]]:
     found = []
-    for group in results.groups:
+    for group in groups:
         rows = []
         for i, name in enumerate(results.detectors):
             latency, censored = latencies(contacts.get((group, name), ()))
@@ -126,6 +172,8 @@ def _survival(results: Results, contacts: Contacts) -> list[dict[str, Any]]:
             curve = survival(latency, censored)
             # A step begins where the share changes; the other points show nothing new.
             kept = np.flatnonzero(np.diff(curve.share, prepend=2.0))
+            if most and len(kept) > most:
+                kept = kept[np.unique(np.linspace(0, len(kept) - 1, most).round().astype(np.intp))]
             keys = ("times", "share", *(("low", "high") if len(latency) >= FEWEST else ()))
             columns = {key: _numbers(getattr(curve, key)[kept]) for key in keys}
             rows.append({"detector": i, **columns, "until": short(float(latency.max())), "n": len(latency)})
@@ -134,9 +182,9 @@ def _survival(results: Results, contacts: Contacts) -> list[dict[str, Any]]:
     return found
 
 
-def _amoc(results: Results) -> list[dict[str, Any]]:
+def _amoc(results: Results, groups: Sequence[str]) -> list[dict[str, Any]]:
     parts: dict[str, dict[str, list[SweepResult]]] = {}
-    for item in results.sweep:
+    for item in (row for row in results.sweep if row.group in groups):
         parts.setdefault(item.group, {}).setdefault(item.detector, []).append(item)
     found = []
     for group, detectors in parts.items():
@@ -174,9 +222,11 @@ def _curve(points: Sequence[SweepResult]) -> dict[str, Any]:
 def _force(report: Report) -> list[dict[str, Any]]:
     """Return for each group with a force profile its limits, and which contacts of which traces have a verdict."""
     results = report.evaluated.results
-    numbers = {(item.group, item.recording, item.onset_s): item.contact for item in results.contacts}
-    verdicts = {(item.group, item.recording, item.contact): item for item in results.forces}
     logs = logs_of(results)
+    traced = {log_of(trace.group, trace.recording, logs) for trace in report.traces}
+    contacts, forces = _of_logs(results.contacts, traced), _of_logs(results.forces, traced)
+    numbers = {(item.group, item.recording, item.onset_s): item.contact for item in contacts}
+    verdicts = {(item.group, item.recording, item.contact): item for item in forces}
     curves: dict[str, list[dict[str, Any]]] = {}
     for i, trace in enumerate(report.traces):
         log = log_of(trace.group, trace.recording, logs)
@@ -199,7 +249,7 @@ def _force(report: Report) -> list[dict[str, Any]]:
             steps = [
                 [short(step["from_s"]), short(step["at_most_n"]), plain(step["name"])] for step in profile["steps"]
             ]
-            count = sum(item.group == group for item in results.forces)
+            count = values_of(results.forces, "group").count(group)
             panels.append(
                 {
                     "group": shown(group),
@@ -211,6 +261,11 @@ def _force(report: Report) -> list[dict[str, Any]]:
                 }
             )
     return panels
+
+
+def _of_logs(rows: Sequence[Row], logs: Collection[Log]) -> Sequence[Row]:
+    columns = (values_of(rows, name) for name in ("group", "recording"))
+    return picked(rows, [number for number, log in enumerate(zip(*columns, strict=True)) if log in logs])
 
 
 def _numbers(values: np.ndarray) -> list[float | int | None]:

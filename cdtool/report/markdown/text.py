@@ -55,7 +55,8 @@ class Section:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lines", table_lines(self.table) if self.table else [])
-        object.__setattr__(self, "whole", self._with(self.lines))
+        cut = self._cut_note(len(self.table.rows)) if self.table and self.table.more else ""
+        object.__setattr__(self, "whole", self._with(self.lines, cut))
 
     def within(self, room: int) -> str:
         """Return as many of its rows as `room` characters hold, with a line that counts them; empty without any row."""
@@ -76,7 +77,7 @@ class Section:
         return _BLANK.join(parts)
 
     def _cut_note(self, kept: int) -> str:
-        count, source = (len(self.table.rows), self.table.source) if self.table else (0, "")
+        count, source = (len(self.table.rows) + self.table.more, self.table.source) if self.table else (0, "")
         return f"*Cut here: {kept} of {counted(count, 'row')}; all of them are in results.json (`{source}`).*"
 
 

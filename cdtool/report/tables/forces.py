@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from cdtool.evaluation.results import ForceResult, ForceStepResult, PointResult, Results
+from cdtool.evaluation.rows import grouped, picked, values_of
+from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOTHING, number, spoken
 from cdtool.report.table import (
     Cell,
@@ -30,9 +32,7 @@ def groups_table(results: Results) -> Table:
     """Return how many contacts of each group meet their force profile."""
     columns = [Column("group"), Column("profile"), *(Column(spoken(verdict), numeric=True) for verdict in _VERDICTS)]
     columns += [Column("largest peak [N]", numeric=True), Column("earliest exceeded after [ms]", numeric=True)]
-    parts: dict[tuple[str, str], list[ForceResult]] = {}
-    for item in results.forces:
-        parts.setdefault((item.group, item.profile), []).append(item)
+    parts = grouped(results.forces, "group", "profile")
     return Table("force", "Force", columns, [_group_row(*part) for part in parts.items()], "forces")
 
 
@@ -47,7 +47,7 @@ def points_table(results: Results) -> Table:
         (Column("steps"), lambda item: _steps(item.steps)),
         (Column("why"), lambda item: Cell(item.reason or "")),
     )
-    return tabulate("points", "Force by test point", fields, results.points, "points")
+    return tabulate("points", "Force by test point", fields, results.points, "points", (), most_rows(results))
 
 
 def contacts_table(results: Results, *, only_exceptions: bool = False) -> Table:
@@ -65,14 +65,17 @@ def contacts_table(results: Results, *, only_exceptions: bool = False) -> Table:
         (Column("why"), lambda item: Cell(item.reason or "")),
     )
     name, title = ("force_exceptions", "Force limits not met") if only_exceptions else ("forces", "Force by contact")
-    items = [item for item in results.forces if not only_exceptions or item.verdict != "pass"]
-    return tabulate(name, title, fields, items, "forces", logs=[(item.group, item.recording) for item in items])
+    verdicts = values_of(results.forces, "verdict")
+    numbers = [i for i, verdict in enumerate(verdicts) if not only_exceptions or verdict != "pass"]
+    items = picked(results.forces, numbers)
+    logs = list(zip(values_of(items, "group"), values_of(items, "recording"), strict=True))
+    return tabulate(name, title, fields, items, "forces", logs, most_rows(results))
 
 
-def _group_row(key: tuple[str, str], forces: Sequence[ForceResult]) -> Row:
-    counts = Counter(item.verdict for item in forces)
-    peaks = [item.peak_n for item in forces if item.peak_n is not None]
-    budgets = [item.time_budget_ms for item in forces if item.time_budget_ms is not None]
+def _group_row(key: tuple[str, ...], forces: Sequence[ForceResult]) -> Row:
+    counts = Counter(values_of(forces, "verdict"))
+    peaks = [value for value in values_of(forces, "peak_n") if value is not None]
+    budgets = [value for value in values_of(forces, "time_budget_ms") if value is not None]
     return (
         *map(name_cell, key),
         *(count_cell(counts[verdict], tone_of(verdict)) for verdict in _VERDICTS),

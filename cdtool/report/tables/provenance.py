@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from cdtool.evaluation.results import Results
+from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOTHING
 from cdtool.report.table import Cell, Column, Row, Table, name_cell, shown
 from cdtool.report.tables.results import detector_cell, part_of
@@ -41,6 +43,8 @@ _NAMES = {
     "scored_without_own_part": "scored with thresholds learned from the other recordings",
     "sections": "parts of logs scored",
 }
+# Items of a list in one cell.
+_MOST_IN_CELL = 1000
 # Entries that have tables of their own, are part of another, or are the same in every report.
 _OTHER_TABLES = (
     *("tool", "gains", "signature_sha256", "learned_sha256", "load_cell_sha256", "units", "short_names"),
@@ -58,14 +62,19 @@ def provenance_tables(results: Results) -> list[Table]:
     ]
     learned = [(name_cell(name), Cell(str(digest))) for name, digest in part_of(provenance, "learned_sha256").items()]
     cells = [(name_cell(name), Cell(str(digest))) for name, digest in part_of(provenance, "load_cell_sha256").items()]
-    tables = (
+    made = (
         _table("provenance", "Provenance", ("entry", "value"), entries),
         _table("gains", "Detectors", ("detector", "unit", "gains", "SHA-256 of its threshold"), _gains(results)),
         _table("profiles", "Force profiles", ("group", "profile", "limits", "source", "note"), _profiles(provenance)),
         _table("learned", "Recordings learned from", ("recording", "SHA-256"), learned),
         _table("load_cells", "Load cells in files of their own", ("recording and file", "SHA-256"), cells),
     )
-    return [table for table in tables if table.rows]
+    most = most_rows(results)
+    return [
+        replace(table, rows=table.rows[:most], more=len(table.rows[most or len(table.rows) :]))
+        for table in made
+        if table.rows
+    ]
 
 
 def _table(name: str, title: str, headings: Sequence[str], rows: Sequence[Row]) -> Table:
@@ -98,5 +107,6 @@ def _in_words(value: object) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} = {_in_words(item)}" for key, item in value.items()) or NOTHING
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return "; ".join(map(_in_words, value)) or NOTHING
+        more = [f"and {len(value) - _MOST_IN_CELL} more"] if len(value) > _MOST_IN_CELL else []
+        return "; ".join((*map(_in_words, value[:_MOST_IN_CELL]), *more)) or NOTHING
     return str(value) or NOTHING

@@ -14,8 +14,10 @@ from cdtool.evaluation.results import (
     RecordingResult,
     Results,
 )
+from cdtool.evaluation.rows import grouped
 from cdtool.evaluation.summary import later_ms
 from cdtool.plain_text import counted
+from cdtool.report.many import most_rows
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number, percent
 from cdtool.report.table import (
     Cell,
@@ -103,7 +105,7 @@ def scored_table(results: Results) -> Table:
         (Column("test point"), lambda item: Cell(item.point or "")),
         (Column("SHA-256"), lambda item: Cell(item.sha256)),
     )
-    return tabulate("scored", "Recordings scored", fields, results.recordings, "recordings")
+    return tabulate("scored", "Recordings scored", fields, results.recordings, "recordings", (), most_rows(results))
 
 
 def contact_tables(results: Results) -> list[Table]:
@@ -123,8 +125,9 @@ def contact_tables(results: Results) -> list[Table]:
         "not_assessable": ("not_assessable_contacts", "Contacts not assessable"),
         "in_progress": ("in_progress", "Contacts in progress at the start"),
     }
+    rows = grouped(results.contacts, "outcome")
     return [
-        tabulate(name, title, fields, [item for item in results.contacts if item.outcome == outcome], "contacts")
+        tabulate(name, title, fields, rows.get((outcome,), ()), "contacts", (), most_rows(results))
         for outcome, (name, title) in tables.items()
     ]
 
@@ -142,7 +145,8 @@ def false_alarms_table(results: Results) -> Table:
         (Column("value", numeric=True), lambda item: _with_unit(item.statistic, units.get(item.detector, ""))),
         (Column("limit", numeric=True), lambda item: _with_unit(item.limit, units.get(item.detector, ""))),
     )
-    return tabulate("false_alarms", "False alarms", fields, results.false_alarms, "false_alarms")
+    rows = results.false_alarms
+    return tabulate("false_alarms", "False alarms", fields, rows, "false_alarms", (), most_rows(results))
 
 
 def not_assessable_table(results: Results) -> Table:
@@ -165,9 +169,9 @@ def reasons_tables(results: Results) -> list[Table]:
         (Column("reason"), lambda item: Cell(item.reason.removeprefix(f"{item.recording}: ") or NOTHING)),
     )
     return [
-        tabulate("skipped", "Left out", fields, alike(results.skipped), "skipped"),
-        tabulate("damaged", "Damaged but used", fields, alike(results.losses), "findings"),
-        tabulate("findings", "Warnings", fields, alike(results.warnings), "findings"),
+        tabulate("skipped", "Left out", fields, alike(results.skipped), "skipped", (), most_rows(results)),
+        tabulate("damaged", "Damaged but used", fields, alike(results.losses), "findings", (), most_rows(results)),
+        tabulate("findings", "Warnings", fields, alike(results.warnings), "findings", (), most_rows(results)),
     ]
 
 

@@ -37,8 +37,8 @@ class Report:
 
     @cached_property
     def model(self) -> Model:
-        """The tables, texts and test cases that all renderers show."""
-        return report_model(self.evaluated)
+        """The tables and texts that all renderers show."""
+        return report_model(self.evaluated, dict.fromkeys((trace.group, trace.recording) for trace in self.traces))
 
 
 class Writer(Generic[Content]):
@@ -47,7 +47,7 @@ class Writer(Generic[Content]):
     `name` is the name it is registered under. `subject`: what it writes, the reports of a benchmark or the comparison
     of two builds. `suffixes`: of the names that it writes for `--output`; none if it writes only into a report folder,
     as `in_folder`. `kinds`: by suffix, what marks a file that it wrote; any other file of that name is replaced only
-    with `--force`.
+    with `--force`. `writes_folder`: what it writes under a name of its suffix is a folder, which it checks itself.
     """
 
     name: ClassVar[str]
@@ -55,6 +55,7 @@ class Writer(Generic[Content]):
     suffixes: ClassVar[tuple[str, ...]] = ()
     in_folder: ClassVar[str] = ""
     kinds: ClassVar[Mapping[str, Kind]] = {}
+    writes_folder: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         """Raise ConfigurationError for an unknown subject, or a suffix that a name cannot have or without a kind."""
@@ -71,6 +72,9 @@ class Writer(Generic[Content]):
     def files(self, target: Path) -> tuple[Path, ...]:
         """Return all files that are written for a target, the target first."""
         return (target,)
+
+    def check(self, target: Path) -> None:
+        """Raise UsageError if a target cannot be written, beyond what is checked of every file."""
 
     def has_content(self, report: Content) -> bool:  # noqa: ARG002 - most writers always have
         """Return whether there is anything to write into a folder."""

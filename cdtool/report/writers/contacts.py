@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.evaluation.results import ContactResult, Results
-from cdtool.files import write_text
+from cdtool.files import write_pieces
 from cdtool.foreign_files import Kind
-from cdtool.report.csv_text import csv_text
+from cdtool.report.csv_text import csv_lines
 from cdtool.report.writers.base import Report, Writer
 
 
@@ -23,10 +24,10 @@ class Contacts(Writer[Report]):
 
     def write(self, report: Report, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        write_text(target, contacts_csv(report.evaluated.results))
+        write_pieces(target, contacts_lines(report.evaluated.results))
 
 
-def contacts_csv(results: Results) -> str:
-    """Return a row per contact and detector, in the order and under the names of results.json; empty = no value."""
+def contacts_lines(results: Results) -> Iterator[str]:
+    """Yield a row per contact and detector, in the order and under the names of results.json; empty = no value."""
     names = [item.name for item in fields(ContactResult)]
-    return csv_text(names, ([getattr(contact, name) for name in names] for contact in results.contacts))
+    return csv_lines(names, ([getattr(contact, name) for name in names] for contact in results.contacts))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.evaluation.results import Results
-from cdtool.files import write_text
+from cdtool.files import write_pieces
 from cdtool.foreign_files import Kind
-from cdtool.report.csv_text import csv_text
+from cdtool.report.csv_text import csv_lines
 from cdtool.report.writers.base import Report, Writer
 
 _OF_CONTACT = ("recording", "group", "contact", "point", "profile", "verdict", "peak_n")
@@ -29,14 +30,14 @@ class Forces(Writer[Report]):
 
     def write(self, report: Report, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        write_text(target, forces_csv(report.evaluated.results))
+        write_pieces(target, forces_lines(report.evaluated.results))
 
 
-def forces_csv(results: Results) -> str:
-    """Return a row per contact and step, in the order of results.json; empty = no value, or never exceeded."""
+def forces_lines(results: Results) -> Iterator[str]:
+    """Yield a row per contact and step, in the order of results.json; empty = no value, or never exceeded."""
     rows = (
         [getattr(force, name) for name in _OF_CONTACT] + [getattr(step, name) for name in _OF_STEP]
         for force in results.forces
         for step in force.steps
     )
-    return csv_text(_NAMES, rows)
+    return csv_lines(_NAMES, rows)

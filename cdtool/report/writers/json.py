@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import ClassVar
 
-from cdtool.evaluation.results_file import to_json
+from cdtool.evaluation.results_file import json_pieces
 from cdtool.evaluation.traces.file import encode_traces, traces_path
-from cdtool.files import replaced, write_text
+from cdtool.files import replaced, write_pieces
 from cdtool.foreign_files import Kind
 from cdtool.report.writers.base import Report, Writer
 
@@ -29,10 +30,14 @@ class Json(Writer[Report]):
 
     def write(self, report: Report, target: Path) -> None:
         """Write results and traces: both or neither. Raises CdtoolError."""
-        text = to_json(report.evaluated.results)
         if target.exists() and not target.is_file():
-            write_text(target, text)  # a device or pipe has no second file
+            write_pieces(target, json_pieces(report.evaluated.results))  # a device or pipe has no second file
             return
+        digest = hashlib.sha256()
         with replaced(*self.files(target)) as (results, traces):
-            results.write_bytes(text.encode("utf-8", "replace"))
-            traces.write_bytes(encode_traces(report.traces, text))
+            with results.open("wb") as file:
+                for piece in json_pieces(report.evaluated.results):
+                    content = piece.encode("utf-8", "replace")
+                    digest.update(content)
+                    file.write(content)
+            traces.write_bytes(encode_traces(report.traces, results_sha256=digest.hexdigest()))

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 from cdtool.files import write_text
 from cdtool.foreign_files import Kind
 from cdtool.plain_text import plain
-from cdtool.report.cases import Case, Suite
+from cdtool.report.cases import Case, Suite, suites_of
 from cdtool.report.writers.base import Report, Writer
 
 _COUNTED = {"failures": "failure", "errors": "error", "skipped": "skipped"}
@@ -36,13 +36,17 @@ class Junit(Writer[Report]):
 
 def to_junit(report: Report) -> str:
     """Return JUnit XML that Jenkins and GitLab read; the same text for the same results."""
-    suites = [_suite(suite) for suite in report.model.suites]
-    counts = {key: str(sum(int(suite.get(key, "0")) for suite in suites)) for key in ("tests", "failures", "errors")}
     # Jenkins' schema has no "skipped" for all suites together.
-    root = ElementTree.Element("testsuites", {"name": "cdtool", **counts, "time": "0"})
-    root.extend(suites)
-    ElementTree.indent(root, " ")
-    body = ElementTree.tostring(root, encoding="unicode")
+    counts = dict.fromkeys(("tests", "failures", "errors"), 0)
+    texts = []
+    for suite in map(_suite, suites_of(report.evaluated)):
+        for key in counts:
+            counts[key] += int(suite.get(key, "0"))
+        ElementTree.indent(suite, " ", level=1)
+        texts.append(ElementTree.tostring(suite, encoding="unicode"))  # an element takes many times as much memory
+    attributes = {"name": "cdtool", **{key: str(count) for key, count in counts.items()}, "time": "0"}
+    root = ElementTree.tostring(ElementTree.Element("testsuites", attributes), encoding="unicode").removesuffix(" />")
+    body = "\n".join((f"{root}>", *(f" {text}" for text in texts), "</testsuites>"))
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -43,6 +44,7 @@ from cdtool.workflows.benchmark.stored_learned import StoreOfRun
 from cdtool.workflows.benchmark.stored_outcomes import StoreReport
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.gathering import Gathering
+from cdtool.workflows.runs import to_be_seen
 from cdtool.workflows.signature.normal_runs import NormalsWithout
 from cdtool.workflows.signature.threshold_settings import set_by_hand
 from cdtool.workflows.store.use import StoreUse
@@ -91,7 +93,8 @@ def benchmark(
     jobs : int, optional
         Number of logs processed at a time; the results do not depend on it.
     workers : Workers, optional
-        In place of `jobs`: also the longest time for a log, and how often one that ended its worker is tried again.
+        In place of `jobs`: also the longest time for a log, and how often one that ended its worker is tried again;
+        or a Dask cluster.
     store : StoreUse, optional
         Where outcomes are kept: a log is computed only if something that determines its outcome has changed.
     progress : callable, optional
@@ -123,9 +126,12 @@ def benchmark(
     """
     workers = workers or Workers(jobs)
     work = BenchmarkWork.of(file, detectors, false_alarm_budget)
-    if store is None:
-        return _run(work, workers, None, progress)
-    with store.opened() as folder:
+    with ExitStack() as stack:
+        folder = stack.enter_context(store.opened()) if store else None
+        logs = [path for item in work.setup.impacts.values() for path in item.logs]
+        stack.enter_context(workers.ready(to_be_seen([*work.setup.learn, *logs])))
+        if store is None or folder is None:
+            return _run(work, workers, None, progress)
         return _run(work, workers, StoreOfRun(folder, store, workers), progress)
 
 

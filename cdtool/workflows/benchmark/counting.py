@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -49,7 +50,8 @@ class SweepRows:
     impact_free: str
     _false_alarms: dict[str, np.ndarray] = field(default_factory=dict)
     _watched: dict[str, tuple[int, float]] = field(default_factory=dict)
-    _latency: dict[tuple[str, str], list[FloatArray]] = field(default_factory=dict)
+    # By detector and group: of each contact the latency with every factor, one contact after the other.
+    _latency: dict[tuple[str, str], array[float]] = field(default_factory=dict)
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     def add(self, group: str, name: str, outcome: OperationOutcome) -> None:
@@ -65,7 +67,7 @@ class SweepRows:
             self._watched[name] = operations + 1, seconds + outcome.seconds
             return
         seen = np.array([item in ("detected", "missed") for item in outcome.outcomes], dtype=bool)
-        self._latency.setdefault((name, group), []).append(swept.latency[:, seen])
+        self._latency.setdefault((name, group), array("d")).frombytes(swept.latency[:, seen].T.tobytes())
         self._blind[name, group] += outcome.outcomes.count("not_assessable")
 
     def rows(self, detectors: Sequence[str], groups: Sequence[str]) -> Iterator[SweepResult]:
@@ -76,7 +78,7 @@ class SweepRows:
                     yield from self._rows_of(name, group)
 
     def _rows_of(self, name: str, group: str) -> Iterator[SweepResult]:
-        latency = 1e3 * np.concatenate(self._latency[name, group], axis=1)
+        latency = 1e3 * np.frombuffer(self._latency[name, group]).reshape(-1, len(self.factors[name])).T
         operations, seconds = self._watched[name]
         in_use = len(self.factors[name]) // 2
         for i, factor in enumerate(self.factors[name]):

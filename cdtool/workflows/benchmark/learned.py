@@ -169,4 +169,4 @@ class Teaching:
     def _fitted(self) -> LearnedThresholds:
         used = self._detectors[0]
         setup = with_only(self.setup, [detector.name for detector in used])
-        return learn_thresholds(setup, self._runs.operations, used, self._runs.skipped)
+        return learn_thresholds(setup, self._runs.operations, used, self._runs.skipped, self.workers.jobs)

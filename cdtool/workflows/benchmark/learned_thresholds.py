@@ -17,6 +17,7 @@ from cdtool.pipeline import run_detector
 from cdtool.thresholds.base import FittedThreshold, is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.left_out import LeftOut
+from cdtool.workflows.execution.workers import Workers, in_order, shares_memory
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import NoUsableRunError, Pair, fitting, signals_of, with_left_out
@@ -27,7 +28,7 @@ class LearnedThresholds:
     """Each detector's thresholds, runs left out, detectors that were not assessable, and how factors were set.
 
     `unusable` maps the detectors that could not be used on any run to the reason; they have no threshold. `unused`: the
-    runs that every other detector left out. `pairs` are the runs by detector.
+    runs that every other detector left out. `pairs` are the runs by detector if logs are scored that are learned from.
     """
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
@@ -44,13 +45,17 @@ class LearnedThresholds:
 
 
 def learn_thresholds(
-    setup: BenchmarkFile, operations: Sequence[Operation], detectors: Sequence[Any], unread: Sequence[Skipped]
+    setup: BenchmarkFile,
+    operations: Sequence[Operation],
+    detectors: Sequence[Any],
+    unread: Sequence[Skipped],
+    jobs: int = 1,
 ) -> LearnedThresholds:
     """Learn each detector's threshold from impact-free runs; a budget also sets its safety factor on these runs.
 
     A threshold that determines its limits in each run learns nothing, but a budget needs the runs. A detector with a
-    missing channel does not stop the others. Raises SignatureError if nothing can be learned, UsageError if there are
-    too few runs for the budget.
+    missing channel does not stop the others. For a budget, `jobs` detectors learn at a time where processes share the
+    runs. Raises SignatureError if nothing can be learned, UsageError if there are too few runs for the budget.
     """
     learned = LearnedThresholds({}, [], [], [], {}, set(), {})
     if is_per_run(setup.rule) and not setup.budget:
@@ -61,25 +66,25 @@ def learn_thresholds(
         raise UsageError(f"a false-alarm budget of {setup.budget} is set on runs", "add impact-free logs: [learn] logs")
     left_out = LeftOut()
     unused: list[set[str]] = []
-    for detector in detectors:
-        try:
-            pairs, unusable = signals_of(operations, setup.machine_file.machine, detector, setup.watched, unread)
-            pairs = in_fixed_order(pairs)
-            made = _learn(setup, detector.name, pairs, [*unread, *unusable])
-        except NothingValidError as fault:
+    # Without a budget, to learn takes no longer than to start processes. Logs that are scored too need all pairs here.
+    at_once = setup.budget and not setup.both and shares_memory()
+    learning = _Learning(setup, tuple(operations), tuple(unread), keeps_pairs=bool(setup.both))
+    made = in_order(learning, detectors, len(detectors), Workers(jobs if at_once else 1))
+    for detector, of_detector in zip(detectors, made, strict=True):
+        if of_detector.made is None:
             learned.thresholds[detector.name] = ()
-            unassessable = Finding(DetectorUnassessable(fault.message))
-            learned.not_assessable.append(RecordingFinding.of(detector.name, unassessable))
+            if of_detector.is_unusable:
+                learned.unusable[detector.name] = of_detector.reason
+            else:
+                unassessable = Finding(DetectorUnassessable(of_detector.reason))
+                learned.not_assessable.append(RecordingFinding.of(detector.name, unassessable))
             continue
-        except NoUsableRunError as fault:
-            learned.thresholds[detector.name] = ()
-            learned.unusable[detector.name] = fault.reason
-            continue
-        left_out.add(detector.name, [*unusable, *made.skipped])
-        unused.append({item.recording for item in [*unusable, *made.skipped]})
-        learned.calibration.extend(made.calibration)
-        learned.thresholds[detector.name] = made.thresholds
-        learned.pairs[detector.name] = pairs
+        skipped = [*of_detector.skipped, *of_detector.made.skipped]
+        left_out.add(detector.name, skipped)
+        unused.append({item.recording for item in skipped})
+        learned.calibration.extend(of_detector.made.calibration)
+        learned.thresholds[detector.name] = of_detector.made.thresholds
+        learned.pairs[detector.name] = of_detector.pairs
     learned.skipped.extend(left_out.combined())
     learned.unused.update(set.intersection(*unused) if unused else ())
     if learned.unusable and len(learned.unusable) == len(detectors):
@@ -92,6 +97,41 @@ class _Made:
     thresholds: tuple[FittedThreshold, ...]
     skipped: tuple[Skipped, ...]
     calibration: tuple[CalibrationResult, ...] = ()
+
+
+@dataclass(frozen=True)
+class _OfDetector:
+    """What one detector has learned and the runs left out before, or the reason why it has learned nothing."""
+
+    made: _Made | None
+    skipped: list[Skipped] = field(default_factory=list)
+    pairs: list[Pair] = field(default_factory=list)
+    reason: str = ""
+    is_unusable: bool = False
+
+
+@dataclass(frozen=True)
+class _Learning:
+    """Learns the thresholds of one detector from all runs."""
+
+    setup: BenchmarkFile
+    operations: tuple[Operation, ...]
+    unread: tuple[Skipped, ...]
+    keeps_pairs: bool
+
+    def __call__(self, detector: Any) -> _OfDetector:
+        setup = self.setup
+        try:
+            pairs, unusable = signals_of(
+                self.operations, setup.machine_file.machine, detector, setup.watched, self.unread
+            )
+            pairs = in_fixed_order(pairs)
+            made = _learn(setup, detector.name, pairs, [*self.unread, *unusable])
+        except NothingValidError as fault:
+            return _OfDetector(None, reason=fault.message)
+        except NoUsableRunError as fault:
+            return _OfDetector(None, reason=fault.reason, is_unusable=True)
+        return _OfDetector(made, unusable, pairs if self.keeps_pairs else [])
 
 
 def _learn(setup: BenchmarkFile, detector: str, pairs: Sequence[Pair], left_out: Sequence[Skipped] = ()) -> _Made:

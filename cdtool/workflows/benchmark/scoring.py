@@ -306,6 +306,7 @@ def _recording_result(
         contacts=contacts,
         campaign=setup.campaigns.get(path),
         point=setup.points.get(path),
+        began_s=recording.began,
     )
 
 

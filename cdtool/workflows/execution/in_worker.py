@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import faulthandler
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic_ns
@@ -19,10 +20,13 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.workflows.execution.interruption import ignore_interruption
+
 # A worker that another process ends exits with this status.
 TOLD_TO_END = 143
-# Entries of a claim: the process, the number of the piece counted from 1 (0: none), and when it began [ns].
-CLAIM = 3
+# Entries of a claim: the process, the number of the piece counted from 1 (0: none), when it began, and when the process
+# was asked to end (0: not) [ns].
+CLAIM = 4
 # The arrays of a log are smaller [bytes].
 _KEPT = 4 << 20
 
@@ -38,6 +42,23 @@ class Failed:
     """A piece of work that may succeed when it is repeated, with the reason why it did not."""
 
     reason: str
+
+
+def limit_words(seconds: float) -> str:
+    """Return the reason of an item that took longer than the time limit."""
+    return f"took longer than {seconds:g} s (--timeout)"
+
+
+def ended_words(code: int) -> str:
+    """Return the reason of an item whose worker process ended, by its exit status; negative: by a signal."""
+    if code >= 0:
+        return f"its worker process ended with exit status {code}"
+    with suppress(ValueError):
+        name = signal.Signals(-code).name
+        if name == "SIGKILL":
+            return "its worker process was killed (SIGKILL): mostly because the memory was not enough"
+        return f"its worker process crashed ({name})"
+    return f"its worker process ended by signal {-code}"
 
 
 def keep_freed_memory() -> None:
@@ -57,13 +78,16 @@ def begin(work: Callable[[Any], Any], claims: Any, free_claims: Any, limit: floa
     _claim = memoryview(claims).cast("B").cast("q")[first : first + CLAIM]
     _claim[0] = os.getpid()
     keep_freed_memory()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_interruption()
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end(*_: object) -> None:
-    raise SystemExit(TOLD_TO_END)
+    _claim[3] = monotonic_ns()
+    if not _claim[1]:  # waiting for work, in code that would print where it was interrupted
+        os._exit(TOLD_TO_END)
+    raise SystemExit(TOLD_TO_END)  # temporary files of the piece are removed
 
 
 def _end_with_parent() -> None:
@@ -81,7 +105,23 @@ def do(batch: Sequence[tuple[int, Any]]) -> list[Any]:
     try:
         return [_done(_work, number, item) for number, item in batch]
     except SystemExit as end:  # temporary files are removed by now
-        os._exit(end.code if isinstance(end.code, int) else 1)
+        os._exit(exit_code(end))
+    except Exception as fault:
+        raise sendable(fault) from None
+
+
+def exit_code(end: SystemExit) -> int:
+    """Return the exit status of a process that ends so."""
+    return end.code if isinstance(end.code, int) else int(end.code is not None)
+
+
+def sendable(fault: Exception) -> Exception:
+    """Return an error that arrives in another process: itself, or its words if it cannot be copied."""
+    try:
+        pickle.loads(pickle.dumps(fault))
+    except Exception:
+        return RuntimeError(f"{type(fault).__name__}: {fault}")
+    return fault
 
 
 def _done(work: Callable[[Any], Any], number: int, item: Any) -> Any:
@@ -92,6 +132,8 @@ def _done(work: Callable[[Any], Any], number: int, item: Any) -> Any:
             result = work(item)
     except MemoryError:
         result = Failed("not enough memory")
+    except (KeyboardInterrupt, GeneratorExit) as fault:  # raised by the piece: Ctrl-C is ignored here
+        result = Failed(f"it was ended by {type(fault).__name__}")
     except Exception:
         _claim[1] = 0
         raise

@@ -6,9 +6,8 @@ process has several threads, they are new processes of Python.
 
 from __future__ import annotations
 
+import os
 import signal
-import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
@@ -16,15 +15,19 @@ from contextlib import contextmanager, suppress
 from multiprocessing import active_children, get_context
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
-from time import monotonic_ns
+from time import monotonic, monotonic_ns
 from typing import Any
 
 from cdtool.errors import WorkerError
-from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do
+from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, ended_words, limit_words
+from cdtool.workflows.execution.interruption import without_interruption
+from cdtool.workflows.execution.workers import shares_memory
 
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
-_JOINED_WITHIN = 10.0
+_JOINED_WITHIN, _ENDED_WITHIN = 10.0, 3.0
+# After the time limit, a process has this long to end itself; the pieces are compared with it so often [s].
+_GRACE, _CHECKED_EVERY = 2.0, 1.0
 
 
 class Processes:
@@ -34,7 +37,7 @@ class Processes:
     """
 
     broken: tuple[type[BaseException], ...] = (BrokenProcessPool, CancelledError)
-    is_exact = True
+    isolates = False
 
     def __init__(self, work: Callable[[Any], Any], size: int, limit: float | None) -> None:
         self.size = size
@@ -46,8 +49,12 @@ class Processes:
 
     def _start(self) -> None:
         context = _context()
-        self._claims: Any = context.RawArray("q", CLAIM * self.size)
-        free: Any = context.SimpleQueue()
+        try:
+            self._claims: Any = context.RawArray("q", CLAIM * self.size)
+            free: Any = context.SimpleQueue()
+        except OSError as fault:
+            words = f"no shared memory for processes: {fault.strerror or fault}"
+            raise WorkerError(words, "free space in /dev/shm, or use --jobs 1 without --timeout") from fault
         for number in range(self.size):
             free.put(number)
         self._children: set[BaseProcess] = set()
@@ -55,10 +62,11 @@ class Processes:
             self.size, context, initializer=begin, initargs=(self._work, self._claims, free, self._limit)
         )
 
-    def submit(self, batch: Sequence[tuple[int, Any]]) -> Future[list[Any]]:
+    def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:  # noqa: ARG002
         """Return the future results of some numbered pieces; a pool whose process has ended gives a failed one."""
         try:
-            future = self._pool.submit(do, batch)
+            with without_interruption():  # it starts processes
+                future = self._pool.submit(do, batch)
         except BrokenProcessPool as fault:
             future = Future()
             future.set_exception(fault)
@@ -66,7 +74,7 @@ class Processes:
             self._children |= set(active_children()) - self._others
         return future
 
-    def blamed(self, lost: Sequence[tuple[int, Any]]) -> dict[int, str]:  # noqa: ARG002  claims tell it
+    def blamed(self, lost: Future[list[Any]]) -> dict[int, str]:  # noqa: ARG002  the claims show it
         """Return the numbers of the pieces that ended their processes, with the reasons, and start new processes.
 
         Raises WorkerError if the processes end again and again before they have begun a piece.
@@ -78,11 +86,17 @@ class Processes:
             child.join(_JOINED_WITHIN)
             status[child.pid or 0] = child.exitcode
         found: dict[int, str] = {}
-        for first in range(0, len(self._claims), CLAIM):
-            process, number, since = self._claims[first : first + CLAIM]
+        asked: list[tuple[int, int]] = []
+        for process, number, since, told in self._each_claim():
             code = status.get(process, 1)
-            if number and code not in (None, 0, TOLD_TO_END, -signal.SIGTERM):
+            if code in (TOLD_TO_END, -signal.SIGTERM):
+                asked += [(told, number)] if told else []
+            elif number and code is not None:
                 found[number - 1] = self._reason(code, 1e-9 * (now - since))
+        # The pool asks all processes to end when one of them has ended; if none has, the first one was asked by others.
+        if not found and asked and all(code in (TOLD_TO_END, -signal.SIGTERM) for code in status.values()):
+            _, number = min(asked)
+            found |= {number - 1: ended_words(-signal.SIGTERM)} if number else {}
         self._restarts = 0 if found else self._restarts + 1
         if self._restarts > _MOST_RESTARTS:
             raise WorkerError(
@@ -92,16 +106,23 @@ class Processes:
         return found
 
     def _reason(self, code: int, seconds: float) -> str:
-        if self._limit is not None and code == 1 and seconds >= self._limit:
-            return f"took longer than {self._limit:g} s (--timeout)"
-        if code >= 0:
-            return f"its worker process ended with exit status {code}"
-        with suppress(ValueError):
-            name = signal.Signals(-code).name
-            if name == "SIGKILL":
-                return "its worker process was killed (SIGKILL): mostly because the memory was not enough"
-            return f"its worker process crashed ({name})"
-        return f"its worker process ended by signal {-code}"
+        if self._limit is not None and code in (1, -signal.SIGKILL) and seconds >= self._limit:
+            return limit_words(self._limit)
+        return ended_words(code)
+
+    def check(self) -> float | None:
+        """End a process whose piece takes too long and which did not end itself, as one that is stopped."""
+        if self._limit is None:
+            return None
+        now = monotonic_ns()
+        for process, number, since, _ in self._each_claim():
+            if number and 1e-9 * (now - since) > self._limit + _GRACE:
+                with suppress(OSError):
+                    os.kill(process, signal.SIGKILL)
+        return _CHECKED_EVERY
+
+    def _each_claim(self) -> Iterator[Sequence[int]]:
+        return (self._claims[first : first + CLAIM] for first in range(0, len(self._claims), CLAIM))
 
     def progressed(self) -> None:
         """Note that a piece was done: the processes work."""
@@ -114,13 +135,18 @@ class Processes:
             yield self
         except BaseException:
             self._pool.shutdown(wait=False, cancel_futures=True)
-            for child in set(active_children()) - self._others:
+            children = set(active_children()) - self._others
+            for child in children:
                 child.terminate()
+            until = monotonic() + _ENDED_WITHIN
+            for child in children:
+                child.join(max(0.0, until - monotonic()))
+                if child.is_alive():  # it ignores the signal
+                    child.kill()
+                    child.join(_ENDED_WITHIN)
             raise
         self._pool.shutdown(wait=True)
 
 
 def _context() -> BaseContext:
-    """Return how processes are started: a fork with other threads could keep a lock for ever."""
-    alone = threading.active_count() == 1
-    return get_context("fork" if sys.platform == "linux" and alone else "spawn")
+    return get_context("fork" if shares_memory() else "spawn")

@@ -1,4 +1,4 @@
-"""Work on many independent items, in this process or in several, with the results in the order of the items.
+"""Work on many independent items, in this process, in several or on a cluster, with the results in the items' order.
 
 Reading and judging a log hold Python's interpreter lock most of the time, so threads would not save time: jobs are
 processes. They receive the work once, and the items in batches: sending one costs
@@ -9,12 +9,15 @@ worker; the items that were under way beside it are repeated without being count
 from __future__ import annotations
 
 import gc
+import sys
+import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from itertools import islice
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cdtool.errors import UsageError, WorkerError
@@ -34,15 +37,17 @@ _SHARES = 4  # of what is left, per worker
 
 @dataclass(frozen=True)
 class Workers:
-    """How work is done: in `jobs` processes.
+    """How work is done: in `jobs` processes, or by the workers of a Dask `cluster`.
 
     An item that takes longer than `timeout` [s], or ends its worker, is tried `retries` times more. With one job and no
-    timeout the work is done in this process, which an item can end.
+    timeout the work is done in this process, which an item can end. `cluster` is the address of a scheduler, or "local"
+    for one that is started here with `jobs` worker processes.
     """
 
     jobs: int = 1
     timeout: float | None = None
     retries: int = 1
+    cluster: str | None = None
 
     def __post_init__(self) -> None:
         if self.jobs < 1:
@@ -51,6 +56,26 @@ class Workers:
             raise UsageError(f"timeout is {self.timeout:g}", "give a time above 0 s, or none")
         if self.retries < 0:
             raise UsageError(f"retries is {self.retries}", "give 0 or more")
+        if self.cluster is not None:
+            from cdtool.workflows.execution.cluster_session import LOCAL, checked_address
+
+            checked_address(self.cluster)
+            if self.cluster != LOCAL and self.jobs != 1:
+                raise UsageError("--jobs with the address of a cluster", "start that many workers there, or remove it")
+
+    @contextmanager
+    def ready(self, inputs: Iterable[Path] = ()) -> Iterator[None]:
+        """Keep the cluster connected in the block, if there is one; its workers must see the `inputs` as they are here.
+
+        Raises UsageError without the package for clusters, WorkerError if the cluster cannot be used.
+        """
+        if self.cluster is None:
+            yield
+            return
+        from cdtool.workflows.execution.cluster_session import session_of
+
+        with session_of(self.cluster, self.jobs, inputs):
+            yield
 
 
 class Pool(Protocol):
@@ -58,17 +83,27 @@ class Pool(Protocol):
 
     # Exceptions of futures whose worker has ended.
     broken: tuple[type[BaseException], ...]
-    # Number of items that it works on at a time.
-    size: int
-    # Whether `blamed` names exactly the items that ended their workers, not also others on the same worker.
-    is_exact: bool
+    # Whether `submit` can do an item alone; otherwise it is alone if nothing else is under way.
+    isolates: bool
 
-    def submit(self, batch: Sequence[tuple[int, Any]]) -> Future[list[Any]]:
-        """Return the future results of some numbered items."""
+    @property
+    def size(self) -> int:
+        """Return the number of items that it works on at a time."""
         ...
 
-    def blamed(self, lost: Sequence[tuple[int, Any]]) -> dict[int, str]:
-        """After an exception in `broken` for the `lost` items: return those to blame, and why; make the pool usable."""
+    def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:
+        """Return the future results of some numbered items; `alone`: if it isolates, on a worker with nothing else."""
+        ...
+
+    def blamed(self, lost: Future[list[Any]]) -> dict[int, str]:
+        """After an exception in `broken`: return the items that ended their workers, and why; make the pool usable.
+
+        Where it is not known which item of a batch ended its worker, it is known when they are done alone.
+        """
+        ...
+
+    def check(self) -> float | None:
+        """End what takes too long and does not end itself; return when to call this again [s], None: never."""
         ...
 
     def progressed(self) -> None:
@@ -78,6 +113,14 @@ class Pool(Protocol):
     def __call__(self) -> AbstractContextManager[Any]:
         """Return the context."""
         ...
+
+
+def shares_memory() -> bool:
+    """Return whether processes that are started now are forked and share the memory of this one.
+
+    A fork with other threads could keep a lock for ever.
+    """
+    return sys.platform == "linux" and threading.active_count() == 1
 
 
 def in_order(
@@ -146,12 +189,33 @@ def _made(
     of_lost: OfLost | None,
     together: int,
 ) -> Iterator[Made]:
-    if not total or (workers.timeout is None and min(workers.jobs, total - 1) <= 1):
+    if not total:
+        return iter(())
+    if workers.cluster is not None:
+        return _on_cluster(work, items, total, workers, of_lost, together)
+    if workers.timeout is None and min(workers.jobs, total - 1) <= 1:
         return map(work, items)
     from cdtool.workflows.execution.processes import Processes
 
     pool = Processes(work, min(workers.jobs, total), workers.timeout)
     return _Ordered(pool, total, workers.retries, of_lost, together).results(items)
+
+
+def _on_cluster(
+    work: Callable[[Item], Made],
+    items: Iterable[Item],
+    total: int,
+    workers: Workers,
+    of_lost: OfLost | None,
+    together: int,
+) -> Iterator[Made]:
+    from cdtool.workflows.execution.cluster import ClusterWorkers
+    from cdtool.workflows.execution.cluster_session import session_of
+
+    assert workers.cluster is not None, "the work is done on a cluster"
+    with session_of(workers.cluster, workers.jobs) as session:
+        pool = ClusterWorkers(session, work, workers.timeout)
+        yield from _Ordered(pool, total, workers.retries, of_lost, together).results(items)
 
 
 @dataclass(frozen=True)
@@ -236,16 +300,15 @@ class _Ordered:
     def _results_of_first(self) -> list[Any] | None:
         """Return the results of the first batch; None if some of it is repeated now."""
         first = self._ahead[0]
-        is_alone = first.future is None and first.results is None
-        if is_alone:
+        if first.future is None and first.results is None:
             wait([batch.future for batch in self._ahead if batch.future is not None])
-            first.future = self.pool.submit(first.items)
+            first.future = self.pool.submit(first.items, alone=True)
         if first.results is None:
             assert first.future is not None, "a batch without results is under way"
             try:
-                first.results = first.future.result()
+                first.results = self._awaited(first.future)
             except self.pool.broken:
-                self._repeat(self.pool.blamed(first.items), is_alone)
+                self._repeat(self.pool.blamed(first.future))
                 return None
             self.pool.progressed()
         failed = {
@@ -256,37 +319,38 @@ class _Ordered:
         if not failed:
             return first.results
         self._ahead.popleft()
-        self._ahead.extendleft(reversed(self._divided(first, failed, is_counted=True)))
+        self._ahead.extendleft(reversed(self._divided(first, failed)))
         return None
 
-    def _repeat(self, blamed: dict[int, str], is_alone: bool) -> None:
-        """Submit again what was lost; the first batch, or one with an item that is blamed, is divided into items.
+    def _awaited(self, future: Future[list[Any]]) -> list[Any]:
+        while not wait([future], timeout=self.pool.check()).done:
+            pass
+        return future.result()
 
-        An item that was not alone is blamed without proof where workers do several at a time.
-        """
-        is_counted = is_alone or self.pool.is_exact or self.retries > 0
+    def _repeat(self, blamed: dict[int, str]) -> None:
+        """Submit again what was lost; the first batch, or one with an item that is blamed, is divided into items."""
         ahead = [self._ahead.popleft() for _ in range(len(self._ahead))]
         for place, batch in enumerate(ahead):
             if not batch.is_lost:
                 self._ahead.append(batch)
             elif not place or any(number in blamed for number, _ in batch.items):
-                self._ahead.extend(self._divided(batch, blamed, is_counted=is_counted))
+                self._ahead.extend(self._divided(batch, blamed))
             else:
-                self._ahead.append(_Batch(batch.items, self.pool.submit(batch.items)))
+                self._ahead.append(_Batch(batch.items, self.pool.submit(batch.items, alone=True)))
 
-    def _divided(self, batch: _Batch, failed: dict[int, str], *, is_counted: bool) -> list[_Batch]:
+    def _divided(self, batch: _Batch, failed: dict[int, str]) -> list[_Batch]:
         """Return batches of one item each: done, lost, submitted again, or to be done alone if it failed before."""
         single = []
         for place, (number, item) in enumerate(batch.items):
             alone = [(number, item)]
-            self._tried[number] += number in failed and is_counted
+            self._tried[number] += number in failed
             if number not in failed:
                 done = None if batch.results is None else [batch.results[place]]
-                single.append(_Batch(alone, None if done else self.pool.submit(alone), done))
+                single.append(_Batch(alone, None if done else self.pool.submit(alone, alone=True), done))
             elif self._tried[number] > self.retries:
                 single.append(_Batch(alone, results=[self._lost(item, number, failed[number])]))
             else:
-                single.append(_Batch(alone))
+                single.append(_Batch(alone, self.pool.submit(alone, alone=True) if self.pool.isolates else None))
         return single
 
     def _lost(self, item: Any, number: int, reason: str) -> Any:

@@ -70,6 +70,8 @@ class LearningOptions:
         The rule by which a contact shows on the load cell; a run with a contact is left out.
     jobs : int, optional
         Number of logs read at a time.
+    workers : Workers, optional
+        In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
     progress : callable, optional
         Called after each log with the number done and the total.
     """
@@ -86,6 +88,7 @@ class LearningOptions:
     false_alarm_budget: str | None = None
     onset: OnsetRule | None = None
     jobs: int = 1
+    workers: Workers | None = None
     progress: Progress | None = None
 
 
@@ -133,9 +136,8 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     instance = machine_file.detector(options.detector)
     paths = [location(log) for log in logs]
     part = _part(paths, options)
-    reading = RunReading(
-        operations, onset=options.onset, part=part, workers=Workers(options.jobs), progress=options.progress
-    )
+    workers = options.workers or Workers(options.jobs)
+    reading = RunReading(operations, onset=options.onset, part=part, workers=workers, progress=options.progress)
     runs = load_runs(paths, machine_file, reading)
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
     fit = fitting(wanted)

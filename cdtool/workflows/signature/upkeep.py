@@ -109,6 +109,8 @@ class SeasonOptions:
         The rule by which a contact shows on the load cell; a run with a contact is left out.
     jobs : int, optional
         Number of logs read at a time.
+    workers : Workers, optional
+        In place of `jobs`: also the longest time for a log, how often it is tried again, or a cluster.
     progress : callable, optional
         Called after each log with the number done and the total.
     """
@@ -119,6 +121,7 @@ class SeasonOptions:
     operations: str | None = None
     onset: OnsetRule | None = None
     jobs: int = 1
+    workers: Workers | None = None
     progress: Progress | None = None
 
     def machine_file(self) -> MachineFile:
@@ -128,7 +131,8 @@ class SeasonOptions:
     def runs(self, file: SignatureFile, machine_file: MachineFile) -> Runs:
         """Read the logs for a signature file; SignatureError if they are cut differently than for learning."""
         operations = _cut(file, self.operations)
-        reading = RunReading(operations, onset=self.onset, workers=Workers(self.jobs), progress=self.progress)
+        workers = self.workers or Workers(self.jobs)
+        reading = RunReading(operations, onset=self.onset, workers=workers, progress=self.progress)
         return load_runs([location(log) for log in self.logs], machine_file, reading, file.plausible)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,10 +11,12 @@ from typing import Any
 import pytest
 
 from cdtool.plain_text import plain
+from cdtool.report import many
 from cdtool.report.html.page import to_html
 from cdtool.report.writers.base import Report
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
+from tests.report.many import LIMITS, report_of_many
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -197,6 +200,44 @@ def test_recordings_are_paged_searched_and_filtered(shown):
     choice = all_of(browser, f"{table} .filters label:last-child option")
     next(item for item in choice if "missed contact" in item.text).click()
     assert texts(browser, f"{table} tbody td:first-child") == ["soft/01.csv"]
+
+
+def test_of_many_recordings_the_failed_cases_are_found_by_filters_and_shown_with_their_traces(shown, monkeypatch):
+    for name, value in LIMITS.items():
+        monkeypatch.setattr(many, name, value)
+    text = to_html(report_of_many())
+    assert len(text.encode()) < 3e6
+    browser = shown(text)
+    assert browser.get_log("browser") == []
+    bars = "return [...document.querySelectorAll('[data-plot=latency] path.bar')].map((item) => item.getAttribute('d'))"
+    drawn = browser.execute_script(bars)
+    assert len(drawn) == 4 and all(path.count("Z") > 10 and "NaN" not in path for path in drawn)
+    table = '.paged[data-table="cases-table"]'
+    for heading, wanted in (("group", "soft"), ("detector", "pure_inertia"), ("outcome", "missed")):
+        (label,) = [item for item in all_of(browser, f"{table} .filters label") if item.text.startswith(heading)]
+        next(item for item in label.find_elements("css selector", "option") if item.text == wanted).click()
+    rows = [row.split() for row in texts(browser, f"{table} tbody td:nth-child(n+2):nth-child(-n+4)")]
+    assert rows and rows[::3] == [["soft"]] * (len(rows) // 3)
+    assert rows[1::3] == [["pure_inertia"]] * (len(rows) // 3) and rows[2::3] == [["missed"]] * (len(rows) // 3)
+    first = texts(browser, f"{table} tbody td:first-child")[0].removeprefix("▸ ")
+    all_of(browser, f"{table} input[type=search]")[0].send_keys(first[-12:])
+    assert [name.removeprefix("▸ ") for name in texts(browser, f"{table} tbody td:first-child")] == [first]
+    browser.execute_script("arguments[0].click()", all_of(browser, f"{table} tbody tr.opens")[0])
+    assert texts(browser, "#viewer-title") == [first]
+    assert "missed" in texts(browser, "#viewer-plot text")
+
+
+def test_a_bar_of_a_histogram_says_how_many_contacts_it_has(shown, monkeypatch):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    for name, value in LIMITS.items():
+        monkeypatch.setattr(many, name, value)
+    browser = shown(to_html(report_of_many()))
+    plot = all_of(browser, '[data-plot="latency"]')[0]
+    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
+    ActionChains(browser, duration=20).move_to_element(plot).perform()
+    name, words = texts(browser, "#tooltip")[0].split("\n")
+    assert name in ("momentum", "pure_inertia") and re.fullmatch(r"\d+ contacts? after [\d.]+ to [\d.]+ ms", words)
 
 
 def test_a_detectors_curve_is_hidden_by_its_name(shown):

@@ -1,6 +1,7 @@
 """A benchmark in several processes: everything that goes to a worker and back, and the same bytes for any number."""
 
 import pickle
+import sys
 import threading
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from cdtool.evaluation.results_file import to_json
 from cdtool.evaluation.traces.file import encode_traces
 from cdtool.thresholds import THRESHOLDS
 from cdtool.workflows import gathering, runs
+from cdtool.workflows.benchmark import learned_thresholds
 from cdtool.workflows.execution.workers import Workers, in_order
 
 FILE = """machine = "machine.toml"
@@ -123,3 +125,36 @@ def test_workers_that_read_at_the_same_time_read_the_same_bits(tmp_path, file_fo
             log for log, one, many in zip(logs, alone, in_order(bits, logs, 72, Workers(4)), strict=True) if one != many
         ]
         assert not differing
+
+
+@pytest.fixture(scope="module")
+def free_runs(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("budget")
+    cdtool.simulate_gate(folder, {"free": 12, "holdout": 1, "stiff": 1}, seed=16)
+    (folder / "budget.toml").write_text(
+        FILE.format(threshold="signature").replace(', "damaged/*.csv"', ""), encoding="utf-8"
+    )
+    return folder / "budget.toml"
+
+
+@pytest.mark.parametrize("beside", [0, 1])
+def test_detectors_learn_for_a_budget_in_processes_that_share_memory(free_runs, beside, monkeypatch):
+    jobs_of_learning = []
+
+    def noting(work, items, total, workers, **options):
+        jobs_of_learning.append(workers.jobs)
+        return in_order(work, items, total, workers, **options)
+
+    monkeypatch.setattr(learned_thresholds, "in_order", noting)
+    stop = threading.Event()
+    threads = [threading.Thread(target=stop.wait) for _ in range(beside)]
+    for thread in threads:
+        thread.start()
+    names = ["momentum", "pure_torque", "pure_inertia", "velocity"]
+    try:
+        made = [cdtool.benchmark(free_runs, detectors=names, false_alarm_budget="1/4op", jobs=jobs) for jobs in (1, 2)]
+    finally:
+        stop.set()
+    one, two = (to_json(done.results) for done in made)
+    assert one == two and len(made[0].results.calibration) > 1
+    assert jobs_of_learning == [1, 2 if sys.platform == "linux" and not beside else 1]

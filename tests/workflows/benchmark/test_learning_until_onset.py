@@ -102,7 +102,7 @@ def test_the_limits_of_a_log_are_those_learned_from_the_others_alone(gate):
 @pytest.mark.parametrize("jobs", [2, 3])
 def test_the_results_do_not_depend_on_the_number_of_jobs(gate, jobs):
     setup = setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
-    assert to_json(benchmark(setup).evaluated) == to_json(benchmark(setup, jobs=jobs).evaluated)
+    assert to_json(benchmark(setup).results) == to_json(benchmark(setup, jobs=jobs).results)
 
 
 def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate):

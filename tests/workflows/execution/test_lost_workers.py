@@ -2,6 +2,7 @@
 
 import ctypes
 import faulthandler
+import multiprocessing
 import os
 import signal
 import sys
@@ -17,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdtool.errors import UsageError, WorkerError
+from cdtool.workflows.execution import processes
 from cdtool.workflows.execution.workers import Workers, _Ordered, in_order
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -40,6 +42,41 @@ def left(number):
         os._exit(7)
     if number == 6:
         sys.exit(8)
+    return number
+
+
+def ended(number):
+    if number == 1:
+        os._exit(0)
+    if number == 3:
+        sys.exit()
+    if number == 5:
+        raise KeyboardInterrupt
+    if number == 7:
+        os.kill(os.getpid(), signal.SIGTERM)
+    return number
+
+
+class OddError(Exception):
+    """It cannot be copied to another process."""
+
+    def __init__(self, file, number):
+        super().__init__(f"{file} is strange")
+        self.number = number
+
+
+def odd(number):
+    if number == 5:
+        raise OddError("05.csv", number)
+    if number > 5:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        time.sleep(60.0)
+    return number
+
+
+def stopped(number):
+    if number == 2:
+        os.kill(os.getpid(), signal.SIGSTOP)
     return number
 
 
@@ -104,6 +141,50 @@ def test_the_reason_and_the_number_of_attempts_are_stated(work, number, reason, 
     assert made[0] == 0 and made[7:] == [7, 8]
 
 
+@pytest.mark.parametrize("beside", [0, 1])
+def test_items_that_leave_their_workers_in_any_way_are_lost_and_no_other(beside, capfd):
+    stop = threading.Event()
+    threads = [threading.Thread(target=stop.wait) for _ in range(beside)]  # then processes are not forked
+    for thread in threads:
+        thread.start()
+    try:
+        made = run(ended, 12, Workers(2, retries=0), 2)
+    finally:
+        stop.set()
+    reasons = {
+        1: "its worker process ended with exit status 0",
+        3: "its worker process ended with exit status 0",
+        5: "it was ended by KeyboardInterrupt",
+        7: "its worker process crashed (SIGTERM)",
+    }
+    assert made == [(number, reasons[number]) if number in reasons else number for number in range(12)]
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_ignore_sigterm_end(capfd, monkeypatch):
+    monkeypatch.setattr(processes, "_ENDED_WITHIN", 0.5)
+    before = set(multiprocessing.active_children())
+    with pytest.raises(RuntimeError, match=r"OddError: 05\.csv is strange"):
+        run(odd, 8, Workers(2))
+    assert set(multiprocessing.active_children()) == before
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_process_that_is_stopped_is_ended_by_the_time_limit(monkeypatch):
+    monkeypatch.setattr(processes, "_GRACE", 0.2)
+    made = run(stopped, 6, Workers(2, timeout=0.5, retries=0))
+    assert made == [0, 1, (2, "took longer than 0.5 s (--timeout)"), 3, 4, 5]
+
+
+def test_without_shared_memory_one_line_states_it(monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(multiprocessing.context.BaseContext, "RawArray", full)
+    with pytest.raises(WorkerError, match="no shared memory for processes: No space left on device"):
+        run(abs, 8, Workers(2))
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize("work", [slow, stuck])
 def test_an_item_that_takes_too_long_is_ended(work, jobs):
@@ -164,11 +245,12 @@ def test_workers_that_cannot_be_are_refused(wrong):
 class Shared:
     """A pool whose only worker holds a queue of batches, all of which are lost when one of them ends it.
 
-    `ends` are the items that always end the worker, `once` those that do so the first time.
+    `ends` are the items that always end the worker, `once` those that do so the first time. An item that is to be alone
+    is done while the queue is elsewhere.
     """
 
     broken = (ConnectionError,)
-    is_exact = False
+    isolates = True
     size = 1
 
     def __init__(self, ends, once):
@@ -177,10 +259,10 @@ class Shared:
         self.may_work = threading.Condition()
         self.ended = False
 
-    def submit(self, batch):
+    def submit(self, batch, *, alone=False):
         future = Future()
         with self.may_work:
-            self.queue.append((batch, future))
+            self.queue.append((batch, future, alone))
             self.may_work.notify()
         return future
 
@@ -190,19 +272,22 @@ class Shared:
                 self.may_work.wait_for(lambda: self.queue or self.ended)
                 if not self.queue:
                     continue
-                batch, future = self.queue[0]
+                batch, future, alone = self.queue.popleft()
                 numbers = {number for number, _ in batch}
                 if fatal := numbers & (self.ends | self.once):
                     self.once -= fatal
-                    for _, lost_future in self.queue:
-                        lost_future.set_exception(ConnectionError())
-                    self.queue.clear()
+                    future.set_exception(ConnectionError(*(numbers if alone and len(batch) == 1 else ())))
+                    for other in [item for item in self.queue if not alone and not item[2]]:
+                        self.queue.remove(other)
+                        other[1].set_exception(ConnectionError())
                 else:
-                    self.queue.popleft()
                     future.set_result([10 * item for _, item in batch])
 
     def blamed(self, lost):
-        return {lost[0][0]: "its worker ended"} if len(lost) == 1 else {}
+        return dict.fromkeys(lost.exception().args, "its worker ended")
+
+    def check(self):
+        return None
 
     def progressed(self):
         pass
@@ -232,7 +317,9 @@ def test_where_several_share_a_worker_only_those_that_end_it_alone_are_lost(coun
     ordered = _Ordered(pool, count, retries, lost, together)
     made = list(ordered.results(range(count)))
     gone = {item for item in made if isinstance(item, tuple)}
-    assert {number for number, _ in gone} == {number for number in ends if number < count}
+    lost_items, always = {number for number, _ in gone}, {number for number in ends if number < count}
+    # One that ends it alone for the first time is lost if nothing is tried again.
+    assert always <= lost_items <= (always | once if not retries else always)
     assert [item[0] * 10 if isinstance(item, tuple) else item for item in made] == [10 * k for k in range(count)]
 
 
@@ -240,12 +327,12 @@ class Sizes:
     """A pool that notes how many items it receives at once."""
 
     broken = ()
-    is_exact = True
+    isolates = False
 
     def __init__(self, size):
         self.size, self.seen = size, []
 
-    def submit(self, batch):
+    def submit(self, batch, *, alone=False):  # noqa: ARG002
         self.seen.append(len(batch))
         future = Future()
         future.set_result([item for _, item in batch])
@@ -253,6 +340,9 @@ class Sizes:
 
     def blamed(self, _):
         raise AssertionError
+
+    def check(self):
+        return None
 
     def progressed(self):
         pass

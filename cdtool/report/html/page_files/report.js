@@ -78,7 +78,9 @@ function start() {
     const traces = viewer && byRecording ? byRecording.opens[recording] : null;
     return traces ? () => viewer.open(traces[0]) : null;
   };
-  makeCharts("latency", data, data.latency, (panel) => latencyPlan(data, panel, openRecording));
+  makeCharts("latency", data, data.latency, (panel) =>
+    panel.edges ? histogramPlan(data, panel) : latencyPlan(data, panel, openRecording),
+  );
   makeCharts("survival", data, data.survival, (panel, hidden) => survivalPlan(data, panel, hidden));
   makeAmoc(data);
   makeForces(data, viewer);
