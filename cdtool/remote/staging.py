@@ -59,6 +59,10 @@ class _Session:
 
     def own_folder(self) -> Path:
         """Return the folder of this process; make it at the first call."""
+        with self.lock:
+            return self._made_folder()
+
+    def _made_folder(self) -> Path:
         if self.folder is None:
             given = os.environ.get(_FOLDER)
             if given and Path(given).is_dir():
@@ -99,6 +103,7 @@ def known_info(url: str) -> ObjectInfo | None:
 
 def current_info(url: str) -> ObjectInfo:
     """Return what is at a URL now; raises MissingObjectError, StorageError."""
+    _session.own_folder()  # workers that are started later find it
     try:
         found = storage.info(url)
     except FileNotFoundError:

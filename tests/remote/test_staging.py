@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from cdtool.errors import is_lasting
-from cdtool.remote import staging, storage
+from cdtool.remote import staging, storage, transferred
+from cdtool.remote.ranges import RangedBytes
 from cdtool.remote.remote_path import location
 from cdtool.remote.storage_error import StorageError
 
@@ -52,6 +53,18 @@ def test_a_thread_keeps_the_copies_of_another_one_that_is_at_work(memory):
 def _use_copies() -> None:
     with staging.copies_in_use():
         os.fspath(location("memory://logs/a.csv"))
+
+
+def test_a_worker_notes_for_the_first_process_what_it_has_read(memory, monkeypatch, tmp_path):
+    monkeypatch.setenv("CDTOOL_REMOTE_FOLDER", str(tmp_path))
+    monkeypatch.setattr(staging, "_session", staging._Session())
+    monkeypatch.setattr(transferred, "_bytes", 0)
+    monkeypatch.setattr(transferred, "_requests", 0)
+    memory.pipe_file("/logs/a.mcap", b"x" * 100)
+    assert RangedBytes("memory://logs/a.mcap").read(10, 90) == b"x" * 90
+    staging.release()
+    transferred.forget()
+    assert transferred.altogether(tmp_path) == (90, 1)
 
 
 def test_the_copies_are_bounded(memory, monkeypatch):

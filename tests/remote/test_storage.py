@@ -96,7 +96,8 @@ def test_without_the_package_of_a_protocol_one_line_names_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "gcsfs", None)
     monkeypatch.setitem(sys.modules, "s3fs", None)
     registered = import_module("fsspec.registry")
-    monkeypatch.setattr(registered, "_registry", {})
+    for protocol in ("gs", "s3"):
+        monkeypatch.delitem(registered._registry, protocol, raising=False)
     with pytest.raises(StorageError, match=r"gs:// needs a package that is not installed \(.*gcsfs.*\)"):
         storage.info("gs://bucket/a.csv")
     with pytest.raises(StorageError, match=r"s3:// needs .* \(pip install 'cdtool\[remote\]'\)"):
