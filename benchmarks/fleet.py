@@ -66,6 +66,7 @@ def child(file: str, store: str, jobs: str, output: str, *flags: str) -> None:
         "clock": perf_counter() - begin,
         "each": (times[-1] - times[skip]) / (len(times) - 1 - skip) if len(times) > 1 else 0.0,
         "cpu": process_time() + of[1].ru_utime + of[1].ru_stime,
+        "own": process_time(),
         "peak": of[0].ru_maxrss / 1024.0,
         "computed": done.stored.computed if done.stored else len(times),
         "recordings": len(done.results.recordings),
@@ -113,6 +114,8 @@ def scale(recordings: int) -> bool:
     store_cost = ratio([item[1]["cpu"] for item in pairs], [item[0]["cpu"] for item in pairs])
     workers_cost = ratio([item[2]["cpu"] for item in pairs], [item[0]["cpu"] for item in pairs])
     faster = Spread.of([large["each"] / two["each"]])
+    share = ratio([item[2]["own"] for item in pairs], [item[2]["cpu"] for item in pairs])
+    print(f"CPU time of the first process with two workers / of all three: {share}")
     rows = [
         (f"{FEW}", median(1e3 * item["each"] for item in small), median(item["peak"] for item in small)),
         (f"{recordings}", 1e3 * large["each"], large["peak"]),
