@@ -36,7 +36,7 @@ from cdtool.workflows.benchmark.log_outcome import (
     striking_of,
 )
 from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome, PieceScoring, ScoreLog, lost
-from cdtool.workflows.benchmark.stored_outcomes import Planned, StoredOutcomes
+from cdtool.workflows.benchmark.stored_outcomes import Planned, StoredOutcomes, same_content
 from cdtool.workflows.contacts.impact_free import unchecked
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.store.sources import SourceFile
@@ -192,7 +192,8 @@ class Gathering:
             traces = [trace for of_run in outcome.outcomes for trace in of_run.traces]
             for number, place, operation in log:
                 trace = traces[operation] if operation < len(traces) else None
-                if trace is not None:  # the log may have changed meanwhile
+                # The log may have changed since its rows were stored.
+                if trace is not None and same_content(outcome.sources, place.sources):
                     self._traces[number] = trace
                     place.keep(operation, trace)
 

@@ -154,7 +154,7 @@ class StoredOutcomes:
             others = [name for name in self.names if name not in missing]
             places = [place for place in planned.detectors if place is not None]
             entries = self._entries(path, places, others)
-            if entries is None or _digests(made.sources) != _digests(planned.sources):
+            if entries is None or not same_content(made.sources, planned.sources):
                 return None
             stored = dict(zip(others, entries, strict=True))
         self.computed += 1
@@ -228,8 +228,11 @@ class StoredOutcomes:
         return StoreReport(self.computed, self.reused)
 
 
-def _digests(sources: Sequence[SourceFile] | None) -> list[str] | None:
-    return None if sources is None else [item.digest for item in sources]
+def same_content(one: Sequence[SourceFile] | None, other: Sequence[SourceFile] | None) -> bool:
+    """Return whether the files of a log have the same content at two times; without a store it is not known."""
+    if one is None or other is None:
+        return one is other
+    return [item.digest for item in one] == [item.digest for item in other]
 
 
 def _of_detector(outcome: LogOutcome, name: str) -> DetectorOutcome | None:

@@ -230,6 +230,28 @@ def test_a_log_that_changes_before_another_detector_runs_is_computed_whole(gate,
     assert found == (alone(gate), 6)
 
 
+def test_a_trace_of_a_log_that_has_changed_since_is_left_out(gate, tmp_path, monkeypatch):
+    """The rows are stored; the trace is made again, since another gain changes it, when the log has another content."""
+    run(gate, tmp_path / "s")
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    log = gate / "stiff" / "03.csv"
+    text, call = log.read_bytes(), pieces.PieceScoring.__call__
+
+    def after_a_change(self, piece):
+        if piece.path == log and piece.operations:
+            log.write_bytes(text.replace(b"-0.00093", b"-0.00094", 1) + b"\n")
+        return call(self, piece)
+
+    monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
+    done = cdtool.benchmark(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    assert log.read_bytes() != text
+    assert "stiff/03.csv" not in {item.recording for item in done.traces}
+    log.write_bytes(text)
+    monkeypatch.undo()
+    assert run(gate, tmp_path / "s") == (alone(gate), 0)
+
+
 def test_logs_that_are_learned_from_and_scored_depend_on_all_others(gate, tmp_path):
     write(gate, learn=', "stiff/*.csv"', until='until = "onset"')
     expected = alone(gate)
