@@ -202,14 +202,19 @@ def _uploaded(paths: Sequence[Path]) -> Iterator[list[Path]]:
 
 @contextmanager
 def _uploaded_folder(path: Path, may_replace: Callable[[Path], bool] | None) -> Iterator[Path]:
-    """Yield a local folder whose files are uploaded if the block ends without error; other files there stay."""
-    if may_replace is not None and path.is_dir():
-        may_replace(path)
+    """Yield a local folder whose files are uploaded if the block ends without error; see `replaced_folder`.
+
+    What the folder had before is removed at the end if all of it may be replaced.
+    """
+    whole = path.is_dir() and (may_replace is None or may_replace(path))
     with tempfile.TemporaryDirectory(prefix="cdtool-") as folder, _explained(path, [(Path(folder), path)]):
         yield Path(folder)
         for item in sorted(Path(folder).rglob("*")):
             if item.is_file():
                 _upload(path / item.relative_to(folder).as_posix(), item)
+        for old in list(path.rglob("*")) if whole else ():
+            if old.is_file() and not (Path(folder) / old.relative_to(path)).exists():
+                old.unlink(missing_ok=True)
 
 
 def _upload(path: Path, content: bytes | Path) -> None:

@@ -40,13 +40,23 @@ def test_a_folder_is_uploaded_and_other_files_stay(memory):
     memory.pipe_file("/out/report.html", b"old")
     asked = []
     target = location("memory://out")
-    with replaced_folder(target, lambda folder: asked.append(folder) or True) as part:
+    with replaced_folder(target, lambda folder: bool(asked.append(folder))) as part:
         (part / "report.html").write_text("new")
         (part / "figures").mkdir()
         (part / "figures" / "1.png").write_bytes(b"1")
     assert asked == [target]
     assert memory.cat("/out/report.html") == b"new" and memory.cat("/out/old.txt") == b"old"
     assert memory.cat("/out/figures/1.png") == b"1"
+
+
+def test_a_folder_that_may_be_replaced_keeps_nothing_old(memory):
+    for name in ("rows/0001.parquet", "rows/0002.parquet"):
+        memory.pipe_file(f"/out/results.parquet/{name}", b"old")
+    with replaced_folder(location("memory://out/results.parquet"), lambda _: True) as part:
+        (part / "rows").mkdir()
+        (part / "rows" / "0001.parquet").write_bytes(b"new")
+    assert memory.find("/out") == ["/out/results.parquet/rows/0001.parquet"]
+    assert memory.cat("/out/results.parquet/rows/0001.parquet") == b"new"
 
 
 def test_what_may_not_be_replaced_is_not(memory):
