@@ -19,7 +19,7 @@ transmission_ratio = 0.001
 position = { topic = "/axis", field = "q" }
 torque = { topic = "/axis", field = "i", unit = "A", scale = 0.5 }
 """
-_CHUNK = 1 << 20
+_CHUNK = 8 << 20
 _START_NS, _STEP_NS = 1_700_000_000 * 10**9, 10**6
 
 

@@ -29,9 +29,7 @@ class Journal:
     """The journal of one run in a folder."""
 
     def __init__(self, folder: Path) -> None:
-        self.path = folder / f"{secrets.token_hex(8)}{_SUFFIX}"
-        self._file = self.path.open("xb", buffering=0)
-        _lock(self._file.fileno())
+        self.path, self._file = _locked_file(folder)
         if hasattr(os, "register_at_fork"):  # the lock is to end with this process, not with the last worker
             own = weakref.ref(self._file)
             os.register_at_fork(after_in_child=lambda: _close(own()))
@@ -39,6 +37,7 @@ class Journal:
     def add(self, entries: list[Entry]) -> None:
         """Add entries; when it returns, they outlive this process."""
         self._file.write(b"".join(map(_line, entries)))
+        self._file.flush()
 
     def clear(self) -> None:
         """Remove all entries: they are in a part of the store now."""
@@ -49,6 +48,16 @@ class Journal:
         """Remove the journal."""
         self.path.unlink(missing_ok=True)
         self._file.close()
+
+
+def _locked_file(folder: Path) -> tuple[Path, IO[bytes]]:
+    """Create a journal; another run may take it over before it is locked."""
+    while True:
+        path = folder / f"{secrets.token_hex(8)}{_SUFFIX}"
+        file = path.open("xb")
+        if _lock(file.fileno()) and path.exists():
+            return path, file
+        file.close()
 
 
 def _close(file: IO[bytes] | None) -> None:
