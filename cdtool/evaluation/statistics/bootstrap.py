@@ -77,8 +77,8 @@ def bca(
 
     with the bias z0, and the acceleration a from leaving one cluster out at a time. If ties leave the acceleration
     undefined, the percentiles of the same resamples are used. For the standard deviation of skewed values the interval
-    is still too short (docs/statistics.md has the measured coverage). More than 2000 clusters are put together at
-    random into 2000 first.
+    is still too short (docs/statistics.md has the measured coverage). More than 500 clusters are put together at
+    random into 500 first.
 
     Examples
     --------

@@ -17,7 +17,7 @@ from cdtool.recording import FloatArray
 
 IntArray = npt.NDArray[np.intp]
 # More clusters than this are put together before they are resampled, flipped or exchanged.
-MOST_CLUSTERS = 2000
+MOST_CLUSTERS = 500
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,18 @@ class Determinants:
 
     def name(self, path: Path) -> str:
         """Return the name of a log in results."""
-        return shown_path(path, self.setup.path.parent)
+        found = self._names.get(path)
+        if found is None:
+            found = self._names[path] = shown_path(path, self._base)
+        return found
+
+    @cached_property
+    def _names(self) -> dict[Path, str]:
+        return {}
+
+    @cached_property
+    def _base(self) -> Path:
+        return self.setup.path.parent
 
     @cached_property
     def _common(self) -> str:
