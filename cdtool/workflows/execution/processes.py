@@ -143,7 +143,7 @@ class Processes:
                 child.join(max(0.0, until - monotonic()))
                 if child.is_alive():  # it ignores the signal
                     child.kill()
-                    child.join(_ENDED_WITHIN)
+                    child.join(_JOINED_WITHIN)
             raise
         self._pool.shutdown(wait=True)
 
