@@ -19,12 +19,16 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
 from cdtool.errors import RecordingError
 from cdtool.evaluation.results import SCHEMA_VERSION, ConclusionResult, ContactResult, LimitResult, Results
+from cdtool.evaluation.rows import Rows
 from cdtool.evaluation.summary import kind_group
 from cdtool.file_kinds import kind_of
-from cdtool.strict_json import flat_strict_json, strict_json
+from cdtool.strict_json import finite, strict_json
 from cdtool.value_words import value_in_words
 
 Row = TypeVar("Row")
+# Rows that are in memory as text at once.
+_AT_ONCE = 256
+_TEXTS, _NUMBERS = {str, type(None)}, {float, int, bool, type(None)}
 # Rows of a detector, of a group or of both.
 _TABLES = ("contacts", "false_alarms", "exposure", "recordings", "forces", "points", "sweep", "calibration", "limits")
 # Earlier versions that can be read: 2 has "kept", "broken" and "not assessable", and no conclusion; 3 lists lost data
@@ -111,29 +115,47 @@ def _are_rows(value: Any) -> bool:
 
 
 def _rows_in_json(rows: Sequence[Any], depth: int = 2) -> Iterator[str]:
-    """Yield rows as `strict_json` lays them out at a depth."""
+    """Yield rows as `strict_json` lays them out at a depth, many at a time, field by field."""
     if not rows:
         yield "[]"
         return
+    names = [item.name for item in fields(rows[0])]
     before, line = "[", "\n" + " " * depth
-    for row in rows:
-        yield f"{before}{line}{{{line} {_fields_in_json(row, depth)}{line}}}"
+    layout = f"{line}{{{line} " + f",{line} ".join(f'"{name}": %s' for name in names) + f"{line}}}"
+    for columns in _blocks(rows, names):
+        texts = zip(*(_in_json(values, depth + 1) for values in columns), strict=True)
+        yield before + ",".join([layout % row for row in texts])
         before = ","
     yield f"{line[:-1]}]"
 
 
-def _fields_in_json(row: Any, depth: int) -> str:
-    values, between = row.__dict__, ",\n " + " " * depth
-    if not any(isinstance(value, tuple | Mapping) for value in values.values()):
-        return flat_strict_json(values, between)[1:-1]
-    parts = []
-    for name, value in values.items():
-        if _are_rows(value):
-            text = "".join(_rows_in_json(value, depth + 2))
-        else:
-            text = strict_json(value).replace("\n", between[1:])
-        parts.append(f'"{name}": {text}')
-    return between.join(parts)
+def _blocks(rows: Sequence[Any], names: Sequence[str]) -> Iterator[list[Sequence[Any]]]:
+    """Yield the values of each field of rows, in blocks."""
+    if isinstance(rows, Rows):
+        yield from rows.blocks(_AT_ONCE)
+        return
+    for first in range(0, len(rows), _AT_ONCE):
+        some = rows[first : first + _AT_ONCE]
+        yield [[getattr(row, name) for row in some] for name in names]
+
+
+def _in_json(values: Sequence[Any], depth: int) -> Sequence[str]:
+    """Return each value of a field as JSON, laid out at a depth; equal texts are written once."""
+    kinds = set(map(type, values))
+    if kinds <= _TEXTS:
+        known = {value: strict_json(value) for value in set(values)}
+        return [known[value] for value in values]
+    if kinds <= _NUMBERS:
+        text = json.dumps(values)
+        return json.dumps(finite(values))[1:-1].split(", ") if "N" in text or "I" in text else text[1:-1].split(", ")
+    return ["".join(_one_in_json(value, depth)) for value in values]
+
+
+def _one_in_json(value: Any, depth: int) -> Iterator[str]:
+    if _are_rows(value):
+        yield from _rows_in_json(value, depth + 1)
+    else:
+        yield strict_json(value).replace("\n", "\n" + " " * depth)
 
 
 def read_results(path: Path) -> Results:

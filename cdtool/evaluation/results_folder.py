@@ -313,8 +313,8 @@ def _read(folder: Path, kind: Any) -> Rows[Any]:
     rows = Rows(kind)
     for batch in table.to_batches(max_chunksize=_AT_ONCE):
         values = [batch.column(item.name).to_pylist() for item in columns]
-        loaded = [map(item.load, held) if item.load else held for item, held in zip(columns, values, strict=True)]
-        rows.extend(kind(*row) for row in zip(*loaded, strict=True))
+        loaded = zip(columns, values, strict=True)
+        rows.extend_columns([list(map(item.load, held)) if item.load else held for item, held in loaded])
     return rows
 
 

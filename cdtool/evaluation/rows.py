@@ -24,6 +24,8 @@ class _Column(Protocol):
 
     def add(self, value: Any) -> None: ...
 
+    def extend(self, values: Sequence[Any]) -> None: ...
+
     def at(self, number: int) -> Any: ...
 
     def between(self, first: int, last: int) -> Sequence[Any]: ...
@@ -69,6 +71,20 @@ class Rows(Sequence[Row], Generic[Row]):
         for row in rows:
             self.append(row)
 
+    def extend_columns(self, columns: Sequence[Sequence[Any]]) -> None:
+        """Add rows that are given as the values of each field; raises ValueError for columns that do not fit."""
+        lengths = {len(values) for values in columns}
+        if len(columns) != len(self.names) or len(lengths) != 1:
+            raise ValueError(f"{len(columns)} columns of {sorted(lengths)} values for {len(self.names)} fields")
+        for column, values in zip(self._columns, columns, strict=True):
+            column.extend(values)
+        self._length += lengths.pop()
+
+    def blocks(self, size: int = _AT_ONCE) -> Iterator[list[Sequence[Any]]]:
+        """Yield all rows in blocks, each as the values of each field."""
+        for first in range(0, self._length, size):
+            yield [column.between(first, min(first + size, self._length)) for column in self._columns]
+
     def __iadd__(self, rows: Iterable[Row]) -> Rows[Row]:
         self.extend(rows)
         return self
@@ -97,9 +113,8 @@ class Rows(Sequence[Row], Generic[Row]):
         return _row(self.kind, self.names, [column.at(place) for column in self._columns])
 
     def __iter__(self) -> Iterator[Row]:
-        for first in range(0, self._length, _AT_ONCE):
-            last = min(first + _AT_ONCE, self._length)
-            yield from self.between(first, last)
+        for columns in self.blocks():
+            yield from (_row(self.kind, self.names, values) for values in zip(*columns, strict=True))
 
     def between(self, first: int, last: int) -> Iterator[Row]:
         """Yield the rows from one number up to another."""
@@ -268,6 +283,14 @@ class _Floats:
         self.numbers.append(0.0 if value is None else value)
         self.absent.append(value is None)
 
+    def extend(self, values: Sequence[float | None]) -> None:
+        if None in values:
+            self.numbers.extend([0.0 if value is None else value for value in values])
+            self.absent.extend([value is None for value in values])
+        else:
+            self.numbers.extend(values)  # type: ignore[arg-type]  # none of them is None
+            self.absent.extend(bytes(len(values)))
+
     def at(self, number: int) -> float | None:
         return None if self.absent[number] else self.numbers[number]
 
@@ -291,6 +314,9 @@ class _Objects:
     def add(self, value: Any) -> None:
         self.items.append(sys.intern(value) if type(value) is str else value)
 
+    def extend(self, values: Sequence[Any]) -> None:
+        self.items.extend([sys.intern(value) if type(value) is str else value for value in values])
+
     def at(self, number: int) -> Any:
         return self.items[number]
 
@@ -312,6 +338,10 @@ class _Nested:
     def add(self, value: tuple[Any, ...]) -> None:
         self.rows.extend(value)
         self.ends.append(len(self.rows))
+
+    def extend(self, values: Sequence[tuple[Any, ...]]) -> None:
+        for value in values:
+            self.add(value)
 
     def at(self, number: int) -> tuple[Any, ...]:
         return tuple(self.rows.between(self.ends[number], self.ends[number + 1]))

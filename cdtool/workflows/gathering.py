@@ -28,6 +28,7 @@ from cdtool.findings.scoring import PlotsLeftOut
 from cdtool.recording import FloatArray
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
 from cdtool.workflows.benchmark.counting import Exposure, SweepRows
+from cdtool.workflows.benchmark.finished_run import TraceKey
 from cdtool.workflows.benchmark.force_rows import point_rows
 from cdtool.workflows.benchmark.log_outcome import (
     LogOutcome,
@@ -68,6 +69,10 @@ class _Place:
         if self.stored:
             self.stored.add_trace(self.log, self.sources, operation, trace)
 
+    def trace_key(self, operation: int) -> str | None:
+        """Return under which key the trace of an operation is stored; None if it is not."""
+        return self.stored.trace_key(self.log, self.sources, operation) if self.stored else None
+
 
 class Gathering:
     """The rows of a benchmark, log by log in the order of the file, and the selected traces.
@@ -103,8 +108,8 @@ class Gathering:
         self._scored: dict[str, str] = {}
         self._unchecked: list[tuple[str, Finding]] = []
         self._traces: dict[int, Trace] = {}
-        # Traces that are kept but not made yet, with the log and the number of the operation in it.
-        self._absent: dict[int, tuple[_Place, int]] = {}
+        # The log of each trace that is kept, made or not, and the number of the operation in it.
+        self._places: dict[int, tuple[_Place, int]] = {}
         self._place = _Place(0, "", Path())
         self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
         # Time that all logs took [s].
@@ -117,14 +122,15 @@ class Gathering:
         workers: Workers | None = None,
         progress: Progress | None = None,
         stored: StoredOutcomes | None = None,
+        plan: Sequence[Planned] = (),
     ) -> None:
         """Score the logs that are not `stored`, and add the rows of all; one that ends its workers is left out.
 
-        `scoring` is called if a log has to be scored. Raises ConfigurationError if the same log, under any name, was
-        learned from or given twice.
+        `plan` is what is stored of each log; `scoring` is called if one has to be scored. Raises ConfigurationError if
+        the same log, under any name, was learned from or given twice.
         """
         workers = workers or Workers()
-        plan = stored.plan(logs, workers) if stored else [Planned()] * len(logs)
+        plan = plan or [Planned()] * len(logs)
         missing = [log for log, planned in enumerate(plan) if not planned.is_known]
 
         @cache
@@ -176,8 +182,8 @@ class Gathering:
         """Make the traces that are kept and were not made when the logs were scored, as of logs that were stored."""
         absent: dict[int, list[tuple[int, _Place, int]]] = {}
         for number in self._choice.kept():
-            if number not in self._traces and number in self._absent:
-                place, operation = self._absent[number]
+            if number not in self._traces:
+                place, operation = self._places[number]
                 trace = place.stored.trace(place.log, place.sources, operation) if place.stored else None
                 if trace is not None:
                     self._traces[number] = trace
@@ -233,10 +239,9 @@ class Gathering:
             return
         kept = self._choice.kept()
         self._traces = {n: made for n, made in self._traces.items() if n in kept}
-        self._absent = {n: made for n, made in self._absent.items() if n in kept}
-        if trace is None:
-            self._absent[number] = self._place, operation
-        else:
+        self._places = {n: place for n, place in self._places.items() if n in kept}
+        self._places[number] = self._place, operation
+        if trace is not None:
             self._traces[number] = trace
             self._place.keep(operation, trace)
 
@@ -245,6 +250,18 @@ class Gathering:
         """Return the selected traces."""
         why = self._choice.kept()
         return tuple(replace(self._traces[number], chosen=why[number]) for number in why if number in self._traces)
+
+    @property
+    def trace_keys(self) -> list[TraceKey] | None:
+        """Return where the store has the selected traces; None if it does not have all of them."""
+        why, found = self._choice.kept(), []
+        for number, chosen in why.items():
+            place, operation = self._places[number]
+            key = place.trace_key(operation) if number in self._traces else None
+            if key is None:
+                return None
+            found.append(TraceKey(key, chosen))
+        return found
 
     def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
         """Return all results; raises RecordingError if no log could be scored."""

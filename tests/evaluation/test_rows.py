@@ -85,3 +85,22 @@ def test_no_row_of_a_detector_and_group_is_there_before_it_is_asked_for():
     taken = MANY.contacts.picked(range(10))
     assert not any(isinstance(value, ContactResult) for value in vars(taken).values())
     assert taken[0] is not taken[0]
+
+
+def test_blocks_of_columns_make_the_same_rows(given):
+    kind, rows = given
+    again = Rows(kind)
+    for columns in Rows(kind, rows).blocks(100):
+        again.extend_columns(columns)
+    assert again == rows and len(again) == len(rows)
+    with pytest.raises(ValueError, match="columns of"):
+        again.extend_columns([["a"]] if len(fields(kind)) != 1 else [])
+    assert again == rows
+
+
+def test_a_column_without_some_values_is_the_same_one_by_one_and_at_once():
+    values = [1.5, None, float("nan"), 2.0]
+    rows = [replace(FULL.contacts[0], latency_ms=value) for value in values]
+    again = Rows(ContactResult)
+    again.extend_columns([[getattr(row, item.name) for row in rows] for item in fields(ContactResult)])
+    assert repr([row.latency_ms for row in again]) == repr(values)

@@ -47,6 +47,7 @@ from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import to_be_seen
 from cdtool.workflows.signature.normal_runs import NormalsWithout
 from cdtool.workflows.signature.threshold_settings import set_by_hand
+from cdtool.workflows.store.digest import code_version, digest_of
 from cdtool.workflows.store.use import StoreUse
 
 
@@ -171,16 +172,44 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     gathered.skipped += learned.about.skipped
     gathered.findings += [*measured, *learned.about.findings, *left_out]
     logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
-    stored = store.outcomes(setup, learned, factors) if store else None
-    gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored)
-    gathered.skipped += _labels_without_run(setup, gathered.scored)
     used = [setup.machine_file.detector(name) for name in setup.detectors]
     provenance = _provenance(setup, used, learned)
-    provenance["units"] |= gathered.units
-    results = gathered.results(provenance, learned.about.calibration)
+    stored = store.outcomes(setup, learned, factors) if store else None
+    plan = stored.plan(logs, workers) if stored else ()
+    beside_logs = _digest_beside_logs(gathered, learned, provenance) if stored else ""
+    found = stored.finished(beside_logs, provenance) if stored else None
+    if found is None:
+        gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
+        gathered.skipped += _labels_without_run(setup, gathered.scored)
+        provenance["units"] |= gathered.units
+        evaluated = evaluate(gathered.results(provenance, learned.about.calibration), setup.limits)
+        traces = gathered.traces
+    else:
+        evaluated, traces = found[0].evaluated, found[1]
+        if progress:
+            progress(len(logs), len(logs))
     report = stored.finish() if stored else None
+    if stored and found is None:
+        stored.add_finished(beside_logs, evaluated, gathered.trace_keys)
     times = {"reading": learned.seconds + gathered.reading, "detecting": seconds - learned.seconds + gathered.detecting}
-    return Benchmark(evaluate(results, setup.limits), gathered.traces, times, setup.inputs, report)
+    return Benchmark(evaluated, traces, times, setup.inputs, report)
+
+
+def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mapping[str, Any]) -> str:
+    """Return the digest of what determines the results beside the outcome of each log, before the first is scored."""
+    setup = gathered.setup
+    return digest_of(
+        code_version(),
+        provenance,
+        str(setup.path),
+        setup.limits,
+        setup.labels,
+        {name: group.force for name, group in setup.impacts.items()},
+        list(gathered.skipped),
+        list(gathered.findings),
+        learned.about.calibration,
+        learned.about.sources,
+    )
 
 
 @dataclass(frozen=True)

@@ -6,23 +6,28 @@ determines it; so a detector with another gain is run on its own. Errors of the 
 
 from __future__ import annotations
 
+import hashlib
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
+from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.determinants import Determinants
+from cdtool.workflows.benchmark.finished_run import FinishedRun, TraceKey
 from cdtool.workflows.benchmark.known_sources import KnownSources
 from cdtool.workflows.benchmark.log_outcome import DetectorOutcome, LogOutcome, LogRows
 from cdtool.workflows.benchmark.pieces import Piece, PieceOutcome
 from cdtool.workflows.execution.workers import Workers
-from cdtool.workflows.store.digest import code_version
+from cdtool.workflows.store.digest import code_version, combined
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry, source_entry
+from cdtool.workflows.store.finished import read_finished, write_finished
 from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.store import RunRecord, Store, encodable, write_run
 from cdtool.workflows.store.use import StoreUse
@@ -69,15 +74,55 @@ class StoredOutcomes:
         self.keys = list(keys)
         self.computed = self.reused = self.failed = 0
         self.began = time.time()
+        # Of the outcomes of all logs, in order: those that are planned, and those that were used.
+        self._planned_keys: list[str] = []
+        self._order = hashlib.sha256()
+        self._lasts = True
 
     def plan(self, logs: Sequence[tuple[str, Path]], workers: Workers) -> list[Planned]:
         """Return what is in the store of each log."""
         known = KnownSources(self.setup, self.store, self.use, workers)
         sources = known.of([path for _, path in logs])
         keys = [key for log, of_log in zip(logs, sources, strict=True) if of_log for key in self._keys_of(log, of_log)]
+        self._planned_keys = [] if None in sources else keys
         places = iter(self.store.places(keys))
         each = 1 + len(self.names)
-        return [self._planned(item, list(islice(places, each)) if item else None) for item in sources]
+        planned = [self._planned(item, list(islice(places, each)) if item else None) for item in sources]
+        self._note_touched(logs, planned)
+        return planned
+
+    def finished(self, key: str, provenance: Mapping[str, Any]) -> tuple[FinishedRun, tuple[Trace, ...]] | None:
+        """Return the results of a run with the planned outcomes, under `key` for everything else, with its traces.
+
+        Returns None if there are none, or if some of its logs could not be read and are to be read again.
+        """
+        if not self._planned_keys:
+            return None
+        whole = combined(key, _digest_of_keys(self._planned_keys))
+        try:
+            found = FinishedRun.of_texts(read_finished(self.store.folder, whole), provenance, self.setup.groups)
+            if found is None or (found.failed and self.use.retry_failed):
+                return None
+            entries = [self.store.get(item.key) for item in found.traces]
+            traces = tuple(
+                replace(decoded(entry.content, Trace), chosen=item.chosen)
+                for entry, item in zip(entries, found.traces, strict=True)
+                if entry is not None
+            )
+        except ValueError:  # damaged
+            return None
+        if len(traces) < len(found.traces):
+            return None
+        self.keys += [*self._planned_keys, *(item.key for item in found.traces)]
+        self.reused, self.failed = len(self._planned_keys) // (1 + len(self.names)), found.failed
+        return found, traces
+
+    def add_finished(self, key: str, evaluated: Evaluated, traces: Sequence[TraceKey] | None) -> None:
+        """Store the results of the run if it would have the same again; `traces` is None if one of them is missing."""
+        if not self._lasts or traces is None or not self.store.writes:
+            return
+        whole = combined(key, self._order.hexdigest())
+        write_finished(self.store.folder, whole, FinishedRun(evaluated, tuple(traces), self.failed).to_texts())
 
     def _keys_of(self, log: tuple[str, Path], sources: tuple[SourceFile, ...]) -> list[str]:
         """Return the key of the rows of a log, and of the outcome of each detector."""
@@ -114,9 +159,7 @@ class StoredOutcomes:
             detectors = [decoded(item.content, _OfDetector) for item in entries[1:]]
         except ValueError:
             return None
-        self.keys += [item.key for item in entries]
-        if planned.sources is not None and planned.sources != entries[0].sources:
-            self._add_touched(source_entry(entries[0].recording, planned.sources))
+        self._use([item.key for item in entries])
         self.reused += 1
         self.failed += any(item.unread for item in rows)
         return _combined(rows, detectors)
@@ -134,11 +177,23 @@ class StoredOutcomes:
             found.append(entry)
         return found
 
-    def _add_touched(self, entry: Entry) -> None:
-        """Add the present times of the files of a log whose content is the same as before."""
-        self.keys.append(entry.key)
-        if self.store.places([entry.key]) == [None]:
-            self.store.add([entry])
+    def _use(self, keys: Sequence[str]) -> None:
+        """Note the keys of the outcomes of the next log."""
+        self.keys += keys
+        self._order.update("".join(keys).encode())
+
+    def _note_touched(self, logs: Sequence[tuple[str, Path]], planned: Sequence[Planned]) -> None:
+        """Add the present times of the files of logs whose content is the same as before."""
+        entries = []
+        for (_, path), item in zip(logs, planned, strict=True):
+            if item.is_known and item.sources is not None:
+                name = self.determinants.name(path)
+                if item.sources != self.store.sources_of(name):
+                    entries.append(source_entry(name, item.sources))
+                elif key := self.store.source_key_of(name):
+                    self.keys.append(key)
+        self.keys += [entry.key for entry in entries]
+        self.store.add(entries)
 
     def add(self, group: str, path: Path, planned: Planned, made: PieceOutcome) -> list[LogOutcome] | None:
         """Store what was computed of a log, and return the outcomes with every detector.
@@ -157,21 +212,22 @@ class StoredOutcomes:
             if entries is None or not same_content(made.sources, planned.sources):
                 return None
             stored = dict(zip(others, entries, strict=True))
-        self.computed += 1
-        self.failed += unread
         new = {name: tuple(_of_detector(item, name) for item in made.outcomes) for name in missing}
-        if made.sources is not None:
-            self._store(group, path, made, new)
-        if not stored:
-            return list(made.outcomes)
-        self.keys += [entry.key for entry in stored.values()]
         try:
-            every = [new.get(name) or decoded(stored[name].content, _OfDetector) for name in self.names]
+            known = {name: decoded(entry.content, _OfDetector) for name, entry in stored.items()}
         except ValueError:
             return None
-        return _combined(rows, every)
+        self.computed += 1
+        self.failed += unread
+        if made.sources is None:
+            self._lasts = False
+        else:
+            keys = self._store(group, path, made, new) | {name: entry.key for name, entry in stored.items()}
+            self._use([keys[name] for name in ("", *self.names)])
+        return _combined(rows, [(new | known)[name] for name in self.names]) if known else list(made.outcomes)
 
-    def _store(self, group: str, path: Path, made: PieceOutcome, new: dict[str, _OfDetector]) -> None:
+    def _store(self, group: str, path: Path, made: PieceOutcome, new: dict[str, _OfDetector]) -> dict[str, str]:
+        """Store the rows of a log and new outcomes; return their keys by detector, that of the rows under ""."""
         assert made.sources is not None
         of, name, version = self.determinants, self.determinants.name(path), code_version()
         key = of.log_key(group, path, made.sources)
@@ -182,11 +238,11 @@ class StoredOutcomes:
             text, own = encoded(outcomes, _OfDetector), of.detector_key(detector, path, key)
             entries.append(Entry(own, "detector", name, detector, text, failed=unread, version=version))
         self.store.add(entries)
-        self.keys += [entry.key for entry in entries]
+        return {entry.detector: entry.key for entry in entries}
 
     def trace(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> Trace | None:
         """Return the stored trace of an operation of a log; None if it is missing."""
-        key = self._trace_key(log, sources, number)
+        key = self.trace_key(log, sources, number)
         entry = None if key is None else self.store.get(key)
         if entry is None:
             return None
@@ -200,13 +256,14 @@ class StoredOutcomes:
         self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int, trace: Trace
     ) -> None:
         """Store the trace of an operation of a log."""
-        key = self._trace_key(log, sources, number)
+        key = self.trace_key(log, sources, number)
         if key is not None:
             name = self.determinants.name(log[1])
             self.store.add([Entry(key, "trace", name, "", encoded(trace, Trace), version=code_version())])
             self.keys.append(key)
 
-    def _trace_key(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> str | None:
+    def trace_key(self, log: tuple[str, Path], sources: tuple[SourceFile, ...] | None, number: int) -> str | None:
+        """Return the key of the trace of an operation of a log; None if the content of the log is not known."""
         if sources is None:
             return None
         return self.determinants.trace_key(log[1], number, self._keys_of(log, sources)[1:])
@@ -226,6 +283,10 @@ class StoredOutcomes:
         )
         write_run(self.store.folder, run, self.keys)
         return StoreReport(self.computed, self.reused)
+
+
+def _digest_of_keys(keys: Sequence[str]) -> str:
+    return hashlib.sha256("".join(keys).encode()).hexdigest()
 
 
 def same_content(one: Sequence[SourceFile] | None, other: Sequence[SourceFile] | None) -> bool:

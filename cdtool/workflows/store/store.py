@@ -97,6 +97,10 @@ class Store:
         text = self._index.sources.get(encodable(recording))
         return None if text is None else decoded(text, tuple[SourceFile, ...])
 
+    def source_key_of(self, recording: str) -> str | None:
+        """Return the key of the entry of the kind "source" that has these files; None if it is of another kind."""
+        return self._index.source_keys.get(encodable(recording))
+
     def places(self, keys: Sequence[str]) -> list[int | None]:
         """Return where the entries of keys are; None for a key without one."""
         return self._index.places(keys)
@@ -176,7 +180,9 @@ class _Index:
 
     def __init__(self, parts: list[Path]) -> None:
         self.parts: list[Path] = []
+        # Of each recording: the files that it was last read from, and the key of the entry if it has only these.
         self.sources: dict[str, str] = {}
+        self.source_keys: dict[str, str] = {}
         self.failed: set[int] = set()
         heads: list[npt.NDArray[np.uint64]] = []
         places: list[npt.NDArray[np.int64]] = []
@@ -188,8 +194,12 @@ class _Index:
             heads.append(_heads(keys))
             places.append((len(self.parts) << _ROW_BITS) + np.arange(len(keys), dtype=np.int64))
             self.parts.append(path)
-            logs = zip(rows["kind"], rows["recording"], rows["sources"], strict=True)
-            self.sources |= {name: text for kind, name, text in logs if kind in ("log", "source")}
+            for key, kind, name, text in zip(keys, rows["kind"], rows["recording"], rows["sources"], strict=True):
+                if kind == "log":
+                    self.sources[name] = text
+                    self.source_keys.pop(name, None)
+                elif kind == "source":
+                    self.sources[name], self.source_keys[name] = text, key
             first = (len(self.parts) - 1) << _ROW_BITS
             self.failed |= {first + row for row, failed in enumerate(rows["failed"]) if failed}
         every = np.concatenate(heads) if heads else np.empty(0, np.uint64)
