@@ -31,8 +31,10 @@ def test_the_corpus_has_layouts_of_all_machines_with_names_of_their_own():
 
 @pytest.mark.parametrize("layout", QUICK, ids=lambda layout: layout.name)
 def test_every_channel_of_a_small_layout_is_mapped(layout, tmp_path):
-    done = score(layout, tmp_path)
+    done = score(layout, tmp_path, audited=True)
     assert set(done.right) == set(done.expected) and not done.unmarked and not done.fault
+    text = (tmp_path / "machine.toml").read_text(encoding="utf-8")
+    assert score(layout, tmp_path) == done and (tmp_path / "machine.toml").read_text(encoding="utf-8") == text
 
 
 def test_nine_of_ten_channels_of_all_layouts_are_mapped_and_nothing_wrong_is_unmarked(tmp_path):

@@ -66,7 +66,13 @@ class Table:
         if self.units:
             lines.append(self.separator.join(self.units))
         rows = np.column_stack(list(columns.values()))
-        text = [self.separator.join(self._cell(value) for value in row) for row in rows.tolist()]
+        if np.all(np.abs(rows) < 1e8):  # and finite
+            line = self.separator.join([f"%.{self.digits}g"] * rows.shape[1])
+            text = [(line % tuple(row)) for row in rows.tolist()]
+            if self.decimal != ".":
+                text = [row.replace(".", self.decimal) for row in text]
+        else:
+            text = [self.separator.join(self._cell(value) for value in row) for row in rows.tolist()]
         path.write_text("\n".join([*lines, *text]) + "\n", encoding=self.encoding)
 
     def _cell(self, value: float) -> str:
