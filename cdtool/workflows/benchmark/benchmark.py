@@ -156,7 +156,6 @@ class BenchmarkWork:
 
 
 def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progress: Progress | None) -> Benchmark:
-    compile_loaded()
     begin = perf_counter()
     setup, measured = with_synchronisation(work.setup, workers)
     teaching = Teaching(setup, workers, every_detector=work.every_detector)
@@ -179,6 +178,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     beside_logs = _digest_beside_logs(gathered, learned, provenance) if stored else ""
     found = stored.finished(beside_logs, provenance) if stored else None
     if found is None:
+        compile_loaded()
         gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
         gathered.skipped += _labels_without_run(setup, gathered.scored)
         provenance["units"] |= gathered.units

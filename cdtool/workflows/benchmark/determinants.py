@@ -6,6 +6,7 @@ the machine, the gains of other detectors and the rows that a label file has on 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,8 +43,9 @@ class Determinants:
 
     def log_key(self, group: str, path: Path, sources: Sources) -> str:
         """Return the key of the rows of a log that do not depend on the detectors."""
-        own = digest_of(*self._of_log(group, path))
-        return combined("log", self._common, own, *(item.digest for item in sources))
+        own = json.dumps(self._of_log(path))
+        labels = "" if self.setup.labels is None else digest_of(labels_of_log(self.setup, path))
+        return combined("log", self._common, self._groups[group], own, labels, *(item.digest for item in sources))
 
     def detector_key(self, detector: str, path: Path, log_key: str) -> str:
         """Return the key of the outcome of a detector on a log."""
@@ -72,25 +74,18 @@ class Determinants:
     def _common(self) -> str:
         return digest_of(code_version(), how_logs_are_read(self.setup), self.setup.watched)
 
-    def _of_log(self, group: str, path: Path) -> list[Any]:
+    def _of_log(self, path: Path) -> list[str | None]:
         setup, name = self.setup, self.name(path)
-        known = setup.impacts[group]
-        return [
-            name,
-            group,
-            group == HOLDOUT,
-            known.window,
-            self._profiles[group],
-            str(setup.sections.get(path, LogSection())),
-            setup.campaigns.get(path),
-            setup.points.get(path),
-            labels_of_log(setup, path),
-            self._ranges(name),
-        ]
+        section = str(setup.sections.get(path, "")) if setup.sections else ""
+        return [name, section, setup.campaigns.get(path), setup.points.get(path), self._ranges(name)]
 
     @cached_property
-    def _profiles(self) -> dict[str, str]:
-        return {name: digest_of(group.force) for name, group in self.setup.impacts.items()}
+    def _groups(self) -> dict[str, str]:
+        """Return the digest of the settings of each group."""
+        return {
+            name: digest_of(name, name == HOLDOUT, group.window, group.force)
+            for name, group in self.setup.impacts.items()
+        }
 
     @cached_property
     def _range_digests(self) -> dict[int, str]:

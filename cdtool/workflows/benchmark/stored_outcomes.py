@@ -94,7 +94,7 @@ class StoredOutcomes:
     def finished(self, key: str, provenance: Mapping[str, Any]) -> tuple[FinishedRun, tuple[Trace, ...]] | None:
         """Return the results of a run with the planned outcomes, under `key` for everything else, with its traces.
 
-        Returns None if there are none, or if some of its logs could not be read and are to be read again.
+        Returns None if the store has none, or if some of its logs could not be read and are to be read again.
         """
         if not self._planned_keys:
             return None

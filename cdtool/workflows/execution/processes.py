@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing import active_children, get_context
+from multiprocessing.connection import wait
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from time import monotonic, monotonic_ns
@@ -26,8 +27,10 @@ from cdtool.workflows.execution.workers import shares_memory
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
 _JOINED_WITHIN, _ENDED_WITHIN = 10.0, 3.0
-# After the time limit, a process has this long to end itself; the pieces are compared with it so often [s].
+# After the time limit, a process has this long to end itself; processes and pieces are looked at so often [s].
 _GRACE, _CHECKED_EVERY = 2.0, 1.0
+# The pool notices within this time that a process has ended, unless it waits for the rest of what that one sent [s].
+_NOTICED_WITHIN = 2.0
 
 
 class Processes:
@@ -58,9 +61,12 @@ class Processes:
         for number in range(self.size):
             free.put(number)
         self._children: set[BaseProcess] = set()
+        self._ended_at: float | None = None  # when it was first seen that a process has ended
+        self._ended_here: set[int] = set()
         self._pool = ProcessPoolExecutor(
             self.size, context, initializer=begin, initargs=(self._work, self._claims, free, self._limit)
         )
+        self._results: Any = self._pool._result_queue  # shutting the pool down drops it
 
     def submit(self, batch: Sequence[tuple[int, Any]], *, alone: bool = False) -> Future[list[Any]]:  # noqa: ARG002
         """Return the future results of some numbered pieces; a pool whose process has ended gives a failed one."""
@@ -71,7 +77,9 @@ class Processes:
             future = Future()
             future.set_exception(fault)
         if len(self._children) < self.size:
-            self._children |= set(active_children()) - self._others
+            # One that has ended already is only in the pool's own list.
+            self._children |= set((getattr(self._pool, "_processes", None) or {}).values()) | set(active_children())
+            self._children -= self._others
         return future
 
     def blamed(self, lost: Future[list[Any]]) -> dict[int, str]:  # noqa: ARG002  the claims show it
@@ -85,6 +93,8 @@ class Processes:
         for child in self._children:
             child.join(_JOINED_WITHIN)
             status[child.pid or 0] = child.exitcode
+        for process in self._ended_here & set(status):
+            status[process] = TOLD_TO_END
         found: dict[int, str] = {}
         asked: list[tuple[int, int]] = []
         for process, number, since, told in self._each_claim():
@@ -110,16 +120,47 @@ class Processes:
             return limit_words(self._limit)
         return ended_words(code)
 
-    def check(self) -> float | None:
-        """End a process whose piece takes too long and which did not end itself, as one that is stopped."""
+    def check(self) -> float:
+        """End a process whose piece takes too long and did not end itself; let the pool notice one that has ended."""
+        self._release()
         if self._limit is None:
-            return None
+            return _CHECKED_EVERY
         now = monotonic_ns()
         for process, number, since, _ in self._each_claim():
             if number and 1e-9 * (now - since) > self._limit + _GRACE:
                 with suppress(OSError):
                     os.kill(process, signal.SIGKILL)
         return _CHECKED_EVERY
+
+    def _release(self) -> None:
+        """End all processes if one has ended and the pool did not notice it.
+
+        A process that is killed while it sends a result leaves the pool waiting for the rest of it, and the other
+        processes for the right to send theirs.
+        """
+        ended = {child for child in self._children if wait([child.sentinel], 0.0)}
+        if not ended:
+            self._ended_at = None
+        elif self._ended_at is None:
+            self._ended_at = monotonic()
+        elif monotonic() - self._ended_at > _NOTICED_WITHIN:
+            self._end(self._children - ended)
+            self._ended_at = None
+
+    def _end(self, children: Iterable[BaseProcess]) -> None:
+        """End processes, by force if they ignore the signal, and the wait of the pool for what they did not send."""
+        for child in children:
+            self._ended_here.add(child.pid or 0)
+            child.terminate()
+        until = monotonic() + _ENDED_WITHIN
+        for child in children:
+            child.join(max(0.0, until - monotonic()))
+            if child.is_alive():
+                child.kill()
+                child.join(_JOINED_WITHIN)
+        # The pool holds an end of the pipe for sending, too: without this it never sees that nobody else does.
+        with suppress(AttributeError, OSError):
+            self._results._writer.close()
 
     def _each_claim(self) -> Iterator[Sequence[int]]:
         return (self._claims[first : first + CLAIM] for first in range(0, len(self._claims), CLAIM))
@@ -135,15 +176,7 @@ class Processes:
             yield self
         except BaseException:
             self._pool.shutdown(wait=False, cancel_futures=True)
-            children = set(active_children()) - self._others
-            for child in children:
-                child.terminate()
-            until = monotonic() + _ENDED_WITHIN
-            for child in children:
-                child.join(max(0.0, until - monotonic()))
-                if child.is_alive():  # it ignores the signal
-                    child.kill()
-                    child.join(_JOINED_WITHIN)
+            self._end(set(active_children()) - self._others)
             raise
         self._pool.shutdown(wait=True)
 

@@ -301,7 +301,7 @@ class _Ordered:
         """Return the results of the first batch; None if some of it is repeated now."""
         first = self._ahead[0]
         if first.future is None and first.results is None:
-            wait([batch.future for batch in self._ahead if batch.future is not None])
+            self._wait_for([batch.future for batch in self._ahead if batch.future is not None])
             first.future = self.pool.submit(first.items, alone=True)
         if first.results is None:
             assert first.future is not None, "a batch without results is under way"
@@ -323,9 +323,12 @@ class _Ordered:
         return None
 
     def _awaited(self, future: Future[list[Any]]) -> list[Any]:
-        while not wait([future], timeout=self.pool.check()).done:
-            pass
+        self._wait_for([future])
         return future.result()
+
+    def _wait_for(self, futures: Sequence[Future[list[Any]]]) -> None:
+        while wait(futures, timeout=self.pool.check()).not_done:
+            pass
 
     def _repeat(self, blamed: dict[int, str]) -> None:
         """Submit again what was lost; the first batch, or one with an item that is blamed, is divided into items."""

@@ -65,8 +65,7 @@ def _inner(value: Any) -> Any:
 @cache
 def code_version() -> str:
     """Return the digest of the code that determines outcomes, and of the libraries that it computes with."""
-    import numba
-    import scipy
+    from importlib.metadata import version
 
     from cdtool.registry import plugin_packages
 
@@ -75,6 +74,6 @@ def code_version() -> str:
     for path in sorted(root.rglob("*.py")):
         if path.relative_to(root).parts[0] not in _ONLY_SHOWN:
             digest.update(path.read_bytes())
-    libraries = {"numpy": np.__version__, "scipy": scipy.__version__, "numba": numba.__version__}
+    libraries = {name: version(name) for name in ("numpy", "scipy", "numba")}  # numba takes long to import
     digest.update(json.dumps([libraries, plugin_packages()], sort_keys=True).encode())
     return digest.hexdigest()

@@ -23,6 +23,7 @@ from cdtool.findings import Fact
 T = TypeVar("T")
 
 _PLAIN = (str, int, float, bool, type(None))
+_as_json = json.JSONEncoder(separators=(",", ":"), check_circular=False).encode
 # Facts are restored from modules below this one only.
 _FACTS = "cdtool.findings."
 
@@ -37,7 +38,7 @@ class _Plan(NamedTuple):
 def encoded(value: Any, kind: Any) -> str:
     """Return a value of a type as JSON; raises TypeError for a type that has no JSON form."""
     plan = _plan(kind)
-    return json.dumps(plan.encode(value) if plan.encode else value, separators=(",", ":"))
+    return _as_json(plan.encode(value) if plan.encode else value)
 
 
 def decoded(text: str | bytes, kind: type[T]) -> T:

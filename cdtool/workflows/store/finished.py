@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from cdtool.files import write_bytes
+from cdtool.workflows.store.text_column import text_column
 
 # Files that are kept: the newest.
 _MOST = 4
@@ -30,7 +31,7 @@ def write_finished(folder: Path, key: str, texts: Iterable[Sequence[tuple[str, s
     schema = pa.schema([(name, pa.large_string()) for name in _NAMES])
     with pq.ParquetWriter(stream, schema, compression="zstd", write_page_checksum=True) as writer:
         for some in texts:
-            columns = [pa.array(column, pa.large_string()) for column in zip(*some, strict=True)]
+            columns = [text_column(column) for column in zip(*some, strict=True)]
             writer.write_table(pa.Table.from_arrays(columns, schema=schema))
     (folder / _FOLDER).mkdir(parents=True, exist_ok=True)
     write_bytes(_path(folder, key), stream.getvalue())

@@ -3,6 +3,7 @@
     store.json                what the folder is
     parts/*.parquet           the entries, a row each; a file is complete or not there
     runs/*.parquet            a file per run: which entries it used, how many it computed
+    finished/*.parquet        all results of the last runs, by what determines them
     *.journal                 entries of a run that is under way
 
 Several processes may write at the same time: each writes files of its own. An entry that two of them compute is there
@@ -18,7 +19,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
 from cdtool.workflows.store.journal import Journal, left_behind
 from cdtool.workflows.store.sources import SourceFile
+from cdtool.workflows.store.text_column import text_column
 
 _KIND, _SCHEMA = "cdtool store", 1
 _MARK = "store.json"
@@ -236,25 +238,17 @@ def require_pyarrow() -> None:
         raise UsageError("--store needs pyarrow", "install it: pip install 'cdtool[store]'") from fault
 
 
-def write_part(folder: Path, entries: Iterable[Entry]) -> Path:
+def write_part(folder: Path, entries: Sequence[Entry]) -> Path:
     """Write entries to a new part of a store, and return it."""
     import pyarrow as pa
 
-    entries = [replace(item, recording=encodable(item.recording)) for item in entries]
     columns: dict[str, list[Any]] = {name: [getattr(item, name) for item in entries] for name in _NAMES}
-    columns["sources"] = [encoded(item.sources, tuple[SourceFile, ...]) for item in entries]
-    arrays = [_numbers(columns[name]) if name in ("seconds", "failed") else _texts(columns[name]) for name in _NAMES]
+    columns["recording"] = [encodable(name) for name in columns["recording"]]
+    columns["sources"] = [encoded(item, tuple[SourceFile, ...]) if item else _NO_SOURCES for item in columns["sources"]]
+    arrays = [
+        _numbers(columns[name]) if name in ("seconds", "failed") else text_column(columns[name]) for name in _NAMES
+    ]
     return _write_table(folder / "parts", pa.table(arrays, names=list(_NAMES)))
-
-
-def _texts(values: Sequence[str]) -> Any:
-    """Return a column of texts; `pyarrow.array` would import pandas, which takes longer than a small store."""
-    import pyarrow as pa
-
-    pieces = [value.encode() for value in values]
-    ends = np.zeros(len(pieces) + 1, dtype=np.int64)
-    np.cumsum([len(piece) for piece in pieces], out=ends[1:])
-    return pa.LargeStringArray.from_buffers(len(pieces), pa.py_buffer(ends), pa.py_buffer(b"".join(pieces)))
 
 
 def _numbers(values: Sequence[float]) -> Any:

@@ -11,6 +11,7 @@ from pathlib import Path
 from cdtool.errors import UsageError
 from cdtool.remote.remote_path import location
 from cdtool.workflows.store.entry import Entry
+from cdtool.workflows.store.finished import finished
 from cdtool.workflows.store.store import RunRecord, Store, read_columns, read_keys, read_runs, require_store, write_part
 
 _DAY = 86_400.0
@@ -88,7 +89,7 @@ def collect_garbage(folder: str | Path, *, keep_runs: int = 10, older_than_days:
     folder : str or Path
         The store.
     keep_runs : int, optional
-        Number of runs, the newest, whose entries are kept; the lists of the others are removed.
+        Number of runs, the newest, whose entries are kept; the lists of the others are removed, and their results.
     older_than_days : float, optional
         Age of the file above which entries that none of these runs used are removed [days].
 
@@ -116,7 +117,7 @@ def collect_garbage(folder: str | Path, *, keep_runs: int = 10, older_than_days:
     oldest = time.time() - _DAY * older_than_days
     parts = store.parts
     kept, removed, files = _rewrite(store, used, oldest)
-    for path, _ in runs[keep_runs:]:
+    for path in (*(path for path, _ in runs[keep_runs:]), *finished(store.folder)[keep_runs:]):
         path.unlink(missing_ok=True)
     return Collected(kept, removed, len(parts), files, before, _size(store.folder))
 

@@ -161,3 +161,15 @@ def test_numbers_that_json_does_not_have_are_exact():
     whole = FinishedRun(evaluate(known), (), 0)
     again = FinishedRun.of_texts((item for some in whole.to_texts() for item in some), known.provenance, known.groups)
     assert again is not None and repr(again.evaluated.results.contacts) == repr(whole.evaluated.results.contacts)
+
+
+def test_the_collection_of_garbage_leaves_as_many_as_runs(gate, tmp_path):
+    from cdtool.workflows.store.upkeep import collect_garbage
+
+    for most in ("500.0", "1.0", "2.0"):
+        (gate / "b.toml").write_text(FILE.replace("500.0", most), encoding="utf-8")
+        run(gate, tmp_path / "s")
+    assert len(list((tmp_path / "s" / "finished").iterdir())) == 3
+    collect_garbage(tmp_path / "s", keep_runs=1)
+    assert len(list((tmp_path / "s" / "finished").iterdir())) == 1
+    assert run(gate, tmp_path / "s")[1] == 0

@@ -5,6 +5,7 @@ import faulthandler
 import multiprocessing
 import os
 import signal
+import struct
 import sys
 import threading
 import time
@@ -54,6 +55,30 @@ def ended(number):
         raise KeyboardInterrupt
     if number == 7:
         os.kill(os.getpid(), signal.SIGTERM)
+    return number
+
+
+class CutOff:
+    """The sending end of a pipe whose process is killed while it sends a result."""
+
+    def __init__(self, writer):
+        self.writer = writer
+
+    def send_bytes(self, content):
+        os.write(self.writer.fileno(), struct.pack("!i", len(content)) + bytes(content[:10]))
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def cut_off(folder, number):
+    """The result of item 3 is cut off the first time."""
+    with (folder / f"{number}.txt").open("a", encoding="utf-8") as file:
+        file.write("x")
+    if number == 3 and (folder / "3.txt").stat().st_size == 1:
+        frame = sys._getframe()
+        while "result_queue" not in frame.f_locals:
+            frame = frame.f_back
+        results = frame.f_locals["result_queue"]
+        results._writer = CutOff(results._writer)
     return number
 
 
@@ -168,6 +193,30 @@ def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_
         run(odd, 8, Workers(2))
     assert set(multiprocessing.active_children()) == before
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("together", [1, 8])
+def test_a_worker_that_is_killed_while_it_sends_a_result_is_replaced(tmp_path, monkeypatch, together):
+    """The pool waits for the rest of the result, and the other workers wait for the right to send theirs."""
+    monkeypatch.setattr(processes, "_NOTICED_WITHIN", 0.2)
+    monkeypatch.setattr(processes, "_CHECKED_EVERY", 0.1)
+    assert run(partial(cut_off, tmp_path), 12, Workers(2, retries=0), together) == list(range(12))
+    assert (tmp_path / "3.txt").stat().st_size == 2
+
+
+def test_work_that_is_given_up_after_a_result_was_cut_off_leaves_nothing(tmp_path):
+    processes_before, threads_before = set(multiprocessing.active_children()), set(threading.enumerate())
+    made = in_order(partial(cut_off, tmp_path), range(12), 12, Workers(2), of_lost=lost)
+    assert next(made) == 0
+    until = time.monotonic() + 20.0
+    while not (tmp_path / "3.txt").exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    time.sleep(0.2)
+    made.close()
+    assert set(multiprocessing.active_children()) <= processes_before
+    for thread in set(threading.enumerate()) - threads_before:
+        thread.join(10.0)
+        assert not thread.is_alive()
 
 
 def test_a_process_that_is_stopped_is_ended_by_the_time_limit(monkeypatch):
