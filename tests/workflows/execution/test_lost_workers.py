@@ -191,6 +191,10 @@ def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_
     before = set(multiprocessing.active_children())
     with pytest.raises(Exception, match=r"05\.csv is strange"):  # Dask, once imported, makes it possible to copy it
         run(odd, 8, Workers(2))
+    until = time.monotonic() + 10.0
+    # A process that a thread of the pool has waited for is listed until that thread goes on.
+    while set(multiprocessing.active_children()) != before and time.monotonic() < until:
+        time.sleep(0.01)
     assert set(multiprocessing.active_children()) == before
     assert capfd.readouterr() == ("", "")
 
