@@ -85,6 +85,13 @@ def require_pyarrow(folder: Path) -> None:
 def tables() -> Mapping[str, Any]:
     """Return the class of the rows of each table; the tables are the fields of `Results` with rows.
 
+    Returns
+    -------
+    mapping of str to type
+        The class by the name of the field.
+
+    Examples
+    --------
     >>> list(tables())[:3]
     ['contacts', 'false_alarms', 'exposure']
     """

@@ -175,7 +175,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     provenance = _provenance(setup, used, learned)
     stored = store.outcomes(setup, learned, factors) if store else None
     plan = stored.plan(logs, workers) if stored else ()
-    beside_logs = _digest_beside_logs(gathered, learned, provenance) if stored else ""
+    beside_logs = _digest_beside_logs(gathered, learned, provenance, stored.determinants.normals) if stored else ""
     found = stored.finished(beside_logs, provenance) if stored else None
     if found is None:
         compile_loaded()
@@ -195,8 +195,11 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     return Benchmark(evaluated, traces, times, setup.inputs, report)
 
 
-def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mapping[str, Any]) -> str:
-    """Return the digest of what determines the results beside the outcome of each log, before the first is scored."""
+def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mapping[str, Any], normals: str) -> str:
+    """Return the digest of what determines the results beside the outcome of each log, before the first is scored.
+
+    `normals` is the digest of the normal motion.
+    """
     setup = gathered.setup
     return digest_of(
         code_version(),
@@ -209,6 +212,7 @@ def _digest_beside_logs(gathered: Gathering, learned: Learned, provenance: Mappi
         list(gathered.findings),
         learned.about.calibration,
         learned.about.sources,
+        normals,
     )
 
 

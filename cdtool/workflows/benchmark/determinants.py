@@ -53,7 +53,7 @@ class Determinants:
 
     def trace_key(self, path: Path, number: int, detector_keys: Sequence[str]) -> str:
         """Return the key of the trace of an operation of a log, which explains alarms by what was learned."""
-        return combined("trace", str(number), *detector_keys, self._normals, self._own_part(path, ()))
+        return combined("trace", str(number), *detector_keys, self.normals, self._own_part(path, ()))
 
     def name(self, path: Path) -> str:
         """Return the name of a log in results."""
@@ -115,7 +115,8 @@ class Determinants:
         }
 
     @cached_property
-    def _normals(self) -> str:
+    def normals(self) -> str:
+        """Return the digest of the normal motion, by which alarms are explained."""
         return digest_of([item.to_dict() for item in self.learned.normals.motions], str(self.learned.normals.absent))
 
     def _own_part(self, path: Path, detectors: tuple[str, ...]) -> str:

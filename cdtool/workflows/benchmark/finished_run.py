@@ -77,15 +77,15 @@ class FinishedRun:
         """
         known = {name: Rows(kind) for name, kind in tables().items()}
         parts: dict[str, str] = {}
-        for name, text in texts:
-            if name in known:
-                columns: Any = decoded(text, _columns_of(tables()[name]))
-                known[name].extend_columns(columns)
-            else:
-                parts[name] = text
-        if not parts:
-            return None
         try:
+            for name, text in texts:
+                if name in known:
+                    columns: Any = decoded(text, _columns_of(tables()[name]))
+                    known[name].extend_columns(columns)
+                else:
+                    parts[name] = text
+            if not parts:
+                return None
             head = json.loads(parts[_HEAD])
             held: dict[str, Any] = {name: rows if name in head["rows"] else tuple(rows) for name, rows in known.items()}
             results = Results(

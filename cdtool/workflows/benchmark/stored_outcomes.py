@@ -9,11 +9,13 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from cdtool.errors import CdtoolError
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.traces.choice import TraceChoice
 from cdtool.evaluation.traces.trace import Trace
@@ -27,7 +29,7 @@ from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.store.digest import code_version, combined
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry, source_entry
-from cdtool.workflows.store.finished import read_finished, write_finished
+from cdtool.workflows.store.finished import mark_used, read_finished, write_finished
 from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.store import RunRecord, Store, encodable, write_run
 from cdtool.workflows.store.use import StoreUse
@@ -89,6 +91,8 @@ class StoredOutcomes:
         each = 1 + len(self.names)
         planned = [self._planned(item, list(islice(places, each)) if item else None) for item in sources]
         self._note_touched(logs, planned)
+        if not all(item.is_known for item in planned):
+            self._planned_keys = []
         return planned
 
     def finished(self, key: str, provenance: Mapping[str, Any]) -> tuple[FinishedRun, tuple[Trace, ...]] | None:
@@ -96,9 +100,10 @@ class StoredOutcomes:
 
         Returns None if the store has none, or if some of its logs could not be read and are to be read again.
         """
-        if not self._planned_keys:
+        planned, self._planned_keys = self._planned_keys, []
+        if not planned:
             return None
-        whole = combined(key, _digest_of_keys(self._planned_keys))
+        whole = combined(key, _digest_of_keys(planned))
         try:
             found = FinishedRun.of_texts(read_finished(self.store.folder, whole), provenance, self.setup.groups)
             if found is None or (found.failed and self.use.retry_failed):
@@ -113,8 +118,9 @@ class StoredOutcomes:
             return None
         if len(traces) < len(found.traces):
             return None
-        self.keys += [*self._planned_keys, *(item.key for item in found.traces)]
-        self.reused, self.failed = len(self._planned_keys) // (1 + len(self.names)), found.failed
+        mark_used(self.store.folder, whole)
+        self.keys += [*planned, *(item.key for item in found.traces)]
+        self.reused, self.failed = len(planned) // (1 + len(self.names)), found.failed
         return found, traces
 
     def add_finished(self, key: str, evaluated: Evaluated, traces: Sequence[TraceKey] | None) -> None:
@@ -122,7 +128,9 @@ class StoredOutcomes:
         if not self._lasts or traces is None or not self.store.writes:
             return
         whole = combined(key, self._order.hexdigest())
-        write_finished(self.store.folder, whole, FinishedRun(evaluated, tuple(traces), self.failed).to_texts())
+        # What the run has found does not depend on this file: without it, only time is lost.
+        with suppress(OSError, CdtoolError):
+            write_finished(self.store.folder, whole, FinishedRun(evaluated, tuple(traces), self.failed).to_texts())
 
     def _keys_of(self, log: tuple[str, Path], sources: tuple[SourceFile, ...]) -> list[str]:
         """Return the key of the rows of a log, and of the outcome of each detector."""
@@ -205,7 +213,9 @@ class StoredOutcomes:
         unread = any(item.unread for item in rows)
         missing = self.missing(planned)
         stored: dict[str, Entry] = {}
-        if len(missing) < len(self.names) and not unread:
+        # A log whose worker ended, or that changed, is left out with this reason: nothing stored of it is used.
+        is_left_out = made.sources is None and all(item.unread for item in rows)
+        if len(missing) < len(self.names) and not is_left_out:
             others = [name for name in self.names if name not in missing]
             places = [place for place in planned.detectors if place is not None]
             entries = self._entries(path, places, others)

@@ -24,8 +24,8 @@ from cdtool.workflows.execution.interruption import ignore_interruption
 
 # A worker that another process ends exits with this status.
 TOLD_TO_END = 143
-# Entries of a claim: the process, the number of the piece counted from 1 (0: none), when it began, and when the process
-# was asked to end (0: not) [ns].
+# Entries of a claim: the process, the number of the piece counted from 1 (0: none; negative: it is done, and its result
+# is being sent or was sent), when it began, and when the process was asked to end (0: not) [ns].
 CLAIM = 4
 # The arrays of a log are smaller [bytes].
 _KEPT = 4 << 20
@@ -85,7 +85,7 @@ def begin(work: Callable[[Any], Any], claims: Any, free_claims: Any, limit: floa
 
 def _end(*_: object) -> None:
     _claim[3] = monotonic_ns()
-    if not _claim[1]:  # waiting for work, in code that would print where it was interrupted
+    if _claim[1] <= 0:  # waiting for work, in code that would print where it was interrupted
         os._exit(TOLD_TO_END)
     raise SystemExit(TOLD_TO_END)  # temporary files of the piece are removed
 
@@ -135,9 +135,9 @@ def _done(work: Callable[[Any], Any], number: int, item: Any) -> Any:
     except (KeyboardInterrupt, GeneratorExit) as fault:  # raised by the piece: Ctrl-C is ignored here
         result = Failed(f"it was ended by {type(fault).__name__}")
     except Exception:
-        _claim[1] = 0
+        _claim[1] = -_claim[1]
         raise
-    _claim[1] = 0
+    _claim[1] = -_claim[1]
     return result
 
 

@@ -6,13 +6,12 @@ process has several threads, they are new processes of Python.
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
-from multiprocessing import active_children, get_context
+from multiprocessing import get_context
 from multiprocessing.connection import wait
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
@@ -24,6 +23,8 @@ from cdtool.workflows.execution.in_worker import CLAIM, TOLD_TO_END, begin, do, 
 from cdtool.workflows.execution.interruption import without_interruption
 from cdtool.workflows.execution.workers import shares_memory
 
+# On Windows, a process is ended in one way only.
+_KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
 _JOINED_WITHIN, _ENDED_WITHIN = 10.0, 3.0
@@ -46,7 +47,6 @@ class Processes:
         self.size = size
         self._work = work
         self._limit = limit
-        self._others = set(active_children())
         self._restarts = 0
         self._start()
 
@@ -76,10 +76,8 @@ class Processes:
         except BrokenProcessPool as fault:
             future = Future()
             future.set_exception(fault)
-        if len(self._children) < self.size:
-            # One that has ended already is only in the pool's own list.
-            self._children |= set((getattr(self._pool, "_processes", None) or {}).values()) | set(active_children())
-            self._children -= self._others
+        # The pool's own list: another pool may be at work in this program, and a process that has ended is in no other.
+        self._children |= set((self._pool._processes or {}).values())
         return future
 
     def blamed(self, lost: Future[list[Any]]) -> dict[int, str]:  # noqa: ARG002  the claims show it
@@ -88,6 +86,7 @@ class Processes:
         Raises WorkerError if the processes end again and again before they have begun a piece.
         """
         now = monotonic_ns()
+        self._end(self._children)
         self._pool.shutdown(wait=True, cancel_futures=True)
         status: dict[int, int | None] = {}
         for child in self._children:
@@ -101,12 +100,14 @@ class Processes:
             code = status.get(process, 1)
             if code in (TOLD_TO_END, -signal.SIGTERM):
                 asked += [(told, number)] if told else []
-            elif number and code is not None:
+            elif number > 0 and code is not None:
                 found[number - 1] = self._reason(code, 1e-9 * (now - since))
+            elif number and code is not None:  # its result may not have arrived
+                found[-number - 1] = ended_words(code)
         # The pool asks all processes to end when one of them has ended; if none has, the first one was asked by others.
         if not found and asked and all(code in (TOLD_TO_END, -signal.SIGTERM) for code in status.values()):
             _, number = min(asked)
-            found |= {number - 1: ended_words(-signal.SIGTERM)} if number else {}
+            found |= {number - 1: ended_words(-signal.SIGTERM)} if number > 0 else {}
         self._restarts = 0 if found else self._restarts + 1
         if self._restarts > _MOST_RESTARTS:
             raise WorkerError(
@@ -116,7 +117,7 @@ class Processes:
         return found
 
     def _reason(self, code: int, seconds: float) -> str:
-        if self._limit is not None and code in (1, -signal.SIGKILL) and seconds >= self._limit:
+        if self._limit is not None and code in (1, -_KILL) and seconds >= self._limit:
             return limit_words(self._limit)
         return ended_words(code)
 
@@ -126,10 +127,14 @@ class Processes:
         if self._limit is None:
             return _CHECKED_EVERY
         now = monotonic_ns()
-        for process, number, since, _ in self._each_claim():
-            if number and 1e-9 * (now - since) > self._limit + _GRACE:
-                with suppress(OSError):
-                    os.kill(process, signal.SIGKILL)
+        too_long = {
+            process
+            for process, number, since, _ in self._each_claim()
+            if number > 0 and 1e-9 * (now - since) > self._limit + _GRACE
+        }
+        for child in self._children:
+            if child.pid in too_long and not _has_ended(child):
+                child.kill()
         return _CHECKED_EVERY
 
     def _release(self) -> None:
@@ -138,7 +143,7 @@ class Processes:
         A process that is killed while it sends a result leaves the pool waiting for the rest of it, and the other
         processes for the right to send theirs.
         """
-        ended = {child for child in self._children if wait([child.sentinel], 0.0)}
+        ended = set(filter(_has_ended, self._children))
         if not ended:
             self._ended_at = None
         elif self._ended_at is None:
@@ -150,12 +155,13 @@ class Processes:
     def _end(self, children: Iterable[BaseProcess]) -> None:
         """End processes, by force if they ignore the signal, and the wait of the pool for what they did not send."""
         for child in children:
-            self._ended_here.add(child.pid or 0)
-            child.terminate()
+            if not _has_ended(child):
+                self._ended_here.add(child.pid or 0)
+                child.terminate()
         until = monotonic() + _ENDED_WITHIN
         for child in children:
             child.join(max(0.0, until - monotonic()))
-            if child.is_alive():
+            if not _has_ended(child):
                 child.kill()
                 child.join(_JOINED_WITHIN)
         # The pool holds an end of the pipe for sending, too: without this it never sees that nobody else does.
@@ -176,9 +182,14 @@ class Processes:
             yield self
         except BaseException:
             self._pool.shutdown(wait=False, cancel_futures=True)
-            self._end(set(active_children()) - self._others)
+            self._end(self._children)
             raise
         self._pool.shutdown(wait=True)
+
+
+def _has_ended(child: BaseProcess) -> bool:
+    """Return whether a process has ended; `is_alive` may be wrong while a thread of the pool waits for it."""
+    return bool(wait([child.sentinel], 0.0))
 
 
 def _context() -> BaseContext:

@@ -9,11 +9,13 @@ damaged nothing is lost.
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from cdtool.files import write_bytes
+from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.store.text_column import text_column
 
 # Files that are kept: the newest.
@@ -57,10 +59,18 @@ def read_finished(folder: Path, key: str) -> Iterator[tuple[str, str]]:
         raise ValueError(f"damaged: {fault}") from fault
 
 
+def mark_used(folder: Path, key: str) -> None:
+    """Make a file the newest one; at a URL its age cannot be changed."""
+    path = _path(folder, key)
+    if not is_remote(path):
+        with suppress(OSError):
+            os.utime(path)
+
+
 def finished(folder: Path) -> list[Path]:
     """Return the files of finished runs, the newest first."""
     found = []
-    for path in (folder / _FOLDER).glob("*.parquet"):
+    for path in list((folder / _FOLDER).glob("*.parquet")):
         with suppress(OSError):  # removed by another process
             found.append((path.stat().st_mtime, path))
     return [path for _, path in sorted(found, reverse=True)]

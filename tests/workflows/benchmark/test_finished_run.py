@@ -1,6 +1,7 @@
 """The results of a run are found again as a whole when nothing has changed, and only then."""
 
 import math
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from cdtool.evaluation.results_file import to_json
 from cdtool.evaluation.traces.file import encode_traces
 from cdtool.workflows.benchmark.finished_run import FinishedRun, TraceKey
 from cdtool.workflows.benchmark.stored_outcomes import StoredOutcomes
-from cdtool.workflows.store.finished import read_finished, write_finished
+from cdtool.workflows.store.finished import finished, mark_used, read_finished, write_finished
 from cdtool.workflows.store.use import StoreUse
 from tests.evaluation.full_results import FULL
 from tests.synthetic.many_results import many_results
@@ -161,6 +162,24 @@ def test_numbers_that_json_does_not_have_are_exact():
     whole = FinishedRun(evaluate(known), (), 0)
     again = FinishedRun.of_texts((item for some in whole.to_texts() for item in some), known.provenance, known.groups)
     assert again is not None and repr(again.evaluated.results.contacts) == repr(whole.evaluated.results.contacts)
+
+
+def test_a_file_that_is_used_is_not_the_oldest(tmp_path):
+    for number in range(3):
+        write_finished(tmp_path, f"{number:064x}", [[("head", str(number))]])
+        os.utime(tmp_path / "finished" / f"{number:064x}.parquet", (number, number))
+    mark_used(tmp_path, f"{0:064x}")
+    mark_used(tmp_path, f"{9:064x}")
+    assert [path.stem for path in finished(tmp_path)] == [f"{number:064x}" for number in (0, 2, 1)]
+
+
+def test_a_run_whose_results_cannot_be_kept_has_them_nevertheless(gate, tmp_path):
+    expected, _ = run(gate)
+    (tmp_path / "s").mkdir()
+    with StoreUse(tmp_path / "s").opened():
+        (tmp_path / "s" / "finished").write_text("in the way", encoding="utf-8")
+    assert run(gate, tmp_path / "s") == (expected, 3)
+    assert run(gate, tmp_path / "s") == (expected, 0)
 
 
 def test_the_collection_of_garbage_leaves_as_many_as_runs(gate, tmp_path):

@@ -180,6 +180,37 @@ def test_a_reading_error_is_stored_until_it_is_to_be_retried(gate, tmp_path):
     assert run(gate, tmp_path / "s", retry_failed=True) == (expected, 1)
 
 
+@pytest.mark.parametrize("operations", ["", 'operations = "clock-reset"'])
+def test_a_log_that_cannot_be_read_stays_one_with_another_detector(gate, tmp_path, operations):
+    (gate / "stiff" / "02.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
+    write(gate, operations=operations)
+    run(gate, tmp_path / "s")
+    text = (gate / "b.toml").read_text(encoding="utf-8")
+    (gate / "b.toml").write_text(text.replace('"friction_ekf"]', '"friction_ekf", "pure_torque"]'), encoding="utf-8")
+    expected = alone(gate)
+    assert run(gate, tmp_path / "s") == (expected, 6)
+    assert run(gate, tmp_path / "s") == (expected, 0)
+
+
+def test_a_log_that_ends_its_worker_is_left_out_also_if_other_detectors_are_stored(gate, tmp_path, monkeypatch):
+    run(gate, tmp_path / "s")
+    with (gate / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
+    call = pieces.PieceScoring.__call__
+
+    def lost(self, piece):
+        if piece.path.name == "03.csv" and piece.detectors:
+            return pieces.lost(self.setup, piece, "its worker process was killed")
+        return call(self, piece)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(pieces.PieceScoring, "__call__", lost)
+        done = cdtool.benchmark(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    left_out = [(item.recording, item.reason) for item in done.results.skipped]
+    assert left_out == [("stiff/03.csv", "its worker process was killed")]
+    assert run(gate, tmp_path / "s") == (alone(gate), 1)
+
+
 def test_an_error_of_the_system_is_not_stored(gate, tmp_path, monkeypatch):
     def fail(path: Path, *_: object) -> None:
         raise RecordingError(f"{path}: cannot be read: the disk is gone") from OSError(5, "Input/output error")

@@ -200,12 +200,50 @@ def test_an_error_that_cannot_be_copied_arrives_as_its_words_and_processes_that_
 
 
 @pytest.mark.parametrize("together", [1, 8])
-def test_a_worker_that_is_killed_while_it_sends_a_result_is_replaced(tmp_path, monkeypatch, together):
+@pytest.mark.parametrize("retries", [0, 1])
+def test_a_worker_that_is_killed_while_it_sends_a_result_is_replaced(tmp_path, monkeypatch, together, retries):
     """The pool waits for the rest of the result, and the other workers wait for the right to send theirs."""
     monkeypatch.setattr(processes, "_NOTICED_WITHIN", 0.2)
     monkeypatch.setattr(processes, "_CHECKED_EVERY", 0.1)
-    assert run(partial(cut_off, tmp_path), 12, Workers(2, retries=0), together) == list(range(12))
-    assert (tmp_path / "3.txt").stat().st_size == 2
+    made = run(partial(cut_off, tmp_path), 12, Workers(2, retries=retries), together)
+    reason = "its worker process was killed (SIGKILL): mostly because the memory was not enough"
+    assert made == [(number, reason) if number == 3 and not retries else number for number in range(12)]
+    assert (tmp_path / "3.txt").stat().st_size == 1 + retries
+
+
+def always_cut_off(folder, number):
+    """The result of item 3 is cut off every time."""
+    (folder / "3.txt").unlink(missing_ok=True)
+    return cut_off(folder, number)
+
+
+def test_an_item_whose_result_never_arrives_is_lost_and_no_other(tmp_path, monkeypatch):
+    monkeypatch.setattr(processes, "_NOTICED_WITHIN", 0.2)
+    monkeypatch.setattr(processes, "_CHECKED_EVERY", 0.1)
+    made = run(partial(always_cut_off, tmp_path), 12, Workers(2, retries=1), 8)
+    assert [item for item in made if isinstance(item, int)] == [number for number in range(12) if number != 3]
+    assert made[3][0] == 3 and "in each of 2 attempts" in made[3][1]
+
+
+def nap(number):
+    time.sleep(0.05)
+    return number
+
+
+def test_two_pools_of_one_program_leave_each_other_alone(monkeypatch):
+    monkeypatch.setattr(processes, "_NOTICED_WITHIN", 0.2)
+    monkeypatch.setattr(processes, "_CHECKED_EVERY", 0.05)
+    made = {}
+
+    def work(count):
+        made[count] = run(nap, count, Workers(2, retries=0))
+
+    threads = [threading.Thread(target=work, args=(count,)) for count in (4, 60)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60.0)
+    assert made == {count: list(range(count)) for count in (4, 60)}
 
 
 def test_work_that_is_given_up_after_a_result_was_cut_off_leaves_nothing(tmp_path):
