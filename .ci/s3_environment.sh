@@ -7,4 +7,6 @@ folder=$1
 mkdir -p "$folder/source"
 git ls-files -z | tar --null --files-from=- -cf - | tar -xf - -C "$folder/source"
 python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet "$folder/source[test,s3test]"
+# One after the other: pip tries fewer versions.
+"$folder/venv/bin/pip" install --quiet "$folder/source[test]"
+"$folder/venv/bin/pip" install --quiet "$folder/source[s3test]"
