@@ -102,6 +102,10 @@ class Machine(Protocol):
         """Return a logged recording with every channel on the load side (apply it once)."""
         ...
 
+    def load_factor(self, channel: str, unit: str) -> FloatArray:
+        """Return (J,): by what a logged value in `unit` is multiplied on its way to the load side; 1 if it is there."""
+        ...
+
     def require_inertia(self, who: str) -> None:
         """Raise ConfigurationError if an inertia is missing that `who` needs."""
         ...

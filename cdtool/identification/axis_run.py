@@ -6,12 +6,12 @@ Identification is offline: a channel is interpolated between its own samples. No
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from cdtool.errors import RecordingError
+from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # A step longer than this many usual steps of a channel is a gap: nothing is interpolated across it.
@@ -28,8 +28,8 @@ USED = ("torque", "speed", "position", "acceleration", "reference_position", "re
 class AxisRun:
     """A joint's channels on the load side (SI), every `period` [s] from `start` [s].
 
-    Every array has n samples; a sample that no channel has is NaN. A channel that was not logged is None. The measured
-    position is the integral of the speed, and the speed the derivative of the position, only where `derived` names it.
+    Every array has n samples; a sample that a channel does not have is NaN. A channel that was not logged is None.
+    `derived` names the channels that are the integral or the causal derivative of another one.
     """
 
     name: str
@@ -61,11 +61,10 @@ class AxisRun:
         return present
 
 
-def axis_run(recording: Recording, joint: int = 0, derived: Sequence[str] = ()) -> AxisRun:
+def axis_run(recording: Recording, joint: int = 0) -> AxisRun:
     """Return a joint's channels of a recording on the load side, on one uniform clock.
 
-    The clock has the longest median step of torque, speed and position, so that no sample is invented. `derived`: the
-    channels that were computed from others when the log was read. Raises RecordingError without torque or without speed
+    The clock has the longest median step of torque, speed and position, so that no sample is invented. Raises RecordingError without torque or without speed
     and position, and for fewer than 50 samples that all channels cover.
     """
     series = {name: recording[name] for name in USED if name in recording and len(recording[name]) > 1}
@@ -85,7 +84,13 @@ def axis_run(recording: Recording, joint: int = 0, derived: Sequence[str] = ()) 
         )
     clock = _uniform(start, period, count)
     channels = {name: _interpolated(item, joint, clock) for name, item in series.items()}
-    return AxisRun(recording.name, start, period, derived=frozenset(derived), **channels)
+    return AxisRun(recording.name, start, period, derived=_derived(recording), **channels)
+
+
+def _derived(recording: Recording) -> frozenset[str]:
+    """Return the channels that were computed from others when the log was read."""
+    computed = (DerivedSpeed, IntegratedPosition, IntegratedReference)
+    return frozenset(item.channel for item in recording.findings if isinstance(item.fact, computed))
 
 
 def _uniform(start: float, period: float, count: int) -> FloatArray:

@@ -176,6 +176,18 @@ class JointMachine:
         power *= speed
         return power
 
+    def load_factor(self, channel: str, unit: str) -> FloatArray:
+        """Return (J,): by what a logged value in `unit` is multiplied on its way to the load side; 1 if it is there."""
+        quantity = channel.removeprefix("reference_")
+        unchanged = np.ones(len(self.joints))
+        if quantity not in self.load_units or quantity == "acceleration" or self.coordinates != "motor":
+            return unchanged
+        # In motor coordinates a log may still contain some channels on the load side.
+        if unit != _MOTOR_UNITS[quantity]:
+            return unchanged
+        ratio = np.array(self.transmission_ratio)
+        return 1.0 / ratio if quantity == "torque" else ratio
+
     def _referred(self, channel: str, series: Series) -> Series:
         quantity = channel.removeprefix("reference_")
         target = self.load_units.get(quantity)
@@ -183,7 +195,6 @@ class JointMachine:
             return series
         ratio, offset = np.array(self.transmission_ratio), np.array(self.position_offset)
         values = series.values
-        # In motor coordinates a log may still contain some channels on the load side.
         if self.coordinates == "motor" and series.unit == _MOTOR_UNITS[quantity]:
             values = values / ratio if quantity == "torque" else values * ratio
         if quantity == "position" and offset.any():

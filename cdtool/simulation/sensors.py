@@ -12,36 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
+
 Array = npt.NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665
 """[m/s2]"""
-
-
-def low_pass(values: Array, time_constant: float, period: float) -> Array:
-    """First-order low-pass, exact for held input: y_k = a y_(k-1) + (1 - a) u_k.
-
-    a = exp(-period / time_constant); `time_constant` and `period` in s.
-    """
-    from scipy.signal import lfilter
-
-    keep = math.exp(-period / time_constant)
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values), dtype=np.float64)
-
-
-def second_order_low_pass(values: Array, frequency: float, damping: float, period: float) -> Array:
-    """Second-order low-pass w^2 / (s^2 + 2 damping w s + w^2), w = 2 pi frequency [Hz], bilinear."""
-    from scipy.signal import lfilter
-
-    angle = 2.0 * math.pi * frequency
-    # Prewarped, so that the corner stays where it is stated.
-    rate = angle / math.tan(0.5 * angle * period)
-    square, cross = rate * rate, 2.0 * damping * angle * rate
-    numerator = angle * angle * np.array([1.0, 2.0, 1.0])
-    denominator = np.array(
-        [square + cross + angle * angle, 2.0 * (angle * angle - square), square - cross + angle * angle]
-    )
-    return np.asarray(lfilter(numerator, denominator, values), dtype=np.float64)
 
 
 def coloured_noise(white: Array, deviation: float, rate: float, period: float) -> Array:
@@ -74,7 +50,7 @@ def resonance(white: Array, deviation: float, frequency: float, damping: float, 
 
 def measured_torque(torque: Array, white: Array, noise: float, time_constant: float, period: float) -> Array:
     """Torque from the motor current: a low-pass of `time_constant` s over torque + noise white."""
-    return low_pass(torque + noise * white, time_constant, period)
+    return first_order_low_pass(torque + noise * white, time_constant, period)
 
 
 @dataclass(frozen=True, kw_only=True)

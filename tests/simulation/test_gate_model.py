@@ -10,8 +10,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cdtool.axis_model.sensor_filters import first_order_low_pass
 from cdtool.errors import UsageError
-from cdtool.simulation import gate_kernel, sensors
+from cdtool.simulation import gate_kernel
 from cdtool.simulation.gate_model import (
     Array,
     GateParameters,
@@ -321,7 +322,7 @@ def test_the_noise_of_each_channel_has_its_stated_size() -> None:
     keep = np.exp(-GATE.sample_period / GATE.torque_filter_time)
     torque_noise = 60.0 * np.sqrt((1.0 - keep) / (1.0 + keep))
     torque = run.motor_torque / GATE.transmission_ratio
-    lagged = sensors.low_pass(run.motor_force, GATE.torque_filter_time, GATE.sample_period)
+    lagged = first_order_low_pass(run.motor_force, GATE.torque_filter_time, GATE.sample_period)
     assert np.std(torque - lagged) == pytest.approx(torque_noise, rel=0.1)
     # 0.16 m/s2 at 18 Hz through the sensor's 25 Hz low-pass, which leaves 0.80 of it there; none at standstill.
     assert np.std(run.acceleration[cruise]) == pytest.approx(0.128, rel=0.15)

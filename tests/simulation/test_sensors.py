@@ -13,18 +13,6 @@ from cdtool.simulation.gate_model import Array, GateParameters
 GATE = GateParameters()
 
 
-def test_a_low_pass_answers_a_step_with_its_time_constant() -> None:
-    answer = sensors.low_pass(np.ones(100), 0.01, 1e-3)
-    np.testing.assert_allclose(answer, 1.0 - np.exp(-np.arange(1, 101) / 10.0), atol=1e-12)
-
-
-def test_the_accelerometer_low_pass_has_unit_gain_at_rest_and_its_damping_at_the_corner() -> None:
-    time = np.arange(4000) * 1e-3
-    answer = sensors.second_order_low_pass(np.sin(2.0 * np.pi * 25.0 * time), 25.0, 0.8, 1e-3)[2000:]
-    assert np.sqrt(2.0) * np.std(answer) == pytest.approx(1.0 / (2.0 * 0.8), rel=1e-3)
-    assert sensors.second_order_low_pass(np.ones(4000), 25.0, 0.8, 1e-3)[-1] == pytest.approx(1.0)
-
-
 def test_coloured_noise_and_resonance_have_the_stated_deviation_and_colour() -> None:
     white = np.random.default_rng(0).standard_normal(400_000)
     coloured = sensors.coloured_noise(white, 15.0, 60.0, 1e-3)
@@ -41,8 +29,6 @@ def test_no_sensor_looks_ahead() -> None:
     changed = values.copy()
     changed[120:] += 1.0
     models: dict[str, Callable[[Array], Array]] = {
-        "low_pass": lambda x: sensors.low_pass(x, 0.01, 1e-3),
-        "second_order": lambda x: sensors.second_order_low_pass(x, 25.0, 0.8, 1e-3),
         "coloured": lambda x: sensors.coloured_noise(x, 1.0, 60.0, 1e-3),
         "resonance": lambda x: sensors.resonance(x, 1.0, 18.0, 0.06, 1e-3),
     }

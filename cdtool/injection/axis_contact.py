@@ -1,0 +1,262 @@
+"""A contact of one axis as the difference of two simulations of its model, one with and one without the obstacle.
+
+The obstacle stands where the model's own load is at the instant of contact: the model's load need not be where the
+log's is. Both simulations follow the same references, so that they are equal up to that instant and their difference is
+the effect of the contact alone; friction that the model does not know cancels to first order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from cdtool.axis_model.axis_loop_kernel import ROWS
+from cdtool.axis_model.obstacle import Obstacle
+from cdtool.axis_model.parameters import AxisModel, Controller
+from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
+from cdtool.axis_model.simulation import AxisInputs, AxisMotion, simulate_axis
+from cdtool.errors import RecordingError
+from cdtool.identification.axis_run import AxisRun
+from cdtool.injection.channel_change import ChannelChange
+from cdtool.recording import FloatArray
+
+# The forces of an injected contact are reliable for so long [s]: afterwards the model's own error dominates.
+RELIABLE_FOR = 0.2
+# What is simulated before the contact where the axis is never at rest before it [s].
+_LONGEST_APPROACH = 30.0
+# A controller without which the motor would not notice the contact: as stiff as the sampling permits.
+_STIFF_SHARE = 0.2
+# The load has lost the contact when the force is below this share of the peak so far.
+_SEPARATED = 1e-3
+
+
+class ControllerReaction(Enum):
+    """How the drive reacts to the contact, where its controller is not known: two brackets."""
+
+    KNOWN = "known controller"
+    FROZEN = "controller frozen"
+    STIFF = "controller stiff"
+
+
+class Doubt(Enum):
+    """What limits an injected contact."""
+
+    RIGID_DRIVE = "the drive is modelled as rigid"
+    WIND_UP_BEYOND_FREE_RUNS = "the drive winds up further than in the impact-free log"
+    SEPARATION = "the load separates from the obstacle"
+    CONTROLLER_UNKNOWN = "the reaction of the controller is an assumption"
+    ACCELEROMETER_UNKNOWN = "the bandwidth of the accelerometer is not known"
+
+
+@dataclass(frozen=True, eq=False)
+class InjectedContact:
+    """A contact of one joint: what it adds to each channel, and what its truth is; times in s on the recording's clock.
+
+    `force` is what the machine exerts on the obstacle [N], `reliable_until` when the model's error takes over: 0.2 s
+    after contact, or at the separation. `free_wind_up` and `wind_up`: the largest ones of the drive [m].
+    """
+
+    start: float
+    changes: Mapping[str, ChannelChange]
+    force: ChannelChange
+    peak_force: float
+    speed: float
+    reliable_until: float
+    separation: float
+    free_wind_up: float
+    wind_up: float
+    reaction: ControllerReaction
+    doubts: tuple[Doubt, ...]
+
+
+def axis_contact(
+    run: AxisRun,
+    model: AxisModel,
+    obstacle: Obstacle,
+    contact: float,
+    duration: float = 1.0,
+    reaction: ControllerReaction = ControllerReaction.KNOWN,
+) -> InjectedContact:
+    """Return the effect of an obstacle that is reached at the time `contact` [s], for `duration` [s] after it.
+
+    `run` is the impact-free log on the load side. Without a controller in the model, `reaction` must be a bracket.
+    Raises RecordingError where the contact is outside the log, the axis is at rest then, or where the contact changes
+    nothing in the model.
+    """
+    if not run.start <= contact <= run.time[-1]:
+        raise RecordingError(
+            f"{run.name}: the contact at {contact:.3f} s is outside the log",
+            f"choose a time from {run.start:.3f} to {run.time[-1]:.3f} s",
+        )
+    model = _with_controller(model, run, reaction)
+    controller = model.controller
+    assert controller is not None
+    begin = _beginning(run, contact)
+    count = math.ceil((min(contact + duration, float(run.time[-1])) - begin) / controller.period) + 2
+    time: FloatArray = begin + controller.period * np.arange(count, dtype=np.float64)
+    inputs = _inputs(run, model, time)
+    free = simulate_axis(model, inputs)
+    at = (contact - begin) / controller.period
+    front, speed = free["front_position"], free["front_speed"]
+    place = float(np.interp(at, np.arange(count), front))
+    approach = float(np.interp(at, np.arange(count), speed))
+    if abs(approach) < 1e-4 * float(np.max(np.abs(speed)) or 1.0):
+        raise RecordingError(f"{run.name}: the axis is at rest at {contact:.3f} s", "choose a contact while it moves")
+    placed = obstacle.at(place, 1 if approach > 0.0 else -1)
+    against = replace(inputs, command=free["command"]) if reaction is ControllerReaction.FROZEN else inputs
+    hit = simulate_axis(model, against, placed)
+    return _difference(model, free, hit, time, (contact, approach), reaction)
+
+
+def _with_controller(model: AxisModel, run: AxisRun, reaction: ControllerReaction) -> AxisModel:
+    """Return a model that follows the log: with its own controller, or with a stiff one for the brackets."""
+    if reaction is ControllerReaction.KNOWN:
+        if model.controller is None:
+            raise RecordingError(
+                f"{run.name}: the model has no controller", "identify it, or use the brackets 'frozen' and 'stiff'"
+            )
+        return model
+    gain = _STIFF_SHARE * model.drive.total_mass / run.period
+    follows = Controller(
+        period=run.period, speed_gain=gain, integral_gain=0.1 * gain / run.period * _STIFF_SHARE, speed_filter_order=0
+    )
+    return replace(model, controller=follows)
+
+
+def _beginning(run: AxisRun, contact: float) -> float:
+    """Return when the simulation begins [s]: in the last rest before the contact, or 30 s before it."""
+    speed = _speed(run)
+    before = run.time <= contact
+    moving = np.abs(np.nan_to_num(speed)) > 0.02 * float(np.nanmax(np.abs(speed)))
+    rest = np.flatnonzero(before & ~moving)
+    start = contact - _LONGEST_APPROACH
+    if len(rest):
+        # A rest of 0.2 s at least: a sample without speed may be noise or the turning point of a stroke.
+        long = round(0.2 / run.period)
+        sums = np.convolve(before & ~moving, np.ones(long), mode="valid") if len(speed) >= long else np.zeros(0)
+        whole = np.flatnonzero(sums >= long)
+        if len(whole):
+            start = max(start, float(run.time[whole[-1]]))
+    return max(start, run.start)
+
+
+def _speed(run: AxisRun) -> FloatArray:
+    if run.speed is not None:
+        return run.speed
+    assert run.position is not None
+    rate: FloatArray = np.gradient(run.position, run.period)
+    return rate
+
+
+def _inputs(run: AxisRun, model: AxisModel, time: FloatArray) -> AxisInputs:
+    """Return the references on the clock of the controller; without a speed reference the measured speed is one."""
+    assert model.controller is not None
+    reference_position = None
+    if model.controller.position_gain > 0.0:
+        wanted = run.reference_position if run.reference_position is not None else run.position
+        if wanted is None:
+            raise RecordingError(
+                f"{run.name}: no position for the controller's position loop", "map reference_position or position"
+            )
+        reference_position = _filled(run.time, wanted, time)
+    if run.reference_speed is not None:
+        reference = _filled(run.time, run.reference_speed, time)
+    elif reference_position is not None and run.reference_position is not None:
+        reference = np.zeros(len(time))  # the position reference alone
+    else:
+        reference = _filled(run.time, _speed(run), time)
+    position = _filled(run.time, run.position, time[:1])[0] if run.position is not None else 0.0
+    begins = _filled(run.time, _speed(run), time[:20])
+    speed = float(np.mean(begins))
+    at_rest = abs(speed) < 0.02 * float(np.nanmax(np.abs(_speed(run))))
+    return AxisInputs(
+        reference,
+        reference_position=reference_position,
+        initial_speed=0.0 if at_rest else speed,
+        initial_position=float(position),
+    )
+
+
+def _filled(time: FloatArray, values: FloatArray, clock: FloatArray) -> FloatArray:
+    known = np.isfinite(values)
+    filled: FloatArray = np.interp(clock, time[known], values[known])
+    return filled
+
+
+def _difference(
+    model: AxisModel,
+    free: AxisMotion,
+    hit: AxisMotion,
+    time: FloatArray,
+    contact: tuple[float, float],
+    reaction: ControllerReaction,
+) -> InjectedContact:
+    start, approach = contact
+    change = hit.rows - free.rows
+    rows = dict(zip(ROWS, change, strict=True))
+    sensors, period = model.sensors, hit.period
+    channels = {
+        "torque": first_order_low_pass(rows["drive_force"], sensors.torque_filter_time, period),
+        "speed": _measured_speed(model, rows, period),
+        "position": rows["motor_position"],
+        "reference_torque": rows["command"],
+    }
+    if sensors.accelerometer_hz > 0.0:
+        channels["acceleration"] = second_order_low_pass(
+            rows["load_acceleration"], sensors.accelerometer_hz, sensors.accelerometer_damping, period
+        )
+    held = {"reference_torque", "speed"} if sensors.speed_hz == 0.0 else {"reference_torque"}
+    changes = {
+        name: ChannelChange(time, values[:, np.newaxis], start, held=name in held) for name, values in channels.items()
+    }
+    force = hit["contact_force"]
+    if not np.any(force) or (changes["torque"].is_nothing and changes["speed"].is_nothing):
+        raise RecordingError(
+            f"the contact at {start:.3f} s changes nothing in the model", "its obstacle or its drive never acts"
+        )
+    separation = _separation(time, force)
+    free_wind_up, wind_up = (float(np.max(np.abs(item["wind_up"]))) for item in (free, hit))
+    until = min(start + RELIABLE_FOR, separation)
+    reached = time <= until
+    beyond = not model.drive.is_rigid and float(np.max(np.abs(hit["wind_up"][reached]))) > 1.05 * free_wind_up
+    doubts = {
+        Doubt.RIGID_DRIVE: model.drive.is_rigid,
+        Doubt.WIND_UP_BEYOND_FREE_RUNS: beyond,
+        Doubt.SEPARATION: separation < start + RELIABLE_FOR,
+        Doubt.CONTROLLER_UNKNOWN: reaction is not ControllerReaction.KNOWN,
+        Doubt.ACCELEROMETER_UNKNOWN: sensors.accelerometer_hz == 0.0,
+    }
+    return InjectedContact(
+        start=start,
+        changes=changes,
+        force=ChannelChange(time, force[:, np.newaxis], start),
+        peak_force=float(np.max(force)),
+        speed=approach,
+        reliable_until=until,
+        separation=separation,
+        free_wind_up=free_wind_up,
+        wind_up=wind_up,
+        reaction=reaction,
+        doubts=tuple(doubt for doubt, applies in doubts.items() if applies),
+    )
+
+
+def _measured_speed(model: AxisModel, rows: Mapping[str, FloatArray], period: float) -> FloatArray:
+    """Return the change of the speed channel: the controller's own, or the log's derivative of the position."""
+    corner = model.sensors.speed_hz
+    if corner == 0.0:
+        return rows["measured_speed"]
+    constant = 1.0 / (2.0 * math.pi * corner)
+    steps = np.diff(rows["motor_position"], prepend=0.0) / period
+    return first_order_low_pass(first_order_low_pass(steps, constant, period), constant, period)
+
+
+def _separation(time: FloatArray, force: FloatArray) -> float:
+    """Return when the force first falls to nothing after the contact [s]; infinite if it does not."""
+    peak = np.maximum.accumulate(force)
+    lost = (peak > 0.0) & (force <= _SEPARATED * peak)
+    return float(time[np.argmax(lost)]) if lost.any() else math.inf
