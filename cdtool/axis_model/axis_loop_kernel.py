@@ -40,7 +40,7 @@ ROWS = (
 """The rows of the array that `integrate_axis` fills; the first seven are the states."""
 
 INPUTS = ("reference_speed", "reference_position", "command", "disturbance")
-"""The rows of the inputs, one value per controller period; `command` is used where `replay` is 1."""
+"""The rows of the inputs, one value per controller period; `command` is used where `replay` is 1 or 2."""
 
 # fmt: off
 PARAMETER_ORDER = (
@@ -72,7 +72,8 @@ def integrate_axis(
     """Fill `log` (a row per name of `ROWS`, a column per period); return the time of first contact [s] or NaN.
 
     `force_curve` (2, points): penetration [m] and force [N], from (0, 0). `initial_state` (8,): the seven states and
-    the controller's integral [N]. `obstacle`: 1 where there is one, its position [m], the direction of approach +-1,
+    the controller's integral [N]. `replay`: 0 for the controller alone, 1 with the input `command` added to its output,
+    2 for this command alone. `obstacle`: 1 where there is one, its position [m], the direction of approach +-1,
     lambda [s/m].
     """
     (
@@ -139,13 +140,15 @@ def integrate_axis(
             measured_speed = keep * measured_speed + (1.0 - keep) * once_filtered
         else:
             measured_speed = once_filtered
-        if replay > 0.5:
+        if replay > 1.5:
             command = inputs[2, sample]
         else:
             error = inputs[0, sample] - measured_speed
             if position_gain > 0.0:
                 error += position_gain * (inputs[1, sample] - state[0])
             wanted = speed_gain * error + integral
+            if replay > 0.5:
+                wanted += inputs[2, sample]
             largest_change = slew_limit * period
             command += min(max(wanted - command, -largest_change), largest_change)
             command = min(max(command, -force_limit), force_limit)

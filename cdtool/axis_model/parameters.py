@@ -15,7 +15,8 @@ class Drive:
     With the wind-up d = x_motor - x_load the drive's force is k1 d + c1 d' up to the take-up travel g, and
     k1 g + k2 (d - g) + c2 d' above it; on the back flank nothing over the backlash b, then k2. It never pulls through
     its dead zone. A drive with one stiffness has an infinite take-up travel. `stiffness` infinite: a rigid drive.
-    A front mass, part of `load_mass`, stands between the load and a contact.
+    A front mass, part of `load_mass`, stands between the load and a contact; `front_stiffness` without a front mass is
+    a spring in series with the obstacle.
     """
 
     motor_mass: float = 0.0

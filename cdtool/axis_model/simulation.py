@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,13 +24,15 @@ _NEVER = 1e12
 class AxisInputs:
     """What drives the model, one value per controller period from `start` [s]; arrays (n,) on the load side.
 
-    `command` [N] replaces the controller if it is given. `disturbance` [N] acts on the load in positive direction.
+    `command` [N] replaces the controller if it is given, or is added to its output if it is a `feed_forward`.
+    `disturbance` [N] acts on the load in positive direction.
     """
 
     reference_speed: FloatArray
     reference_position: FloatArray | None = None
     command: FloatArray | None = None
     disturbance: FloatArray | None = None
+    feed_forward: bool = False
     initial_speed: float = 0.0
     initial_position: float = 0.0
 
@@ -60,7 +62,7 @@ def simulate_axis(
     controller nor command, or where its parameters need more integration steps than are reasonable.
     """
     controller = model.controller
-    if controller is None and inputs.command is None:
+    if controller is None and (inputs.command is None or inputs.feed_forward):
         raise ConfigurationError("the model has no controller", "give [model.controller], or a command")
     step = period or (controller.period if controller else 0.0)
     if step <= 0.0:
@@ -75,6 +77,7 @@ def simulate_axis(
     against = (0.0, 0.0, 1.0, 0.0)
     curve = np.array([[0.0, 1.0], [0.0, 0.0]])
     if obstacle is not None:
+        obstacle = _behind_front(model.drive, obstacle)
         against = (1.0, obstacle.position, float(obstacle.direction), obstacle.damping)
         curve = obstacle.penetration_curve
     first_contact = axis_loop_kernel.integrate_axis(
@@ -83,7 +86,7 @@ def simulate_axis(
         _initial_state(model, inputs),
         table,
         against,
-        1.0 if inputs.command is not None else 0.0,
+        0.0 if inputs.command is None else 1.0 if inputs.feed_forward else 2.0,
         substeps(model, step, obstacle),
         rows,
     )
@@ -138,6 +141,14 @@ def wind_up_at(drive: Drive, force: float) -> float:
     if force <= taken_up:
         return force / drive.stiffness
     return drive.take_up_travel + (force - taken_up) / drive.end_stiffness
+
+
+def _behind_front(drive: Drive, obstacle: Obstacle) -> Obstacle:
+    """Return the obstacle as the load meets it: a front without mass is a spring in series with it."""
+    if drive.front_mass > 0.0 or math.isinf(drive.front_stiffness):
+        return obstacle
+    compliance = 1.0 / obstacle.series_stiffness + 1.0 / drive.front_stiffness
+    return replace(obstacle, series_stiffness=1.0 / compliance)
 
 
 def _finite(value: float) -> float:

@@ -171,3 +171,18 @@ def test_a_model_that_needs_too_many_steps_is_refused() -> None:
 def test_a_model_without_controller_needs_a_command() -> None:
     with pytest.raises(ConfigurationError, match="no controller"):
         simulate_axis(rigid(1.0), AxisInputs(np.zeros(10)), period=1e-3)
+
+
+def test_a_front_without_mass_is_a_spring_in_series_with_the_obstacle() -> None:
+    inputs = AxisInputs(np.zeros(300), command=np.zeros(300), initial_speed=0.3)
+    front = AxisModel(drive=Drive(load_mass=5.0, front_stiffness=3e4))
+    motion = simulate_axis(front, inputs, Obstacle.spring(2e4).at(0.01, 1), period=1e-3)
+    both = simulate_axis(rigid(5.0), inputs, Obstacle.spring(1.2e4).at(0.01, 1), period=1e-3)
+    np.testing.assert_allclose(motion["contact_force"], both["contact_force"], rtol=1e-9)
+
+
+def test_a_feed_forward_is_added_to_the_controller() -> None:
+    controller = Controller(period=1e-3, speed_gain=50.0, speed_filter_order=0)
+    model = AxisModel(drive=Drive(load_mass=10.0), controller=controller)
+    motion = simulate_axis(model, AxisInputs(np.zeros(50), command=np.full(50, 7.0), feed_forward=True))
+    np.testing.assert_allclose(motion["command"], 7.0 - 50.0 * motion["measured_speed"], atol=1e-12)

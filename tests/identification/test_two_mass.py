@@ -1,0 +1,116 @@
+"""Load, drive stiffness and friction of a two-mass axis from the simulated gate's impact-free runs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdtool.axis_model.parameters import Sensors
+from cdtool.identification.axis_run import AxisRun
+from cdtool.identification.estimate import Estimate, IdentificationError, Missing
+from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
+from tests.synthetic.gate_runs import GATE, free_runs, on_any_track
+
+SENSORS = Sensors(accelerometer_hz=GATE.accelerometer_frequency, accelerometer_damping=GATE.accelerometer_damping)
+SETTINGS = TwoMassSettings(motor_mass=GATE.motor_mass, sensors=SENSORS)
+# What the model can see: the motor's friction adds to that of the leaf.
+COULOMB = GATE.coulomb_friction + GATE.motor_friction
+NOMINAL = COULOMB + GATE.viscous_friction * GATE.nominal_speed
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["with references", "without references"])
+def fit(request: pytest.FixtureRequest) -> TwoMassFit:
+    return identify_two_mass(free_runs(GATE, 404, 10, references=request.param), SETTINGS)
+
+
+def test_the_gate_is_identified(fit: TwoMassFit) -> None:
+    assert fit.identified["load_mass"].value == pytest.approx(GATE.leaf_mass, rel=0.15)
+    assert fit.identified["stiffness"].value == pytest.approx(GATE.take_up_stiffness, rel=0.05)
+    assert fit.nominal_friction[0] == pytest.approx(NOMINAL, rel=0.10)
+    assert fit.identified["coulomb"].value == pytest.approx(COULOMB, rel=0.15)
+    assert fit.model.drive.load_mass == fit.identified["load_mass"].value
+
+
+def test_the_standard_errors_are_of_the_size_of_the_errors(fit: TwoMassFit) -> None:
+    truth = {"load_mass": GATE.leaf_mass, "stiffness": GATE.take_up_stiffness, "coulomb": COULOMB}
+    for key, value in truth.items():
+        estimate: Estimate = fit.identified[key]
+        assert abs(estimate.value - value) < 3.0 * estimate.standard_error
+        assert 0.002 < estimate.relative_error < 0.2
+
+
+def test_viscous_friction_of_one_speed_is_not_identifiable(fit: TwoMassFit) -> None:
+    (viscous,) = fit.identified.not_identifiable
+    assert (viscous.key, viscous.missing) == ("viscous", (Missing.SECOND_SPEED,))
+    assert viscous.numbers["speeds"] == 1.0
+    assert fit.model.friction.viscous > 0.0
+
+
+def test_the_model_follows_the_runs(fit: TwoMassFit) -> None:
+    assert fit.relative_error["speed"] < 0.02
+    assert fit.relative_error["torque"] < 0.05
+    assert fit.largest_wind_up == pytest.approx(5e-3, rel=0.1)
+
+
+def test_standard_errors_cover_on_other_tracks() -> None:
+    inside = []
+    for seed in range(3):
+        track = on_any_track(GATE, seed)
+        found = identify_two_mass(free_runs(track, seed, 6, references=seed % 2 == 0), SETTINGS).identified
+        for key, value in (("load_mass", GATE.leaf_mass), ("stiffness", GATE.take_up_stiffness), ("coulomb", COULOMB)):
+            inside.append(abs(found[key].value - value) < 2.0 * found[key].standard_error)
+    assert np.mean(inside) >= 0.8
+
+
+def test_a_second_speed_makes_viscous_friction_better_known() -> None:
+    slow = replace(GATE, nominal_speed=0.08)
+    one = identify_two_mass(free_runs(GATE, 3, 5), SETTINGS)
+    two = identify_two_mass([*free_runs(GATE, 3, 5), *free_runs(slow, 4, 5)], SETTINGS)
+    assert len(two.ensembles) == 2
+    value = next((item.value for item in two.identified.estimates if item.key == "viscous"), None)
+    if value is None:
+        numbers = {item.key: item.numbers for item in two.identified.not_identifiable}["viscous"]
+        before = {item.key: item.numbers for item in one.identified.not_identifiable}["viscous"]
+        assert numbers["relative_standard_error"] < before["relative_standard_error"]
+        assert numbers["speeds"] == 2.0
+    else:
+        assert value == pytest.approx(GATE.viscous_friction, rel=0.5)
+
+
+def cut(run: AxisRun, seconds: float) -> AxisRun:
+    first = round(seconds / run.period)
+    names = ("torque", "speed", "position", "acceleration", "reference_speed", "reference_torque")
+    values = {name: getattr(run, name)[first:] for name in names if getattr(run, name) is not None}
+    return AxisRun(run.name, run.start + seconds, run.period, **values)
+
+
+def test_runs_that_never_start_from_rest_are_refused() -> None:
+    with pytest.raises(IdentificationError, match="none of 3 runs starts from rest"):
+        identify_two_mass([cut(run, 1.0) for run in free_runs(GATE, 5, 3)], SETTINGS)
+
+
+def test_the_motor_inertia_is_needed() -> None:
+    with pytest.raises(IdentificationError, match="motor's inertia"):
+        identify_two_mass(free_runs(GATE, 5, 2), TwoMassSettings(motor_mass=0.0))
+
+
+def test_torque_and_speed_alone_are_enough() -> None:
+    runs = [
+        AxisRun(run.name, run.start, run.period, torque=run.torque, speed=run.speed)
+        for run in free_runs(GATE, 6, 10, references=False)
+    ]
+    found = identify_two_mass(runs, TwoMassSettings(motor_mass=GATE.motor_mass))
+    assert found.identified["load_mass"].value == pytest.approx(GATE.leaf_mass, rel=0.2)
+    assert found.identified["stiffness"].value == pytest.approx(GATE.take_up_stiffness, rel=0.1)
+
+
+def test_missing_samples_do_not_matter() -> None:
+    rng = np.random.default_rng(1)
+    runs = []
+    for run in free_runs(GATE, 7, 8):
+        torque = run.torque.copy()
+        torque[rng.random(len(torque)) < 0.01] = np.nan
+        runs.append(replace(run, torque=torque))
+    assert identify_two_mass(runs, SETTINGS).identified["stiffness"].value == pytest.approx(8e4, rel=0.05)
