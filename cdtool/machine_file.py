@@ -24,7 +24,10 @@ from cdtool.tables import Table, read_toml
 
 @dataclass(frozen=True)
 class MachineFile(StoresDerived):
-    """A validated machine file: the machine, its channels, and gains that differ from the defaults."""
+    """A validated machine file: the machine, its channels, and gains that differ from the defaults.
+
+    `model`: the table [model] as `axis_model.model_table.ModelTable`, None if the file does not have one.
+    """
 
     path: Path
     machine: Machine
@@ -32,6 +35,7 @@ class MachineFile(StoresDerived):
     topics: ChannelMap
     gains: Mapping[str, Mapping[str, Gain]]
     digest: str
+    model: Any = None
 
     @property
     def force_reduction(self) -> str:
@@ -82,9 +86,10 @@ def read_machine_file(path: str | Path) -> MachineFile:
     if len(machine.joints) == 1 and "joints" not in table:
         topics = replace(topics, named=False)
     gains = _read_gains(root.table("detectors"), len(machine.joints))
+    model = _read_model(root, len(machine.joints))
     root.finish()
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
-    return MachineFile(file, machine, columns, topics, gains, digest)
+    return MachineFile(file, machine, columns, topics, gains, digest, model)
 
 
 def fingerprint(machine: Machine) -> str:
@@ -128,6 +133,13 @@ def _read_gains(table: Table, joints: int) -> dict[str, dict[str, Gain]]:
             raise table.fault(name, f"repeats {full}", "give a detector's gains once, under one of its names")
         gains[full] = given
     return gains
+
+
+def _read_model(root: Table, joints: int) -> Any:
+    if "model" not in root:
+        return None
+    # By name: only few commands use it.
+    return import_module("cdtool.axis_model.model_table").ModelTable.read(root.table("model"), joints)
 
 
 def _read_pins(table: Table) -> TablePins:

@@ -2,50 +2,32 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from cdtool.bounded_loading import ContentError, parse_toml, read_text
-from cdtool.columns import Column
-from cdtool.errors import ConfigurationError, RecordingError, UsageError, nearest
+from cdtool.errors import RecordingError, UsageError
 from cdtool.files import replaced
 from cdtool.findings import Finding
 from cdtool.findings.containers import Unverified
-from cdtool.formats.groups import UNVERIFIED, Group, Parts, Writer, WrittenNames
+from cdtool.formats.groups import UNVERIFIED, Parts
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.parts import join_digests
 from cdtool.ingest.reading import LogFolder, log_parts
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, read_machine_file
-from cdtool.recording import UNITLESS
-from cdtool.remote.remote_path import joined, location, relative_name
+from cdtool.remote.remote_path import location
 from cdtool.version import __version__
 from cdtool.workflows.channel_rows import channel_rows
 from cdtool.workflows.convert.section_rows import Rows, SectionRows
 from cdtool.workflows.log_rows import LogRows
+from cdtool.workflows.written_files import files_of, machine_text, writer_of
 
 if TYPE_CHECKING:
     from cdtool.workflows.execution.workers import Progress
 
-_WRITERS = {
-    ".csv": "cdtool.formats.csv_writing:write_csv_table",
-    ".mcap": "cdtool.formats.mcap_writing:write_mcap_topics",
-    ".parquet": "cdtool.formats.parquet_writing:write_parquet",
-    ".feather": "cdtool.formats.parquet_writing:write_feather",
-    ".h5": "cdtool.formats.hdf5_writing:write_hdf5",
-    ".hdf5": "cdtool.formats.hdf5_writing:write_hdf5",
-    ".mf4": "cdtool.formats.mdf:write_mdf",
-    ".tdms": "cdtool.formats.tdms:write_tdms",
-}
 _WHOLE = LogSection()
-_ONE_CLOCK = (".csv",)
-_HEADER = re.compile(r"^\s*\[\[?\s*(?P<name>[^\[\]]+?)\s*\]\]?\s*(#.*)?$")
-_URDF = re.compile(r"^(\s*urdf\s*=\s*).*$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -109,7 +91,7 @@ def convert(
     (('stiff-03.mcap',), 7)
     """
     log, target = location(source), location(output)
-    writer = _writer(target)
+    writer = writer_of(target)
     parts = log_parts(log)
     _check_apart(target, log, parts)
     machine_file = (
@@ -119,7 +101,7 @@ def convert(
     if not rows.groups:
         raise RecordingError(f"{log}: contains none of the mapped channels", "see cdtool info for its content")
     rows = SectionRows(log, rows, section, machine_file) if section else rows
-    pieces = _pieces(target, rows.groups)
+    pieces = files_of(target, rows.groups)
     names = [path for path, _ in pieces]
     companions = [path.with_name(f"{path.name}.machine.toml") for path in names] if machine_file else []
     beside = [path for path in machine_file.files_beside(log) if path.is_file()] if machine_file else []
@@ -132,7 +114,7 @@ def convert(
         for i, (path, part) in enumerate(pieces):
             written = writer(temporary[i], part, row_progress.of(rows.parts(part)), provenance)
             if machine_file is not None:
-                text = _converted_machine(machine_file, path, part, written, companions[i])
+                text = machine_text(machine_file, path, part, written, companions[i])
                 temporary[len(names) + i].write_text(text, encoding="utf-8")
     width = sum(len(parts) for group in rows.groups for parts in group.flat)
     made = tuple(map(str, names)), tuple(map(str, companions))
@@ -161,15 +143,6 @@ class _RowProgress:
             raise RecordingError(text, "check its disk") from fault
 
 
-def _writer(target: Path) -> Writer:
-    place = _WRITERS.get(target.suffix.lower())
-    if place is None:
-        raise UsageError(f"{target}: '{target.suffix}' cannot be written", nearest(target.suffix, _WRITERS))
-    module, _, name = place.partition(":")
-    writer: Writer = getattr(import_module(module), name)
-    return writer
-
-
 def _check_apart(target: Path, log: Path, parts: Sequence[Path]) -> None:
     """Raise UsageError if the new file would become a part of the log."""
     alike = target.suffix.lower() == parts[0].suffix.lower()
@@ -183,14 +156,6 @@ def _check_free(paths: Sequence[Path], parts: Sequence[Path], force: bool) -> No
             raise UsageError(f"{path}: is the log itself, or its load cell", "choose another name")
         if path.exists() and not force:
             raise UsageError(f"{path}: already exists", "choose another name, or overwrite it with --force")
-
-
-def _pieces(target: Path, groups: Sequence[Group]) -> list[tuple[Path, Sequence[Group]]]:
-    """Return which groups are written to which file."""
-    if target.suffix.lower() in _ONE_CLOCK and len(groups) > 1:
-        names = [target.with_name(f"{target.stem}.{i}{target.suffix}") for i in range(1, len(groups) + 1)]
-        return [(name, [group]) for name, group in zip(names, groups, strict=True)]
-    return [(target, groups)]
 
 
 def _provenance(
@@ -217,83 +182,3 @@ def _provenance(
     if machine_file is not None:
         told |= {"machine": machine_file.machine.name, "machine_fingerprint": fingerprint(machine_file.machine)}
     return told
-
-
-def _converted_machine(
-    machine_file: MachineFile, log: Path, groups: Sequence[Group], names: WrittenNames, target: Path
-) -> str:
-    """Return the text of `target`: the machine file without its channels, then those of the converted log."""
-    text = read_text(machine_file.path, ConfigurationError)
-    kept = _without_channels(text)
-    if not _same(text, kept):  # the tables cannot be separated line by line: write only the channels
-        kept = f"# Put [machine] of {machine_file.path.name} here.\n"
-    urdf = _stated_urdf(text)
-    if urdf and machine_file.path.parent.resolve() != target.parent.resolve():
-        place = relative_name(joined(machine_file.path.parent, urdf), target.parent)
-        kept = _URDF.sub(lambda match: f"{match[1]}{_text(place)}", kept)
-    mapped = machine_file.topics if machine_file.topics.sources else machine_file.columns
-    kinds = next((item.kinds for item in mapped.sources if item.channel == "label"), ())
-    return f"{kept.rstrip()}\n\n{_channels(log, groups, names, mapped.speed_low_pass, kinds)}"
-
-
-def _channels(
-    log: Path, groups: Sequence[Group], names: WrittenNames, corner: float, kinds: Sequence[tuple[float, str]]
-) -> str:
-    topics = log.suffix.lower() == ".mcap"
-    lines = [f"# The channels of {log.name} as cdtool convert wrote them: SI units, as logged."]
-    lines += ["[channels.mcap]"] if topics else ["[channels]", 'time = { column = "time", unit = "s" }']
-    lines.append(f"speed_low_pass_hz = {corner!r}")
-    for group, of_group in zip(groups, names, strict=True):
-        for column, places in zip(group.columns, of_group, strict=True):
-            if topics:
-                topic, _, field = places[0].partition(" ")
-                where = f"topic = {_text(topic)}, {_field(field, column)}"
-            elif len(places) == 1:
-                where = f"column = {_text(places[0])}"
-            else:
-                where = f"columns = [{', '.join(map(_text, places))}]"
-            unit = "" if column.name in UNITLESS else f", unit = {_text(column.unit or '1')}"
-            of_label = ", ".join(f'"{value:.17g}" = {_text(kind)}' for value, kind in kinds)
-            also = f", kinds = {{ {of_label} }}" if of_label and column.name == "label" else ""
-            lines.append(f"{column.name} = {{ {where}{unit}{also} }}")
-    return "\n".join(lines) + "\n"
-
-
-def _field(field: str, column: Column) -> str:
-    """Return the field of a channel in [channels.mcap]; the axes of a force are elements of an array."""
-    if column.name != "force" or column.values.ndim == 1:
-        return f"field = {_text(field)}"
-    elements = [_text(field.replace("[:]", f"[{axis}]")) for axis in range(column.values.shape[1])]
-    return f"fields = [{', '.join(elements)}]"
-
-
-def _without_channels(text: str) -> str:
-    kept, skipping = [], False
-    for line in text.splitlines():
-        header = _HEADER.match(line)
-        if header is not None:
-            name = header["name"].replace('"', "").replace(" ", "")
-            skipping = name == "channels" or name.startswith("channels.")
-        if not skipping:
-            kept.append(line)
-    return "\n".join(kept) + "\n"
-
-
-def _same(text: str, kept: str) -> bool:
-    """Whether the remaining text is valid TOML and contains everything but the channels."""
-    try:
-        before, after = parse_toml(text), parse_toml(kept)
-    except ContentError:
-        return False
-    before.pop("channels", None)
-    return before == after
-
-
-def _stated_urdf(text: str) -> str:
-    machine: dict[str, Any] = parse_toml(text).get("machine", {})
-    return str(machine.get("urdf", ""))
-
-
-def _text(value: str) -> str:
-    """Return a TOML string: JSON's escapes are valid in TOML, except for DEL."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from cdtool.formats import FORMATS
-from cdtool.workflows.convert.converting import _ONE_CLOCK, _WRITERS
+from cdtool.workflows.written_files import ONE_CLOCK, WRITERS
 
 # One suffix per writer: others mean the same container.
-KINDS = list({writer: suffix for suffix, writer in reversed(_WRITERS.items())}.values())[::-1]
-SEVERAL_CLOCKS = [suffix for suffix in KINDS if suffix not in _ONE_CLOCK]
+KINDS = list({writer: suffix for suffix, writer in reversed(WRITERS.items())}.values())[::-1]
+SEVERAL_CLOCKS = [suffix for suffix in KINDS if suffix not in ONE_CLOCK]
 _EXTRAS = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8"))["project"][
     "optional-dependencies"
 ]

@@ -12,8 +12,9 @@ from cdtool.errors import OutputError, RecordingError, UsageError
 from cdtool.files import replaced
 from cdtool.ingest.reading import survey
 from cdtool.machine_file import read_machine_file
-from cdtool.workflows.convert.converting import _WRITERS, convert
+from cdtool.workflows.convert.converting import convert
 from cdtool.workflows.runs import read_log
+from cdtool.workflows.written_files import WRITERS
 from tests.command import cdtool
 from tests.formats.containers import assert_same, logged, machine_file, two_clocks
 from tests.workflows.convert.kinds import KINDS, SEVERAL_CLOCKS, needs, table
@@ -74,7 +75,7 @@ def test_the_start_of_a_log_on_an_epoch_is_kept(suffix, tmp_path):
     assert logged(done.files[0], done.machine_files[0]).origin == logged(log, machine).origin > 1.6e9
 
 
-@pytest.mark.parametrize("suffix", _WRITERS)
+@pytest.mark.parametrize("suffix", WRITERS)
 def test_without_a_machine_file_all_columns_are_written_with_their_units(suffix, tmp_path):
     needs(suffix)
     log, _ = gate(tmp_path)
@@ -112,7 +113,7 @@ def test_a_robots_urdf_is_found_from_another_folder(tmp_path):
     )
 
 
-@pytest.mark.parametrize("suffix", _WRITERS)
+@pytest.mark.parametrize("suffix", WRITERS)
 def test_every_file_states_its_origin(suffix, tmp_path):
     needs(suffix)
     log, machine = gate(tmp_path)
