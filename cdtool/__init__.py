@@ -18,6 +18,7 @@ Every command is available as a function:
     cdtool.score("triggers.csv", "benchmark.toml")                      -> Score
     cdtool.compare("old.json", "new.json")                              -> BuildComparison
     cdtool.plan(missed_at_most="5%")                                    -> Plan
+    cdtool.inject("benchmark.toml", "injected")                         -> Injected: impacts made from impact-free logs
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
     cdtool.study_sensors("machine.toml", ...)                           -> SensorStudy
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.explaining import explain, explain_runs
     from cdtool.workflows.information import info
     from cdtool.workflows.init.drafting import init, init_study
+    from cdtool.workflows.injecting import inject
     from cdtool.workflows.planning import plan
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
@@ -62,6 +64,7 @@ _API = {
     "benchmark": "cdtool.workflows.benchmark.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
     "convert": "cdtool.workflows.convert.converting:convert",
+    "inject": "cdtool.workflows.injecting:inject",
     "init": "cdtool.workflows.init.drafting:init",
     "init_study": "cdtool.workflows.init.drafting:init_study",
     "recover": "cdtool.workflows.recovering:recover",
@@ -86,6 +89,7 @@ __all__ = [
     "info",
     "init",
     "init_study",
+    "inject",
     "learn_signature",
     "plan",
     "read",

@@ -14,6 +14,7 @@ from cdtool.tables import Table
 
 # What [machine] gives, so that it must not be repeated in [model.drive].
 _FROM_MACHINE = ("load_mass",)
+_NOT_KEYS = (*_FROM_MACHINE, "stated_rigid")
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,11 @@ class ModelTable:
             if name not in table:
                 continue
             section = table.table(name)
-            values = {}
+            values: dict[str, tuple[float, ...]] = {}
+            if name == "drive" and section.flag("rigid", False):
+                values["stated_rigid"] = (1.0,) * joints
             for item in fields(part):
-                if item.name in section.values and item.name not in _FROM_MACHINE:
+                if item.name in section.values and item.name not in _NOT_KEYS:
                     values[item.name] = section.numbers(item.name, joints)
             section.finish()
             sections[name] = values
@@ -61,7 +64,8 @@ def axis_model(machine: Axis, table: ModelTable | None, joint: int = 0) -> AxisM
     table = table or ModelTable({})
     motor = float(machine.reflected_inertia[joint])
     load = float(machine.nominal_inertia[joint]) - motor
-    drive = table.of_joint("drive", joint)
+    drive: dict[str, Any] = {**table.of_joint("drive", joint)}
+    drive["stated_rigid"] = bool(drive.get("stated_rigid", False))
     if "motor_mass" in drive:
         if motor > 0.0:
             raise ConfigurationError(
@@ -105,4 +109,4 @@ def _require(machine: str, section: str, given: Mapping[str, float], part: type[
 def finite_values(part: Drive | Friction | Controller | Sensors) -> dict[str, float]:
     """Return the values of a part of the model that a table can hold: without those that are infinite."""
     values = {item.name: getattr(part, item.name) for item in fields(part)}
-    return {name: float(value) for name, value in values.items() if math.isfinite(value) and name not in _FROM_MACHINE}
+    return {name: float(value) for name, value in values.items() if math.isfinite(value) and name not in _NOT_KEYS}

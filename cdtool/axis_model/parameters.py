@@ -14,7 +14,8 @@ class Drive:
 
     With the wind-up d = x_motor - x_load the drive's force is k1 d + c1 d' up to the take-up travel g, and
     k1 g + k2 (d - g) + c2 d' above it; on the back flank nothing over the backlash b, then k2. It never pulls through
-    its dead zone. A drive with one stiffness has an infinite take-up travel. `stiffness` infinite: a rigid drive.
+    its dead zone. A drive with one stiffness has an infinite take-up travel. `stiffness` infinite: a rigid
+    drive, known to be one if it is `stated_rigid`.
     A front mass, part of `load_mass`, stands between the load and a contact; `front_stiffness` without a front mass is
     a spring in series with the obstacle.
     """
@@ -31,6 +32,7 @@ class Drive:
     front_mass: float = 0.0
     front_stiffness: float = math.inf
     front_damping: float = 0.0
+    stated_rigid: bool = False
 
     def __post_init__(self) -> None:
         _check_not_negative("model.drive", self)
@@ -38,6 +40,8 @@ class Drive:
             raise ConfigurationError("model.drive: load_mass is not above 0", "give the load's mass or inertia")
         if not self.is_rigid and self.motor_mass <= 0.0:
             raise ConfigurationError("model.drive: an elastic drive without motor_mass", "give machine.motor_inertia")
+        if self.stated_rigid and not self.is_rigid:
+            raise ConfigurationError("model.drive: rigid = true contradicts stiffness", "remove one of the two")
         if self.front_mass >= self.load_mass:
             raise ConfigurationError("model.drive: front_mass is not below load_mass", "it is a part of the load")
 

@@ -64,8 +64,8 @@ class AxisRun:
 def axis_run(recording: Recording, joint: int = 0) -> AxisRun:
     """Return a joint's channels of a recording on the load side, on one uniform clock.
 
-    The clock has the longest median step of torque, speed and position, so that no sample is invented. Raises RecordingError without torque or without speed
-    and position, and for fewer than 50 samples that all channels cover.
+    The clock has the longest median step of torque, speed and position, so that no sample is invented. Raises
+    RecordingError without torque or without speed and position, and for fewer than 50 samples that all channels cover.
     """
     series = {name: recording[name] for name in USED if name in recording and len(recording[name]) > 1}
     if "torque" not in series:

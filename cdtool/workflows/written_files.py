@@ -128,3 +128,9 @@ def _stated_urdf(text: str) -> str:
 def _text(value: str) -> str:
     """Return a TOML string: JSON's escapes are valid in TOML, except for DEL."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def require_free_folder(folder: Path) -> None:
+    """Raise UsageError unless a folder is new or empty."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} exists and is not an empty folder", "choose another --output")

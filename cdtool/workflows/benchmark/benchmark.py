@@ -42,6 +42,7 @@ from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisa
 from cdtool.workflows.benchmark.scoring import Detect, Scored, detect_with, score_runs
 from cdtool.workflows.benchmark.stored_learned import StoreOfRun
 from cdtool.workflows.benchmark.stored_outcomes import StoreReport
+from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.gathering import Gathering
 from cdtool.workflows.runs import to_be_seen
@@ -127,6 +128,7 @@ def benchmark(
     """
     workers = workers or Workers(jobs)
     work = BenchmarkWork.of(file, detectors, false_alarm_budget)
+    work = replace(work, setup=with_injected(work.setup, workers, progress))
     with ExitStack() as stack:
         folder = stack.enter_context(store.opened()) if store else None
         logs = [path for item in work.setup.impacts.values() for path in item.logs]
@@ -170,6 +172,11 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
     gathered.skipped += learned.about.skipped
     gathered.findings += [*measured, *learned.about.findings, *left_out]
+    gathered.skipped += [
+        Skipped(name, f"{group}: not tested by injected contacts: {reason}")
+        for group, item in setup.impacts.items()
+        for name, reason in item.refused.items()
+    ]
     logs = [(group, path) for group, item in setup.impacts.items() for path in item.logs]
     used = [setup.machine_file.detector(name) for name in setup.detectors]
     provenance = _provenance(setup, used, learned)
@@ -232,6 +239,10 @@ class _LogScoring:
     def __call__(
         self, group: str, path: Path, wanted: Wanted | None, detectors: tuple[str, ...] | None
     ) -> list[LogOutcome]:
+        refused = self.setup.impacts[group].refused if group in self.setup.impacts else {}
+        if refused:
+            wanted_here = detectors or tuple(item.name for item in self.detectors)
+            detectors = tuple(name for name in wanted_here if name not in refused)
         chosen = self if detectors is None else self._with_only(detectors)
         scored = score_runs(chosen.setup, group, path, chosen._detection_of, chosen.factors, chosen.ranges)
         return [outcome_of(item, chosen.setup, chosen._normals_for(item), wanted) for item in scored]

@@ -32,6 +32,8 @@ from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.execution.workers import Workers
+from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, read_inject_section
+from cdtool.workflows.injection.injected_logs import model_of, reactions_of
 from cdtool.workflows.named_logs import LogsOf, labels_of, named_logs
 from cdtool.workflows.runs import RunReading, resolve_all, shown_path
 from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
@@ -46,11 +48,18 @@ _GUARD = 0.2
 
 @dataclass(frozen=True)
 class ImpactGroup:
-    """One group of logs with impacts: an alarm belongs to a contact up to `window` [s] after its onset."""
+    """One group of logs with impacts: an alarm belongs to a contact up to `window` [s] after its onset.
+
+    A group of injected contacts has its own `machine_file`, exact `labels`, and detectors that it cannot test, each
+    with the reason (`refused`).
+    """
 
     logs: tuple[Path, ...]
     window: float
     force: ForceProfile | None = None
+    machine_file: MachineFile | None = None
+    labels: Labels | None = None
+    refused: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -90,6 +99,7 @@ class BenchmarkFile:
     learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
     measures_synchronisation: bool = False
+    inject: InjectSection | None = None
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -167,7 +177,14 @@ class BenchmarkFile:
     def rules_of(self, group: str) -> ScoringRules:
         """Return the settings that determine the results of a log in that group, or in no group."""
         window = self.impacts[group].window if group in self.impacts else self.window
+        if group in self.impacts and (exact := self.impacts[group].labels):
+            return ScoringRules(self.onset, window, exact)
         return ScoringRules(self.onset, window, self.labels, self.synchronisation, self.mass_before_cell)
+
+    def machine_file_of(self, group: str) -> MachineFile:
+        """Return the machine file by which the logs of a group are read."""
+        own = self.impacts[group].machine_file if group in self.impacts else None
+        return own or self.machine_file
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -224,6 +241,7 @@ def read_benchmark_file(
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
     impacts, sections = _groups(root, found, window, force)
+    inject = _read_inject(root, found, operations, tuple(impacts))
     learn = _under_scored_paths(learn, _scored(impacts, HOLDOUT))
     onset = root.table("onset")
     migrated = migrated_onset(onset)
@@ -251,7 +269,7 @@ def read_benchmark_file(
         limits=read_limits(
             root.table("limits"),
             [*_names(machine_file, names), *((name, name) for name in also_known)],
-            tuple(impacts),
+            (*impacts, *(_injected_groups(inject, machine_file) if inject else ())),
             [kind_group(group, kind) for group in impacts for kind in _kinds(machine_file, labels)],
         ),
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
@@ -260,6 +278,7 @@ def read_benchmark_file(
         sections=sections,
         learned_sections={path: section for path, section in learn.items() if section},
         guard=guard,
+        inject=inject,
     )
     root.finish()
     if benchmark.points and not any(group.force for group in impacts.values()):
@@ -267,6 +286,27 @@ def read_benchmark_file(
     refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
     return benchmark
+
+
+def _read_inject(root: Table, found: LogsOf, operations: str, groups: tuple[str, ...]) -> InjectSection | None:
+    if "inject" not in root:
+        return None
+    if found.runs:
+        raise root.fault("inject", f"cannot be used with operations = '{operations}'", "write each run to its own log")
+    section = read_inject_section(
+        root.table("inject"),
+        found,
+        found.machine_file.machine.joints,
+        tuple(name for name in groups if name != HOLDOUT),
+    )
+    for name in groups:
+        if name.startswith(f"{INJECTED}_"):
+            raise root.fault("impacts", f"{name} is the name of an injected group", "choose another name")
+    return section
+
+
+def _injected_groups(section: InjectSection, machine_file: MachineFile) -> tuple[str, ...]:
+    return tuple(section.groups(reactions_of(model_of(section, machine_file))))
 
 
 def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:
@@ -365,7 +405,7 @@ def _groups(
         raise force.fault(
             "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"
         )
-    if not groups:
+    if not groups and "inject" not in root:
         raise root.fault("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")
     return groups, {path: section for path, section in sections.items() if section}
 

@@ -145,7 +145,7 @@ def score_log(
     `factors`: the safety factors of the sweep by detector. `group` is empty for a log outside all groups. Values
     outside the plausible `ranges` are masked.
     """
-    return _score(setup, group, path, detect, factors, _WholeLog(setup, path, ranges))
+    return _score(setup, group, path, detect, factors, _WholeLog(setup, group, path, ranges))
 
 
 def score_runs(
@@ -189,13 +189,14 @@ class _WholeLog:
     """Reads a log that is one recording."""
 
     setup: BenchmarkFile
+    group: str
     path: Path
     ranges: LearnedRanges | None
 
     def __call__(self) -> Recording:
         setup, base = self.setup, self.setup.path.parent
         ranges = _of_others(self.ranges, shown_path(self.path, base))
-        return read_named(self.path, setup.machine_file, base, ranges, setup.onset)
+        return read_named(self.path, setup.machine_file_of(self.group), base, ranges, setup.onset)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,63 @@
+"""`cdtool inject`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
+from cdtool.cli.options import ClusterOption, JobsOption, JsonOption, RetriesOption, TimeoutOption
+from cdtool.cli.place import Place, location
+from cdtool.plain_text import counted
+
+_FORMATS = ("csv", "mcap")
+
+
+def inject(
+    file: Annotated[
+        Place,
+        typer.Argument(parser=location, help="Benchmark file with a section [inject]; see docs/injection.md."),
+    ],
+    output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder, new or empty.")],
+    file_format: Annotated[
+        str | None, typer.Option("--format", help="csv, or mcap for channels with clocks of their own.")
+    ] = None,
+    jobs: JobsOption = 1,
+    cluster: ClusterOption = None,
+    timeout: TimeoutOption = None,
+    retries: RetriesOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Put simulated contacts into impact-free logs: every channel changes as it would, and the onset is exact.
+
+    The machine file needs a table [model], see docs/injection.md.
+
+    Example: cdtool inject benchmark.toml -o injected
+    """
+    from cdtool.errors import UsageError, nearest
+    from cdtool.workflows.execution.workers import Workers
+    from cdtool.workflows.injecting import inject as run
+
+    if file_format is not None and file_format not in _FORMATS:
+        raise UsageError(f"--format is '{file_format}'", nearest(file_format, _FORMATS))
+    with progress("injecting") as advance:
+        done = run(
+            file,
+            output,
+            file_format=file_format,
+            workers=Workers(jobs, timeout, retries, cluster),
+            progress=advance,
+        )
+    print_skipped(done.skipped, ())
+    if as_json:
+        print_json(done)
+    else:
+        groups = dict.fromkeys(case.group for case in done.logs.cases)
+        typer.echo(f"{plain(done.folder)}: {counted(len(done.logs.cases), 'injected contact')} in {', '.join(groups)}")
+        doubts = dict.fromkeys(doubt for case in done.logs.cases for doubt in case.doubts)
+        for doubt in doubts:
+            many = sum(doubt in case.doubts for case in done.logs.cases)
+            typer.echo(f"note: {doubt.replace('_', ' ')}: {many} of {len(done.logs.cases)}")
+        typer.echo(f"written: {plain(done.folder)}/benchmark.toml, with {counted(done.copied, 'impact-free log')}")
+    leave(done.skipped)

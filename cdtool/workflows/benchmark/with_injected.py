@@ -1,0 +1,88 @@
+"""The groups of injected contacts of a benchmark: its section [inject] carried out, or found as it was carried out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from cdtool.detectors import DETECTORS
+from cdtool.errors import OutputError
+from cdtool.files import replaced_folder
+from cdtool.ingest.channel_assembly import file_digest
+from cdtool.injection.axis_contact import ControllerReaction
+from cdtool.injection.refusal import refusal
+from cdtool.machine_file import read_machine_file
+from cdtool.remote.remote_path import joined
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, ImpactGroup
+from cdtool.workflows.execution.workers import Progress, Workers
+from cdtool.workflows.injection.inject_section import InjectSection
+from cdtool.workflows.injection.injected_logs import (
+    MANIFEST,
+    InjectedLogs,
+    model_of,
+    reactions_of,
+    read_injected,
+    write_injected,
+)
+from cdtool.workflows.store.digest import code_version, digest_of
+
+_DIGEST = "digest.txt"
+
+
+def with_injected(setup: BenchmarkFile, workers: Workers, progress: Progress | None = None) -> BenchmarkFile:
+    """Return the benchmark with a group per injected obstacle; unchanged without [inject].
+
+    The recordings are kept in the folder that [inject] names and used again as long as nothing they depend on has
+    changed. Raises OutputError if that folder holds something else.
+    """
+    if setup.inject is None:
+        return setup
+    injected = injected_logs(setup, setup.inject, workers, progress)
+    return with_groups(setup, setup.inject, injected)
+
+
+def injected_logs(
+    setup: BenchmarkFile, section: InjectSection, workers: Workers, progress: Progress | None = None
+) -> InjectedLogs:
+    """Return the injected recordings of a section, from its folder if it has them already."""
+    folder = joined(setup.path.parent, section.folder)
+    digest = digest_of(
+        code_version(), setup.machine_file.digest, section, setup.onset, {log: file_digest(log) for log in section.logs}
+    )
+    mark = folder / _DIGEST
+    if mark.is_file() and mark.read_text(encoding="utf-8").strip() == digest:
+        return read_injected(folder)
+    if folder.exists() and not _may_replace(folder):
+        raise OutputError(f"{folder}: exists and holds other files", "set another [inject] folder, or remove it")
+    with replaced_folder(folder, _may_replace) as part:
+        write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
+        (part / _DIGEST).write_text(digest + "\n", encoding="utf-8")
+    return read_injected(folder)
+
+
+def with_groups(setup: BenchmarkFile, section: InjectSection, injected: InjectedLogs) -> BenchmarkFile:
+    """Return the benchmark with the groups of injected contacts before its hold-out."""
+    model = model_of(section, setup.machine_file)
+    machine_file = read_machine_file(injected.machine_path)
+    labels = injected.labels(setup.path.parent)
+    groups = {}
+    for name, (_, reaction) in section.groups(reactions_of(model)).items():
+        logs = tuple(injected.folder / case.file for case in injected.cases if case.group == name)
+        if logs:
+            refused = _refused(setup, section, reaction)
+            groups[name] = ImpactGroup(logs, setup.window, None, machine_file, labels, refused)
+    real = {name: group for name, group in setup.impacts.items() if name != HOLDOUT}
+    holdout = {HOLDOUT: setup.impacts[HOLDOUT]} if HOLDOUT in setup.impacts else {}
+    return replace(setup, impacts={**real, **groups, **holdout}, inject=None)
+
+
+def _refused(setup: BenchmarkFile, section: InjectSection, reaction: ControllerReaction) -> dict[str, str]:
+    """Return the detectors that these contacts cannot test, with the reason."""
+    model = model_of(section, setup.machine_file)
+    found = {name: refusal(DETECTORS.load(name).needs, model, reaction) for name in setup.detectors}
+    return {name: reason.value for name, reason in found.items() if reason is not None}
+
+
+def _may_replace(folder: Path) -> bool:
+    """Return whether a folder holds injected recordings, or nothing."""
+    return (folder / MANIFEST).is_file() or not any(folder.iterdir())

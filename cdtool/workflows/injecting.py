@@ -1,0 +1,130 @@
+"""`cdtool inject`: a folder of recordings with injected contacts, with everything that a benchmark of it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from cdtool.evaluation.results import Skipped
+from cdtool.files import replaced_folder
+from cdtool.ingest.channel_assembly import file_digest
+from cdtool.ingest.reading import read_as_logged
+from cdtool.remote.remote_path import location
+from cdtool.tables import read_toml
+from cdtool.version import __version__
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.workflows.execution.workers import Progress, Workers
+from cdtool.workflows.injection.inject_section import InjectSection, require_section
+from cdtool.workflows.injection.injected_logs import CONTACTS, InjectedLogs, write_injected, write_recording
+from cdtool.workflows.written_files import require_free_folder
+
+# Tables of the benchmark file that name logs of its own.
+_OF_LOGS = ("inject", "impacts", "learn", "holdout", "limits", "campaigns", "points", "onset", "machine")
+
+
+@dataclass(frozen=True)
+class Injected:
+    """The folder that was written, its cases, and what was left out."""
+
+    folder: str
+    logs: InjectedLogs
+    copied: int
+
+    @property
+    def skipped(self) -> tuple[Skipped, ...]:
+        """Return the logs and contacts that were left out, with the reason."""
+        return self.logs.skipped
+
+
+def inject(
+    file: str | Path,
+    output: str | Path,
+    *,
+    file_format: str | None = None,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> Injected:
+    """Put the contacts of a benchmark file's section [inject] into its impact-free logs, and write them as logs.
+
+    Parameters
+    ----------
+    file : str or Path
+        The benchmark file.
+    output : str or Path
+        A new or empty folder: a group of recordings per obstacle, contacts.csv with the exact contacts, injected.json
+        with the origin of each, copies of the logs to learn from, and machine.toml and benchmark.toml for all of them.
+    file_format : str, optional
+        "csv" or "mcap"; that of the section by default.
+    workers : Workers, optional
+        How the work is done; in this process by default.
+    progress : callable, optional
+        Called after each log with the number done and the total.
+
+    Returns
+    -------
+    Injected
+        The recordings with their contacts, and what was left out.
+
+    Raises
+    ------
+    ConfigurationError
+        The benchmark file has no section [inject], or the model of the machine is incomplete.
+    RecordingError
+        No contact can be made.
+    UsageError
+        The folder is not empty.
+    """
+    setup = read_benchmark_file(file)
+    section = require_section(setup.inject, setup.path)
+    if file_format is not None:
+        section = replace(section, file_format=file_format)
+    folder = location(output)
+    require_free_folder(folder)
+    with replaced_folder(folder) as part:
+        injected = write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
+        copied = _copy_learned(setup, section, part)
+        _write_benchmark(setup, injected, copied, part)
+    return Injected(str(folder), replace(injected, folder=folder), sum(map(len, copied.values())))
+
+
+def _copy_learned(setup: BenchmarkFile, section: InjectSection, folder: Path) -> dict[str, list[str]]:
+    """Write the logs to learn from and the hold-out with the same channels, so that one machine file reads all."""
+    groups = {"learn": setup.learn}
+    if HOLDOUT in setup.impacts:
+        groups[HOLDOUT] = setup.impacts[HOLDOUT].logs
+    copied: dict[str, list[str]] = {}
+    for group, logs in groups.items():
+        for number, log in enumerate(logs, 1):
+            recording = read_as_logged(log, setup.machine_file, unread="loss").recording
+            name = f"{group}/{number:03d}_{log.stem}.{section.file_format}"
+            provenance = {
+                "source": log.name,
+                "sha256": file_digest(log),
+                "version": __version__,
+                "origin_s": repr(recording.origin),
+            }
+            write_recording(folder / name, recording, provenance, setup.machine_file)
+            copied.setdefault(group, []).append(name)
+    return copied
+
+
+def _write_benchmark(
+    setup: BenchmarkFile, injected: InjectedLogs, copied: Mapping[str, list[str]], folder: Path
+) -> None:
+    import tomlkit
+
+    given = read_toml(setup.path, "a benchmark file")
+    values: dict[str, Any] = {"machine": "machine.toml"}
+    values |= {key: value for key, value in given.items() if key not in _OF_LOGS}
+    values.setdefault("detectors", list(setup.detectors))
+    values |= {group: {"logs": logs} for group, logs in copied.items()}
+    groups: dict[str, list[str]] = {}
+    for case in injected.cases:
+        groups.setdefault(case.group, []).append(case.file)
+    values["impacts"] = {group: {"logs": logs} for group, logs in groups.items()}
+    onset = {key: value for key, value in given.get("onset", {}).items() if not key.startswith("labels")}
+    values["onset"] = {**onset, "labels": CONTACTS}
+    text = "# Made by cdtool inject: every contact in [impacts] is simulated and was added to an impact-free log.\n"
+    (folder / "benchmark.toml").write_text(text + tomlkit.dumps(values), encoding="utf-8")

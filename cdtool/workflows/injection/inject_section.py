@@ -1,0 +1,157 @@
+"""The section [inject] of a benchmark file: which contacts are put into which impact-free logs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.axis_model.obstacle import Obstacle
+from cdtool.errors import ConfigurationError, UsageError, nearest
+from cdtool.injection.axis_contact import ControllerReaction
+from cdtool.injection.obstacles import read_obstacle, shipped_obstacles
+from cdtool.log_section import MARK_HINT, Mark
+from cdtool.plain_text import digits
+from cdtool.remote.remote_path import joined
+from cdtool.tables import Table
+from cdtool.workflows.named_logs import LogsOf
+
+# The name of every group of injected contacts begins with this word.
+INJECTED = "injected"
+FORMATS = ("csv", "mcap")
+# More contacts than this are a mistake in a grid.
+_MOST_POSITIONS = 1000
+
+
+@dataclass(frozen=True)
+class NamedObstacle:
+    """An obstacle with its name, its stiffness at first touch [N/m], and the group of real impacts to compare with."""
+
+    name: str
+    obstacle: Obstacle
+    compare_with: str = ""
+
+    @property
+    def stiffness(self) -> float:
+        """Return the slope of the force curve at first touch, with what is in series [N/m]."""
+        penetration, force = self.obstacle.penetration_curve
+        return float((force[1] - force[0]) / (penetration[1] - penetration[0]))
+
+
+@dataclass(frozen=True)
+class InjectSection:
+    """Every obstacle is put at every position into every log.
+
+    `positions` are marks: distances travelled, or times. `duration` [s] of a recording after its contact. `folder` is
+    where `cdtool benchmark` keeps the recordings. `joint`: the axis that meets the obstacle.
+    """
+
+    logs: tuple[Path, ...]
+    obstacles: tuple[NamedObstacle, ...]
+    positions: tuple[Mark, ...]
+    duration: float
+    seed: int
+    joint: int
+    folder: str
+    file_format: str
+
+    def groups(self, reactions: tuple[ControllerReaction, ...]) -> dict[str, tuple[NamedObstacle, ControllerReaction]]:
+        """Return the groups of contacts by name: an obstacle, and how the drive is assumed to react."""
+        named = {}
+        for item in self.obstacles:
+            for reaction in reactions:
+                bracket = "" if reaction is ControllerReaction.KNOWN else f"_{reaction.name.lower()}"
+                named[f"{INJECTED}_{item.name}{bracket}"] = (item, reaction)
+        return named
+
+
+def read_inject_section(table: Table, found: LogsOf, joints: tuple[str, ...], groups: tuple[str, ...]) -> InjectSection:
+    """Read and check [inject]; raises ConfigurationError naming the key.
+
+    `groups` are the groups of real impacts that an obstacle may be compared with.
+    """
+    shipped = shipped_obstacles(joined(found.base, table.text("obstacle_file")) if "obstacle_file" in table else None)
+    obstacles = _obstacles(table, shipped, groups)
+    joint = table.choice("joint", joints, joints[0])
+    section = InjectSection(
+        logs=found.of(Table({"logs": table.raw("logs", [])}, table.where, table.prefix)),
+        obstacles=obstacles,
+        positions=_positions(table),
+        duration=table.number("duration_s", 1.0, above=0.0),
+        seed=table.whole("seed", 0, minimum=0),
+        joint=joints.index(joint),
+        folder=table.text("folder", INJECTED),
+        file_format=table.choice("format", FORMATS, "csv"),
+    )
+    table.finish()
+    return section
+
+
+def _obstacles(table: Table, shipped: Mapping[str, Obstacle], groups: tuple[str, ...]) -> tuple[NamedObstacle, ...]:
+    tables = table.table("obstacles")
+    found = []
+    for name in tables.values:
+        if not name.replace("_", "").replace("-", "").isalnum():
+            raise tables.fault(name, "is not a valid name", "use letters, digits, - and _")
+        own = tables.table(name)
+        compared = own.text("compare_with", "")
+        if compared and compared not in groups:
+            raise own.fault("compare_with", f"is '{compared}'", nearest(compared, groups))
+        found.append(NamedObstacle(name, read_obstacle(own, shipped), compared))
+    for stiffness in _stiffnesses(table):
+        found.append(NamedObstacle(f"{digits(stiffness)}_n_per_mm", Obstacle.spring(stiffness * 1e3)))
+    if not found:
+        raise table.fault(
+            "obstacles", "is missing", "give [inject.obstacles.NAME] with stiffness_n_per_mm, or stiffnesses_n_per_mm"
+        )
+    if len({item.name for item in found}) < len(found):
+        raise table.fault("stiffnesses_n_per_mm", "repeats an obstacle", "list each stiffness once")
+    return tuple(found)
+
+
+def _stiffnesses(table: Table) -> tuple[float, ...]:
+    """Return a list of stiffnesses [N/mm], or `{ from, to, per_decade }`, rounded to two digits."""
+    if "stiffnesses_n_per_mm" not in table:
+        return ()
+    if isinstance(table.raw("stiffnesses_n_per_mm"), list):
+        return table.numbers("stiffnesses_n_per_mm", len(table.raw("stiffnesses_n_per_mm")), above=0.0)
+    grid = table.table("stiffnesses_n_per_mm")
+    low, high = grid.number("from", above=0.0), grid.number("to", above=0.0)
+    per_decade = grid.whole("per_decade", 2, minimum=1)
+    grid.finish()
+    if high <= low:
+        raise grid.fault("to", f"is {high:g}, not above from", "give a larger stiffness")
+    count = max(round(float(np.log10(high / low)) * per_decade), 1) + 1
+    return tuple(float(f"{value:.2g}") for value in np.geomspace(low, high, count))
+
+
+def _positions(table: Table) -> tuple[Mark, ...]:
+    """Return a list of marks, or an equal grid `{ from, to, count }` of marks."""
+    raw = table.raw("positions")
+    if not isinstance(raw, dict):
+        return tuple(_mark(table, "positions", text) for text in table.texts("positions"))
+    grid = table.table("positions")
+    begin, end = (_mark(grid, name, grid.text(name)) for name in ("from", "to"))
+    count = grid.whole("count", 7, minimum=2)
+    grid.finish()
+    if begin.unit != end.unit or not end.value > begin.value:
+        raise grid.fault("to", "is not after from", "give both in the same unit")
+    if count > _MOST_POSITIONS:
+        raise grid.fault("count", f"is {count}", f"give at most {_MOST_POSITIONS}")
+    return tuple(Mark(float(value), begin.unit) for value in np.linspace(begin.value, end.value, count))
+
+
+def _mark(table: Table, name: str, text: str) -> Mark:
+    try:
+        return Mark.parse(text)
+    except UsageError as fault:
+        raise table.fault(name, fault.message, MARK_HINT) from fault
+
+
+def require_section(section: InjectSection | None, file: Path) -> InjectSection:
+    """Return the section; raises ConfigurationError if a benchmark file does not have one."""
+    if section is None:
+        raise ConfigurationError(f"{file}: has no section [inject]", "see docs/injection.md for one")
+    return section

@@ -1,0 +1,326 @@
+"""Put the contacts of [inject] into impact-free logs, and write them as logs with their exact contacts."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.axis_model.model_table import axis_model
+from cdtool.axis_model.parameters import AxisModel
+from cdtool.columns import Column
+from cdtool.errors import CdtoolError, ConfigurationError, RecordingError
+from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.truth.labels import Labels
+from cdtool.evaluation.truth.onset_rule import OnsetRule
+from cdtool.formats.groups import Group, Part
+from cdtool.identification.axis_run import AxisRun, axis_run
+from cdtool.ingest.reading import read_as_logged
+from cdtool.injection.axis_contact import ControllerReaction, InjectedContact, axis_contact
+from cdtool.injection.injected_recording import injected_recording
+from cdtool.log_section import Mark
+from cdtool.logged_recording import LoggedRecording
+from cdtool.machine_file import MachineFile
+from cdtool.machines.axis import Axis
+from cdtool.plain_text import digits
+from cdtool.recording import Contact, Recording
+from cdtool.version import __version__
+from cdtool.workflows.contacts.impact_free import contacts_shown
+from cdtool.workflows.execution.workers import Progress, Workers, in_order
+from cdtool.workflows.injection.inject_section import InjectSection, NamedObstacle
+from cdtool.workflows.runs import shown_path, unread
+from cdtool.workflows.written_files import machine_text, writer_of
+
+MANIFEST, MACHINE, CONTACTS = "injected.json", "machine.toml", "contacts.csv"
+
+
+@dataclass(frozen=True)
+class InjectedCase:
+    """One injected contact: its file below the folder, where it comes from, and what is true of it; SI units."""
+
+    file: str
+    group: str
+    log: str
+    obstacle: str
+    stiffness: float
+    position: str
+    position_value: float
+    start: float
+    end: float
+    speed: float
+    peak_force: float
+    reliable_until: float
+    separation: float | None
+    wind_up: float
+    free_wind_up: float
+    reaction: str
+    doubts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class InjectedLogs:
+    """The recordings of a folder: every case, what was left out, and the machine file that reads them."""
+
+    folder: Path
+    cases: tuple[InjectedCase, ...]
+    skipped: tuple[Skipped, ...]
+
+    @property
+    def machine_path(self) -> Path:
+        """Return the path of the machine file."""
+        return self.folder / MACHINE
+
+    def labels(self, base: Path) -> Labels:
+        """Return the exact contacts, by the names that the recordings have below `base`."""
+        contacts, lines = {}, {}
+        for case in self.cases:
+            name = shown_path(self.folder / case.file, base)
+            contacts[name] = (
+                Contact(case.start, case.end, 0.0, case.peak_force, found_by="injection", resolution=0.0),
+            )
+            lines[name] = (f"{MANIFEST} {case.file}",)
+        return Labels(str(self.folder / MANIFEST), contacts, lines)
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What is needed to inject into any log."""
+
+    section: InjectSection
+    machine_file: MachineFile
+    model: AxisModel
+    reactions: tuple[ControllerReaction, ...]
+    onset: OnsetRule
+    base: Path
+    folder: Path
+
+    def __call__(self, item: tuple[int, Path]) -> _OfLog:
+        number, log = item
+        try:
+            return self._written(number, log)
+        except CdtoolError as fault:
+            return _OfLog((), (unread(log, self.base, fault),))
+
+    def _written(self, number: int, log: Path) -> _OfLog:
+        machine = self.machine_file.machine
+        logged: LoggedRecording = read_as_logged(log, self.machine_file, unread="loss")
+        recording = replace(logged.on_load_side(machine), name=shown_path(log, self.base))
+        contacts = contacts_shown(recording, self.onset)
+        if contacts:
+            raise RecordingError(
+                f"{log}: a contact at {contacts[0].start:.3f} s", "contacts are put into impact-free logs only"
+            )
+        run = axis_run(recording, self.section.joint)
+        cases: list[InjectedCase] = []
+        skipped, machine_toml = [], ""
+        groups = self.section.groups(self.reactions).items()
+        rng = np.random.default_rng([self.section.seed, number])
+        for mark in self.section.positions:
+            # The contact is anywhere between two samples, not always on one.
+            share = float(rng.random())
+            for group, (obstacle, reaction) in groups:
+                try:
+                    contact = self._contact(run, recording, mark, share, obstacle, reaction)
+                    file = f"{group}/{number + 1:03d}_{log.stem}_{digits(mark.value)}{mark.unit}"
+                    case, machine_toml = self._write(file, log, logged.recording, group, obstacle, mark, contact)
+                    cases.append(case)
+                except RecordingError as fault:
+                    skipped.append(Skipped(recording.name, f"{group} at {mark}: {fault}"))
+        return _OfLog(tuple(cases), tuple(skipped), machine_toml)
+
+    def _contact(
+        self,
+        run: AxisRun,
+        recording: Recording,
+        mark: Mark,
+        share: float,
+        obstacle: NamedObstacle,
+        reaction: ControllerReaction,
+    ) -> InjectedContact:
+        time = mark.time_in(recording)
+        if not math.isfinite(time):
+            raise RecordingError(f"the log never reaches {mark}", "choose a position within the travel")
+        time = max(time - share * run.period, run.start)
+        return axis_contact(run, self.model, obstacle.obstacle, time, self.section.duration, reaction)
+
+    def _write(
+        self,
+        file: str,
+        log: Path,
+        logged: Recording,
+        group: str,
+        obstacle: NamedObstacle,
+        mark: Mark,
+        contact: InjectedContact,
+    ) -> tuple[InjectedCase, str]:
+        recording = injected_recording(
+            logged, self.machine_file.machine, contact.changes, contact.force, (self.section.joint,)
+        )
+        name = f"{file}.{self.section.file_format}"
+        case = InjectedCase(
+            file=name,
+            group=group,
+            log=shown_path(log, self.base),
+            obstacle=obstacle.name,
+            stiffness=obstacle.stiffness,
+            position=str(mark),
+            position_value=mark.value,
+            start=contact.start,
+            end=float(contact.force.time[-1]),
+            speed=contact.speed,
+            peak_force=contact.peak_force,
+            reliable_until=contact.reliable_until,
+            separation=contact.separation if math.isfinite(contact.separation) else None,
+            wind_up=contact.wind_up,
+            free_wind_up=contact.free_wind_up,
+            reaction=contact.reaction.value,
+            doubts=tuple(doubt.name.lower() for doubt in contact.doubts),
+        )
+        target = self.folder / name
+        provenance = {
+            "source": log.name,
+            "version": __version__,
+            "origin_s": repr(recording.origin),
+            "injected": json.dumps(asdict(case), sort_keys=True),
+        }
+        return case, write_recording(target, recording, provenance, self.machine_file)
+
+
+@dataclass(frozen=True)
+class _OfLog:
+    cases: tuple[InjectedCase, ...]
+    skipped: tuple[Skipped, ...]
+    machine_toml: str = ""
+
+
+def write_recording(
+    target: Path, recording: Recording, provenance: Mapping[str, str], machine_file: MachineFile
+) -> str:
+    """Write a recording as logged, and return the text of the machine file that reads it from the folder above.
+
+    A table has one clock: a recording with several needs a container of messages, such as .mcap.
+    """
+    clocks = {series.time.tobytes() for series in recording.channels.values()}
+    if len(clocks) > 1 and target.suffix == ".csv":
+        raise ConfigurationError(f"{target}: the channels have {len(clocks)} clocks", 'set [inject] format = "mcap"')
+    one = len(clocks) == 1
+    groups = [_group("clock_1", recording, tuple(recording.channels))] if one else []
+    if not one:
+        groups = [_group(name, recording, (name,)) for name in recording.channels]
+    target.parent.mkdir(parents=True, exist_ok=True)
+
+    def parts() -> Iterator[list[Part | None]]:
+        yield [
+            Part(
+                recording[group.columns[0].name].time,
+                tuple(_values(recording, column.name) for column in group.columns),
+            )
+            for group in groups
+        ]
+
+    written = writer_of(target)(target, groups, parts(), provenance)
+    return machine_text(machine_file, target, groups, written, target.parent.parent / MACHINE)
+
+
+def _group(name: str, recording: Recording, channels: Sequence[str]) -> Group:
+    columns = []
+    for channel in channels:
+        series = recording[channel]
+        shape = (0, series.joint_count) if series.joint_count > 1 else (0,)
+        columns.append(Column(channel, np.empty(shape), None, None if series.unit == "1" else series.unit))
+    first = recording[channels[0]]
+    return Group(name, tuple(columns), len(first), True, float(first.time[0]), recording.joints)
+
+
+def _values(recording: Recording, channel: str) -> Any:
+    series = recording[channel]
+    return series.values if series.joint_count > 1 else series.values[:, 0]
+
+
+def reactions_of(model: AxisModel) -> tuple[ControllerReaction, ...]:
+    """Return how the drive is assumed to react: as its controller does, or without one both brackets."""
+    if model.controller is not None:
+        return (ControllerReaction.KNOWN,)
+    return (ControllerReaction.FROZEN, ControllerReaction.STIFF)
+
+
+def model_of(section: InjectSection, machine_file: MachineFile) -> AxisModel:
+    """Return the model of the axis that meets the obstacle; raises ConfigurationError for other machines."""
+    if not isinstance(machine_file.machine, Axis):
+        raise ConfigurationError(
+            f"{machine_file.path}: contacts cannot be injected into a machine of coupled joints",
+            "use a linear_axis or rotary_axis",
+        )
+    return axis_model(machine_file.machine, machine_file.model, section.joint)
+
+
+def write_injected(
+    section: InjectSection,
+    machine_file: MachineFile,
+    onset: OnsetRule,
+    folder: Path,
+    base: Path,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> InjectedLogs:
+    """Write every injected recording below `folder`, which exists and is empty, with contacts.csv and the manifest.
+
+    A log that cannot be used, and a contact that cannot be made, are left out with the reason. Raises RecordingError if
+    no contact can be made, ConfigurationError where the model is incomplete.
+    """
+    model = model_of(section, machine_file)
+    work = _Work(section, machine_file, model, reactions_of(model), onset, base, folder)
+    items = list(enumerate(section.logs))
+    done: list[_OfLog] = list(
+        in_order(work, items, len(items), workers or Workers(), progress=progress, of_lost=_Lost(base))
+    )
+    cases = tuple(case for item in done for case in item.cases)
+    skipped = tuple(left for item in done for left in item.skipped)
+    if not cases:
+        reason = skipped[0].reason if skipped else "no log is given"
+        raise RecordingError(f"no contact can be injected: {reason}", "choose other logs or positions")
+    injected = InjectedLogs(folder, cases, skipped)
+    machine_toml = next(item.machine_toml for item in done if item.machine_toml)
+    injected.machine_path.write_text(machine_toml, encoding="utf-8")
+    _write_manifest(injected)
+    return injected
+
+
+@dataclass(frozen=True)
+class _Lost:
+    base: Path
+
+    def __call__(self, item: tuple[int, Path], reason: str) -> _OfLog:
+        return _OfLog((), (Skipped(shown_path(item[1], self.base), reason),))
+
+
+def _write_manifest(injected: InjectedLogs) -> None:
+    rows = ["recording,start_s,end_s,kind,uncertainty_s"]
+    rows += [f"{case.file},{case.start!r},{case.end!r},{case.obstacle},0" for case in injected.cases]
+    (injected.folder / CONTACTS).write_text("\n".join(rows) + "\n", encoding="utf-8")
+    manifest = {
+        "tool": "cdtool",
+        "tool_version": __version__,
+        "injected": True,
+        "cases": [asdict(case) for case in injected.cases],
+        "skipped": [asdict(item) for item in injected.skipped],
+    }
+    text = json.dumps(manifest, indent=1, allow_nan=False) + "\n"
+    (injected.folder / MANIFEST).write_text(text, encoding="utf-8")
+
+
+def read_injected(folder: Path) -> InjectedLogs:
+    """Return the recordings of a folder from its manifest; raises ConfigurationError for a wrong one."""
+    path = folder / MANIFEST
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        cases = tuple(InjectedCase(**{**item, "doubts": tuple(item["doubts"])}) for item in values["cases"])
+        skipped = tuple(Skipped(**item) for item in values["skipped"])
+    except (OSError, ValueError, KeyError, TypeError) as fault:
+        raise ConfigurationError(f"{path}: is no manifest of injected recordings", "delete the folder") from fault
+    return InjectedLogs(folder, cases, skipped)
