@@ -18,6 +18,7 @@ Every command is available as a function:
     cdtool.score("triggers.csv", "benchmark.toml")                      -> Score
     cdtool.compare("old.json", "new.json")                              -> BuildComparison
     cdtool.plan(missed_at_most="5%")                                    -> Plan
+    cdtool.identify(logs, "machine.toml", "machine.toml")               -> IdentifiedMachine: parameters with errors
     cdtool.inject("benchmark.toml", "injected")                         -> Injected: impacts made from impact-free logs
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
     cdtool.study_sensors("machine.toml", ...)                           -> SensorStudy
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.convert.converting import convert
     from cdtool.workflows.detection import detect, detect_runs
     from cdtool.workflows.explaining import explain, explain_runs
+    from cdtool.workflows.identification.identifying import identify
     from cdtool.workflows.information import info
     from cdtool.workflows.init.drafting import init, init_study
     from cdtool.workflows.injecting import inject
@@ -64,6 +66,7 @@ _API = {
     "benchmark": "cdtool.workflows.benchmark.benchmark:benchmark",
     "score": "cdtool.workflows.score_triggers:score",
     "convert": "cdtool.workflows.convert.converting:convert",
+    "identify": "cdtool.workflows.identification.identifying:identify",
     "inject": "cdtool.workflows.injecting:inject",
     "init": "cdtool.workflows.init.drafting:init",
     "init_study": "cdtool.workflows.init.drafting:init_study",
@@ -86,6 +89,7 @@ __all__ = [
     "detect_runs",
     "explain",
     "explain_runs",
+    "identify",
     "info",
     "init",
     "init_study",

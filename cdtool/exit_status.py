@@ -94,6 +94,7 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "plan": _ALWAYS,
     "convert": _CAN_LOSE,
     "recover": _CAN_LOSE,
+    "identify": _CAN_LOSE,
     "inject": _CAN_LOSE,
     "signature show": _ALWAYS,
     "signature check": _CAN_LOSE,

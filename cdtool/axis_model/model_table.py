@@ -57,7 +57,8 @@ class ModelTable:
 def axis_model(machine: Axis, table: ModelTable | None, joint: int = 0) -> AxisModel:
     """Return the model of one axis: masses and friction of [machine] on the load side, and what [model] has.
 
-    Without [model.drive] stiffness the drive is rigid; without [model.friction] it is that of [machine]. Raises
+    Without [model.drive] stiffness the drive is rigid; without [model.friction] the friction is that of [machine]. A
+    Coulomb friction of one direction applies to both. Raises
     ConfigurationError where the load's mass or inertia is missing, or values contradict one another.
     """
     machine.require_inertia("a model of the axis")
@@ -97,6 +98,9 @@ def _friction(machine: Axis, table: ModelTable, joint: int) -> Friction:
         "viscous": machine.viscous_friction[joint] / ratio**2,
         "offset": machine.constant_force[joint] / ratio,
     }
+    for key, other in (("coulomb_forward", "coulomb_backward"), ("coulomb_backward", "coulomb_forward")):
+        if key in given and other not in given:
+            of_machine[other] = given[key]
     return Friction(**{**of_machine, **given})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,9 +24,10 @@ from cdtool.cli.options import (
 from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, digits
 
 if TYPE_CHECKING:
+    from cdtool.evaluation.evaluated import Evaluated
     from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.store.use import StoreUse
 
@@ -107,6 +109,7 @@ def benchmark(
     if as_json:
         typer.echo(to_json(done.results), nl=False)
     else:
+        _show_agreement(done.evaluated)
         show_conclusion(done.evaluated)
         show_table(done.evaluated)
         if done.stored is not None:
@@ -114,6 +117,21 @@ def benchmark(
         for path in written:
             typer.echo(f"written: {plain(path)}")
     finish(done.evaluated)
+
+
+def _show_agreement(evaluated: Evaluated) -> None:
+    """Print how injected contacts agree with the real ones that the benchmark file compares them with."""
+    from cdtool.evaluation.agreement import agreements
+
+    for item in agreements(evaluated):
+        typer.echo(
+            f"{item.detector}: {plain(item.injected_group)} {_ms(item.injected_ms)}, real ({plain(item.real_group)}) "
+            f"{_ms(item.real_ms)} ms, n = {item.injected_count} and {item.real_count}"
+        )
+
+
+def _ms(value: float) -> str:
+    return digits(float(f"{value:.3g}")) if math.isfinite(value) else "-"
 
 
 def _show_dry_run(

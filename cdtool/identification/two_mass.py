@@ -329,7 +329,10 @@ class _Problem:
                 f"{force}/{length}",
                 (Missing.HIGHER_RATE, Missing.START_UP),
             ),
-            ("model.friction", "coulomb", coulomb, coulomb * relative[2], force, (Missing.SECOND_SPEED,)),
+            *(
+                ("model.friction", key, coulomb, coulomb * relative[2], force, (Missing.SECOND_SPEED,))
+                for key in self._directions()
+            ),
             ("model.friction", "static", static, static_error, force, (Missing.MORE_RECORDINGS,)),
             (
                 "model.friction",
@@ -351,6 +354,11 @@ class _Problem:
                 numbers |= {"speeds": float(speeds), "condition_number": condition}
                 missing.append(NotIdentifiable(section, key, needs, numbers))
         return Identified(tuple(estimates), tuple(missing))
+
+    def _directions(self) -> list[str]:
+        """Return the keys of the Coulomb friction in the directions of the starts."""
+        keys = {1: "coulomb_forward", -1: "coulomb_backward"}
+        return [keys[direction] for direction in (1, -1) if any(item.direction == direction for item in self.ensembles)]
 
     def _relative_error(self, model: AxisModel, frictions: Sequence[FloatArray]) -> dict[str, float]:
         totals: dict[str, list[tuple[float, float]]] = {}

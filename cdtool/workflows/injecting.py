@@ -75,6 +75,13 @@ def inject(
         No contact can be made.
     UsageError
         The folder is not empty.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> done = cdtool.inject("sample_logs/gate/inject.toml", "injected")
+    >>> len(done.logs.cases), done.logs.cases[0].group
+    (16, 'injected_stiff')
     """
     setup = read_benchmark_file(file)
     section = require_section(setup.inject, setup.path)

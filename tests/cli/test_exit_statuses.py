@@ -74,6 +74,19 @@ class Folder:
             '[force]\nlimits = "limits_of_force.toml"\n'
         )
 
+    def injection(self, positions: str) -> Path:
+        """A benchmark with a model of the gate and contacts at these positions."""
+        model = "[model.drive]\nstiffness = 8e4\n[model.controller]\nperiod = 0.001\nspeed_gain = 4300\n"
+        (self.path / "model.toml").write_text(self.machine.read_text(encoding="utf-8") + model, encoding="utf-8")
+        obstacle = "[inject.obstacles.stiff]\nstiffness_n_per_mm = 500\n"
+        log = (self.gate / "holdout" / "01.csv").as_posix()
+        inject = f'[inject]\nlogs = ["{log}"]\npositions = {positions}\n{obstacle}'
+        free = ", ".join(f'"{path.as_posix()}"' for path in self.free(3))
+        path = self.path / "inject.toml"
+        head = 'machine = "model.toml"\ndetectors = ["gm"]\n'
+        path.write_text(f"{head}[signature]\nforce = true\n[learn]\nlogs = [{free}]\n{inject}", encoding="utf-8")
+        return path
+
     @property
     def store(self) -> Path:
         with StoreUse(self.path / "store").opened() as store:
@@ -186,6 +199,12 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("convert", 0): lambda f: cdtool("convert", f.log, f.path / "out.mcap"),
     ("convert", 2): lambda f: cdtool("convert", f.absent, f.path / "out.mcap"),
     ("convert", 3): lambda f: cdtool("convert", f.cut, f.path / "out.mcap"),
+    ("identify", 0): lambda f: cdtool("identify", *f.free(3), "-m", f.machine),
+    ("identify", 2): lambda f: cdtool("identify", f.absent, "-m", f.machine),
+    ("identify", 3): lambda f: cdtool("identify", *f.free(3), f.empty, "-m", f.machine),
+    ("inject", 0): lambda f: cdtool("inject", f.injection('["0.5m"]'), "-o", f.path / "injected"),
+    ("inject", 2): lambda f: cdtool("inject", f.injection('["50m"]'), "-o", f.path / "injected"),
+    ("inject", 3): lambda f: cdtool("inject", f.injection('["0.5m", "50m"]'), "-o", f.path / "injected"),
     ("recover", 0): lambda f: cdtool("recover", f.mcap, "-o", f.path / "out.mcap"),
     ("recover", 2): lambda f: cdtool("recover", f.absent, "-o", f.path / "out.mcap"),
     ("recover", 3): lambda f: cdtool("recover", f.cut_mcap, "-o", f.path / "out.mcap"),

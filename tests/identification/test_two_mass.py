@@ -29,12 +29,12 @@ def test_the_gate_is_identified(fit: TwoMassFit) -> None:
     assert fit.identified["load_mass"].value == pytest.approx(GATE.leaf_mass, rel=0.15)
     assert fit.identified["stiffness"].value == pytest.approx(GATE.take_up_stiffness, rel=0.05)
     assert fit.nominal_friction[0] == pytest.approx(NOMINAL, rel=0.10)
-    assert fit.identified["coulomb"].value == pytest.approx(COULOMB, rel=0.15)
+    assert fit.identified["coulomb_forward"].value == pytest.approx(COULOMB, rel=0.15)
     assert fit.model.drive.load_mass == fit.identified["load_mass"].value
 
 
 def test_the_standard_errors_are_of_the_size_of_the_errors(fit: TwoMassFit) -> None:
-    truth = {"load_mass": GATE.leaf_mass, "stiffness": GATE.take_up_stiffness, "coulomb": COULOMB}
+    truth = {"load_mass": GATE.leaf_mass, "stiffness": GATE.take_up_stiffness, "coulomb_forward": COULOMB}
     for key, value in truth.items():
         estimate: Estimate = fit.identified[key]
         assert abs(estimate.value - value) < 3.0 * estimate.standard_error
@@ -59,7 +59,11 @@ def test_standard_errors_cover_on_other_tracks() -> None:
     for seed in range(3):
         track = on_any_track(GATE, seed)
         found = identify_two_mass(free_runs(track, seed, 6, references=seed % 2 == 0), SETTINGS).identified
-        for key, value in (("load_mass", GATE.leaf_mass), ("stiffness", GATE.take_up_stiffness), ("coulomb", COULOMB)):
+        for key, value in (
+            ("load_mass", GATE.leaf_mass),
+            ("stiffness", GATE.take_up_stiffness),
+            ("coulomb_forward", COULOMB),
+        ):
             inside.append(abs(found[key].value - value) < 2.0 * found[key].standard_error)
     assert np.mean(inside) >= 0.8
 

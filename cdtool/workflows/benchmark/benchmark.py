@@ -302,6 +302,7 @@ def _provenance(
     detectors: Sequence[Any],
     learned: Learned,
 ) -> dict[str, Any]:
+    injected = {name: dict(group.injected) for name, group in setup.impacts.items() if group.injected}
     return {
         "tool": "cdtool",
         "tool_version": __version__,
@@ -326,6 +327,7 @@ def _provenance(
         "short_names": {detector.name: detector.short_name for detector in detectors},
         "learned_sha256": dict(sorted(learned.about.digests.items())),
         "plugins": plugin_packages(),
+        **({"injected": injected} if injected else {}),
     }
 
 

@@ -51,7 +51,7 @@ class ImpactGroup:
     """One group of logs with impacts: an alarm belongs to a contact up to `window` [s] after its onset.
 
     A group of injected contacts has its own `machine_file`, exact `labels`, and detectors that it cannot test, each
-    with the reason (`refused`).
+    with the reason (`refused`). `injected` states how the contacts were made, for provenance.
     """
 
     logs: tuple[Path, ...]
@@ -60,6 +60,7 @@ class ImpactGroup:
     machine_file: MachineFile | None = None
     labels: Labels | None = None
     refused: Mapping[str, str] = field(default_factory=dict)
+    injected: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)

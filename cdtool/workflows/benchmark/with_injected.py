@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from cdtool.detectors import DETECTORS
 from cdtool.errors import OutputError
@@ -15,9 +18,10 @@ from cdtool.machine_file import read_machine_file
 from cdtool.remote.remote_path import joined
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, ImpactGroup
 from cdtool.workflows.execution.workers import Progress, Workers
-from cdtool.workflows.injection.inject_section import InjectSection
+from cdtool.workflows.injection.inject_section import InjectSection, NamedObstacle
 from cdtool.workflows.injection.injected_logs import (
     MANIFEST,
+    InjectedCase,
     InjectedLogs,
     model_of,
     reactions_of,
@@ -66,11 +70,13 @@ def with_groups(setup: BenchmarkFile, section: InjectSection, injected: Injected
     machine_file = read_machine_file(injected.machine_path)
     labels = injected.labels(setup.path.parent)
     groups = {}
-    for name, (_, reaction) in section.groups(reactions_of(model)).items():
-        logs = tuple(injected.folder / case.file for case in injected.cases if case.group == name)
+    for name, (obstacle, reaction) in section.groups(reactions_of(model)).items():
+        cases = [case for case in injected.cases if case.group == name]
+        logs = tuple(injected.folder / case.file for case in cases)
         if logs:
             refused = _refused(setup, section, reaction)
-            groups[name] = ImpactGroup(logs, setup.window, None, machine_file, labels, refused)
+            stated = _stated(obstacle, reaction, cases)
+            groups[name] = ImpactGroup(logs, setup.window, None, machine_file, labels, refused, stated)
     real = {name: group for name, group in setup.impacts.items() if name != HOLDOUT}
     holdout = {HOLDOUT: setup.impacts[HOLDOUT]} if HOLDOUT in setup.impacts else {}
     return replace(setup, impacts={**real, **groups, **holdout}, inject=None)
@@ -81,6 +87,19 @@ def _refused(setup: BenchmarkFile, section: InjectSection, reaction: ControllerR
     model = model_of(section, setup.machine_file)
     found = {name: refusal(DETECTORS.load(name).needs, model, reaction) for name in setup.detectors}
     return {name: reason.value for name, reason in found.items() if reason is not None}
+
+
+def _stated(obstacle: NamedObstacle, reaction: ControllerReaction, cases: Sequence[InjectedCase]) -> dict[str, Any]:
+    """Return how the contacts of a group were made, for provenance."""
+    doubts = Counter(doubt for case in cases for doubt in case.doubts)
+    return {
+        "obstacle": obstacle.name,
+        "stiffness_n_per_m": obstacle.stiffness,
+        "controller": reaction.value,
+        "contacts": len(cases),
+        "doubts": dict(sorted(doubts.items())),
+        "compared_with": obstacle.compare_with or None,
+    }
 
 
 def _may_replace(folder: Path) -> bool:

@@ -1,0 +1,713 @@
+"""Friction, drive inertias and base parameters of a robot or planar arm by weighted least squares.
+
+The equation of motion M a + C v + g + friction = tau (contact-free) is linear in its parameters. It is used in its
+filtered, weak form: multiplied by a smooth window w(t) and integrated by parts,
+
+    -int w' p dt + int w (g - C'v + friction) dt = int w tau dt,      p = M v
+
+so that no acceleration is needed (Shinbrot, 1957; modulating functions). A window that meets a gap is no equation. Each
+joint's equations are weighted by its residual. Residuals are coloured: the standard errors come from leaving out blocks
+of the log, longer than the residuals are correlated (jackknife; MacKinnon and White, 1985).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.errors import UsageError
+from cdtool.identification.base_parameters import (
+    BaseParameterSet,
+    Grouping,
+    Range,
+    column_scale,
+    condition_number,
+    group_columns,
+    independent_norms,
+    random_rows,
+)
+from cdtool.identification.estimate import (
+    Estimate,
+    IdentificationError,
+    Identified,
+    Method,
+    Missing,
+    NotIdentifiable,
+)
+from cdtool.identification.robot_regressor import Column, Group, Regressor, regressor_of, with_bodies
+from cdtool.identification.robot_run import RobotRun
+from cdtool.machines.coupled import CoupledMachine
+from cdtool.machines.urdf_robot import UrdfRobot
+from cdtool.recording import BoolArray, FloatArray
+
+Index = npt.NDArray[np.int64]
+
+# A window has at least this many samples on either side of its centre: else its sums are no integrals.
+_FEWEST_BESIDE = 10
+# At rest dry friction takes any value: an equation of a joint that rests for more than this share of a window is left
+# out. A joint rests below its stick speed.
+_REST_SHARE = 0.1
+# Directions of the parameters that are excited less than this, relative to the most, keep the machine's values.
+_UNSEEN = 1e-9
+# A column of a joint, or an inertial one, that is independent of the others to less than this share of what it is in
+# random motion is not excited.
+_EXCITED, _EXCITED_INERTIAL = 0.1, 0.01
+# The standard error of an inertial parameter, or of all together, may make this share of a joint's torque in random
+# motion, that of a joint's friction or drive the other.
+_UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT = 0.1, 0.5
+# Columns are scaled to the same length: noise passes into a set with a larger condition number (Presse, Gautier, 1993).
+_WORST_CONDITION = 100.0
+# A block has at least this length [s] and this many correlation times of the residual; fewer blocks are no sample.
+_SHORTEST_BLOCK, _CORRELATION_TIMES, _FEWEST_BLOCKS = 0.5, 4.0, 8
+_FOLDS = 5
+_WEIGHT_PASSES = 3
+_BEST_SENSOR = 1e-3
+# Fewer equations of a joint than this are no motion of it.
+_FEWEST_EQUATIONS = 10
+# Of the samples in motion; below it, there is only one direction.
+_OTHER_DIRECTION = 0.05
+_UNITS = {
+    Group.DRIVE_INERTIA: ("kg m2", "kg"),
+    Group.VISCOUS: ("N m s/rad", "N s/m"),
+    Group.COULOMB: ("N m", "N"),
+    Group.CONSTANT: ("N m", "N"),
+    Group.LOAD: ("1", "1"),
+}
+_NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.LOAD)
+_DRY = (Group.COULOMB, Group.LOAD)
+# Slopes of dry friction that are tried [s/rad, s/m], and by how much the sum of squares must fall for a new one.
+_SLOPES = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+_CLEARLY_BETTER = 0.98
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotParameters:
+    """Which groups are identified; those that are not keep the machine's values.
+
+    `friction`: viscous and Coulomb; `offsets`: constant force; `inertial`: base inertial parameters; `load_friction`:
+    dry friction in proportion to the joint's gravity torque, which no machine file has. `slope`: a machine with a
+    coulomb_slope gets the one that fits best. `half_width` [s]: of the window, a zero-phase low-pass of about
+    0.5 / half_width Hz; at least ten samples. Raises UsageError.
+    """
+
+    friction: bool = True
+    offsets: bool = True
+    drive_inertia: bool = False
+    inertial: bool = False
+    load_friction: bool = False
+    slope: bool = True
+    half_width: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.half_width < math.inf:
+            raise UsageError(f"half_width is {self.half_width} s", "give a time above 0, as 0.1")
+        if not self.groups:
+            raise UsageError("no parameter is free", "free friction, offsets, drive_inertia or inertial")
+
+    @property
+    def groups(self) -> frozenset[Group]:
+        """Return the groups of columns that are free."""
+        free = {
+            Group.VISCOUS: self.friction,
+            Group.COULOMB: self.friction,
+            Group.CONSTANT: self.offsets,
+            Group.DRIVE_INERTIA: self.drive_inertia,
+            Group.INERTIAL: self.inertial,
+            Group.LOAD: self.load_friction,
+        }
+        return frozenset(group for group, is_free in free.items() if is_free)
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueError:
+    """RMS of the torque that the model does not explain, per joint (J,) [N m, N], through the window's low-pass.
+
+    `train`: on the runs it was identified from; `cross_validated`: on runs, or fifths of the only one, left out of the
+    identification; NaN for a joint without motion.
+    """
+
+    train: FloatArray
+    cross_validated: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Weighted equations of the runs: `rows` (m, B) of the base parameters, `torques` (m,), both times the weight.
+
+    `joints`, `times` [s], `runs` (m,): the joint, the window's centre and the index of the run of each.
+    """
+
+    rows: FloatArray
+    torques: FloatArray
+    joints: FloatArray
+    times: FloatArray
+    runs: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class RobotFit:
+    """The identified model of a robot.
+
+    `parameters` (P,): every column of the regressor, those not identified as in the machine; `base` and its `grouping`
+    for all free columns; `condition_number` of the scaled equations; `equations`, weighted by joint, for what further
+    restricts the parameters; `machine` as it was, but with the fitted slope of dry friction.
+    """
+
+    machine: CoupledMachine
+    parameters: FloatArray
+    columns: tuple[Column, ...]
+    grouping: Grouping
+    base: BaseParameterSet
+    identified: Identified
+    torque_error: TorqueError
+    condition_number: float
+    equations: Equations
+
+
+def identify_robot(runs: Sequence[RobotRun], machine: CoupledMachine, what: RobotParameters | None = None) -> RobotFit:
+    """Return the free parameters of a robot from contact-free runs.
+
+    `machine`: the robot with its own parameters, of which those that are not free are taken as known. Coulomb friction
+    has the machine's shape: tanh with its coulomb_slope, else a sign above its stick_speed. A parameter that these runs
+    do not determine is a NotIdentifiable: its column is not independent of the others in this motion, or its standard
+    error makes more than a tenth (of friction and drive: half) of a joint's torque in random motion. The full set of
+    base parameters must also have a condition number of at most 100. Raises IdentificationError without any motion,
+    UsageError for another machine.
+    """
+    what = what or RobotParameters()
+    regressor, slopes = regressor_of(machine), machine.coulomb_slope
+    free = tuple(i for i, column in enumerate(regressor.columns) if column.group in what.groups)
+    grouping = group_columns(regressor, free)
+    windows = _Windows(tuple(runs), grouping, what)
+    known = regressor.values
+    start = grouping.combination @ known[list(free)]
+    if what.slope and what.friction and any(machine.coulomb_slope):
+        machine = _with_best_slopes(machine, windows, start)
+        regressor = regressor_of(machine)
+    bounded = _bounds(regressor.columns, grouping)
+    solution = _Solution.of(windows.equations(regressor), start, bounded, len(machine.joints))
+    equations = solution.equations
+    parameters = known.copy()
+    parameters[list(grouping.base)] += solution.values - start
+    transfer = _Transfer.of(runs, regressor, grouping, solution)
+    base = _base_set(regressor.columns, grouping, solution, transfer)
+    condition = condition_number(equations.rows)
+    identified = _Judge(
+        runs, machine, regressor.columns, grouping, base, transfer, condition, solution, slopes
+    ).outcome()
+    return RobotFit(
+        machine=machine,
+        parameters=parameters,
+        columns=regressor.columns,
+        grouping=grouping,
+        base=base,
+        identified=identified,
+        torque_error=_torque_error(solution, start, machine),
+        condition_number=condition,
+        equations=equations,
+    )
+
+
+def predict_torque(fit: RobotFit, run: RobotRun) -> FloatArray:
+    """Return the torque (n, J) [N m, N] that the fitted model needs for a run's motion without contact.
+
+    The acceleration is the central derivative of the speed. NaN without it, and for a joint at rest (below its stick
+    speed), where dry friction is unknown.
+    """
+    machine, regressor, acceleration = fit.machine, regressor_of(fit.machine), run.acceleration()
+    torque = machine.required_torque(run.position, run.speed, acceleration)
+    change = fit.parameters - regressor.values
+    for column in np.flatnonzero(change).tolist():
+        torque += change[column] * regressor.torque(column, run.position, run.speed, acceleration)
+    torque[np.abs(run.speed) < np.array(machine.stick_speed)] = np.nan
+    return torque
+
+
+def fitted_robot(fit: RobotFit) -> UrdfRobot:
+    """Return the robot with all fitted parameters; raises UsageError for another machine than one from a URDF.
+
+    With free inertial parameters its motion as a whole is right; a single link may be unphysical, see
+    consistent_inertia.py.
+    """
+    machine = fit.machine
+    if not isinstance(machine, UrdfRobot):
+        raise UsageError(f"machine '{machine.name}': has no URDF", "fitted_robot is for type = 'urdf_robot'")
+    values = {group: np.array([fit.parameters[i] for i in _columns_of(fit, group)]) for group in Group}
+    ratio = np.array(machine.transmission_ratio)
+    tree = with_bodies(machine.tree, values[Group.INERTIAL])
+    drives = dict(zip(tree.order, values[Group.DRIVE_INERTIA].tolist(), strict=True))
+    joints = tuple(replace(joint, drive_inertia=drives[joint.name]) for joint in tree.joints)
+    return replace(
+        machine,
+        tree=replace(tree, joints=joints),
+        viscous_friction=tuple((values[Group.VISCOUS] * ratio**2).tolist()),
+        coulomb_friction=tuple((values[Group.COULOMB] * np.abs(ratio)).tolist()),
+        constant_force=tuple((values[Group.CONSTANT] * ratio).tolist()),
+    )
+
+
+def _columns_of(fit: RobotFit, group: Group) -> list[int]:
+    return [i for i, column in enumerate(fit.columns) if column.group is group]
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """w, and its derivative [1/s], on the samples of a run; `step` between two windows [samples]."""
+
+    weights: FloatArray
+    slope: FloatArray
+    step: int
+
+    @classmethod
+    def of(cls, half_width: float, period: float) -> Window:
+        """(1 - x^2)^4: its first three derivatives are continuous, so that sums are integrals to rounding."""
+        half = max(_FEWEST_BESIDE, round(half_width / period))
+        x = np.arange(-half, half + 1) / half
+        shape = (1.0 - x**2) ** 4
+        slope = -8.0 * x * (1.0 - x**2) ** 3 / (half * period)
+        total = float(shape.sum())
+        return cls(shape / total, slope / total, max(1, half // 2))
+
+    def average(self, values: FloatArray) -> FloatArray:
+        """Return int w x dt (K, J)."""
+        return self._sum(values, self.weights)
+
+    def rate(self, values: FloatArray) -> FloatArray:
+        """Return int w dx/dt dt = -int w' x dt (K, J)."""
+        return self._sum(values, -self.slope)
+
+    def _sum(self, values: FloatArray, weights: FloatArray) -> FloatArray:
+        if len(values) < len(weights):
+            return np.empty((0, values.shape[1]))
+        windows = np.lib.stride_tricks.sliding_window_view(values, len(weights), axis=0)[:: self.step]
+        return np.asarray(windows @ weights)
+
+
+def resting_windows(run: RobotRun, machine: CoupledMachine, window: Window) -> BoolArray:
+    """Return in which windows (K, J) a joint rests, so that its dry friction is unknown."""
+    rests = np.abs(np.nan_to_num(run.speed, nan=np.inf)) < np.array(machine.stick_speed)
+    return window.average(rests.astype(np.float64)) > _REST_SHARE
+
+
+class _Windows:
+    """The equations of the runs; what does not depend on the shape of dry friction is computed once."""
+
+    def __init__(self, runs: tuple[RobotRun, ...], grouping: Grouping, what: RobotParameters) -> None:
+        self._runs = runs
+        self._grouping = grouping
+        self._what = what
+        self._kept: dict[tuple[int, int], FloatArray] = {}
+
+    def equations(self, regressor: Regressor) -> Equations:
+        """Return all equations, unweighted; what is not free is subtracted. Raises IdentificationError, UsageError."""
+        machine, parts = regressor.machine, []
+        for index, run in enumerate(self._runs):
+            if run.joint_count != len(machine.joints):
+                raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
+            window = Window.of(self._what.half_width, run.period)
+            torque = window.average(run.torque) - self._known(index, regressor, window)
+            rows = np.stack([self._column(index, regressor, window, own) for own in self._grouping.base], axis=2)
+            valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
+            place, joint = np.nonzero(valid)
+            times = run.start + run.period * (place * window.step + len(window.weights) // 2)
+            parts.append(
+                (rows[valid], torque[valid], joint.astype(np.float64), times, np.full(len(place), 1.0 * index))
+            )
+        if not any(len(part[1]) for part in parts):
+            raise IdentificationError(
+                "no joint moves in these runs for longer than a window", "use runs with motion, without contact"
+            )
+        return Equations(*(np.concatenate(item) for item in zip(*parts, strict=True)))
+
+    def _column(self, index: int, regressor: Regressor, window: Window, column: int) -> FloatArray:
+        """Return the windows (K, J) of a column."""
+        key = index, column
+        if key in self._kept:
+            return self._kept[key]
+        momentum, rest = regressor.momentum(column, self._runs[index].position, self._runs[index].speed)
+        values = window.rate(momentum) + window.average(rest)
+        if regressor.columns[column].group not in _DRY:
+            self._kept[key] = values
+        return values
+
+    def _known(self, index: int, regressor: Regressor, window: Window) -> FloatArray:
+        """Return the windows' torques (K, J) of the parameters that are not free."""
+        run, free, values = self._runs[index], self._what.groups, regressor.values
+        total = np.zeros_like(window.average(run.position))
+        if Group.INERTIAL not in free:
+            momentum, velocity_force, gravity = regressor.machine.momentum_terms(run.position, run.speed)
+            total += window.rate(momentum) + window.average(gravity - velocity_force)
+        for column, item in enumerate(regressor.columns):
+            # The machine's momentum contains its drives.
+            contained = item.group is Group.DRIVE_INERTIA and Group.INERTIAL not in free
+            factor = (0.0 if item.group in free else 1.0) - (1.0 if contained else 0.0)
+            if item.group is not Group.INERTIAL and values[column] and factor:
+                total += factor * values[column] * self._column(index, regressor, window, column)
+        return total
+
+
+def _with_best_slopes(machine: CoupledMachine, windows: _Windows, start: FloatArray) -> CoupledMachine:
+    """Return the machine with the slope of each joint's dry friction that explains its torques clearly better."""
+    own = machine.coulomb_slope
+    equations = windows.equations(regressor_of(machine))
+    weights = _joint_weights(equations, start, len(own))
+    best, least = list(own), _squares(equations, start, weights) * _CLEARLY_BETTER
+    for slope in _SLOPES:
+        tried = replace(machine, coulomb_slope=tuple(slope if item else 0.0 for item in own))
+        squares = _squares(windows.equations(regressor_of(tried)), start, weights)
+        for joint, square in enumerate(squares.tolist()):
+            if own[joint] and square < least[joint]:
+                best[joint], least[joint] = slope, square
+    return replace(machine, coulomb_slope=tuple(best))
+
+
+def _squares(equations: Equations, start: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the sum of squares of each joint's residual (J,)."""
+    joints = equations.joints.astype(np.int64)
+    residual = equations.torques - equations.rows @ _solve(_weighted(equations, weights[joints]), start)
+    return np.asarray(np.bincount(joints, residual**2, minlength=len(weights)), dtype=np.float64)
+
+
+def _joint_weights(equations: Equations, start: FloatArray, count: int) -> FloatArray:
+    """Return 1 / RMS residual of each joint (J,), of at least a thousandth of its torque: no sensor is better."""
+    joints = equations.joints.astype(np.int64)
+    weights = np.ones(count)
+    for _ in range(_WEIGHT_PASSES):
+        residual = equations.torques - equations.rows @ _solve(_weighted(equations, weights[joints]), start)
+        for joint in np.unique(joints).tolist():
+            own = joints == joint
+            least = _BEST_SENSOR * _rms(equations.torques[own])
+            weights[joint] = 1.0 / max(_rms(residual[own]), least, 1e-300)
+    return weights
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _bounds(columns: tuple[Column, ...], grouping: Grouping) -> BoolArray:
+    """Return which base parameters cannot be negative (B,): those of drive and friction that stand alone."""
+    alone = [columns[item].group in _NOT_NEGATIVE and grouping.is_alone(item) for item in grouping.base]
+    return np.array(alone, dtype=np.bool_)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solution:
+    """Weighted least squares: `values` (B,), `unbounded` before negative ones became 0, `covariance` (B, B)."""
+
+    equations: Equations
+    weights: FloatArray
+    values: FloatArray
+    unbounded: FloatArray
+    covariance: FloatArray
+    block_count: int
+
+    @classmethod
+    def of(cls, plain: Equations, start: FloatArray, is_bounded: BoolArray, joint_count: int) -> _Solution:
+        weights = _joint_weights(plain, start, joint_count)
+        equations = _weighted(plain, weights[plain.joints.astype(np.int64)])
+        unbounded = _solve(equations, start)
+        values = _not_negative(equations, start, unbounded, is_bounded)
+        blocks = jackknife_blocks(equations, equations.torques - equations.rows @ unbounded)
+        covariance = jackknife_covariance(equations, unbounded, blocks)
+        return cls(equations, weights, values, unbounded, covariance, int(blocks.max()) + 1)
+
+
+def _weighted(plain: Equations, weights: FloatArray) -> Equations:
+    return replace(plain, rows=plain.rows * weights[:, np.newaxis], torques=plain.torques * weights)
+
+
+def _inverse(rows: FloatArray) -> FloatArray:
+    """Return (Y'Y)^-1 (B, B) without the directions that the rows do not contain; columns are scaled to length 1."""
+    scale = column_scale(rows)
+    upper = np.linalg.qr(rows * scale, mode="r")
+    _, values, right = np.linalg.svd(upper, full_matrices=False)
+    seen = values > _UNSEEN * max(float(values[0]), 1e-300)
+    basis = scale[:, np.newaxis] * right[seen].T / values[seen]
+    return np.asarray(basis @ basis.T)
+
+
+def _solve(equations: Equations, start: FloatArray) -> FloatArray:
+    """Return the parameters (B,); directions that the equations do not contain stay as at the start."""
+    scale = column_scale(equations.rows)
+    rest = equations.torques - equations.rows @ start
+    # The triangle has the same solution, in a fraction of the time.
+    upper: FloatArray = np.asarray(np.linalg.qr(np.column_stack((equations.rows * scale, rest)), mode="r"))
+    change = np.linalg.lstsq(upper[:, :-1], upper[:, -1], rcond=_UNSEEN)[0]
+    return np.asarray(start + scale * change)
+
+
+def _not_negative(equations: Equations, start: FloatArray, unbounded: FloatArray, is_bounded: BoolArray) -> FloatArray:
+    """Return the parameters with those that must not be negative at 0, one after another, the others fitted again."""
+    values, fixed = unbounded, np.zeros(len(start), dtype=np.bool_)
+    while True:
+        below = is_bounded & ~fixed & (values < 0.0)
+        if not below.any():
+            return values
+        fixed |= below
+        reduced = replace(equations, rows=equations.rows[:, ~fixed])
+        values = np.zeros(len(start))
+        values[~fixed] = _solve(reduced, start[~fixed])
+
+
+def jackknife_blocks(equations: Equations, residual: FloatArray) -> Index:
+    """Return the number of the block of each equation (m,): a time of one run, longer than residuals are correlated."""
+    length, duration = 0.0, 0.0
+    for run in np.unique(equations.runs):
+        own = equations.runs == run
+        duration += float(np.ptp(equations.times[own]))
+        for joint in np.unique(equations.joints[own]):
+            chosen = own & (equations.joints == joint)
+            length = max(length, _CORRELATION_TIMES * _correlation_time(equations.times[chosen], residual[chosen]))
+    length = max(_SHORTEST_BLOCK, min(length, duration / _FEWEST_BLOCKS))
+    labels = np.stack((equations.runs, np.floor((equations.times - _starts(equations)) / length)), axis=1)
+    return np.asarray(np.unique(labels, axis=0, return_inverse=True)[1]).ravel()
+
+
+def _starts(equations: Equations) -> FloatArray:
+    starts = np.empty(len(equations.times))
+    for run in np.unique(equations.runs):
+        own = equations.runs == run
+        starts[own] = equations.times[own].min()
+    return starts
+
+
+def _correlation_time(times: FloatArray, residual: FloatArray) -> float:
+    """Return the time [s] over which a residual is correlated: the sum of its autocorrelation up to its first zero."""
+    count = len(residual)
+    power = float(residual @ residual)
+    if count < 4 or power <= 0.0:
+        return 0.0
+    step = float(np.median(np.diff(times)))
+    total = 0.5
+    for lag in range(1, count // 2):
+        value = float(residual[:-lag] @ residual[lag:]) / power
+        if value <= 0.0:
+            break
+        total += value
+    return total * step
+
+
+def jackknife_covariance(equations: Equations, values: FloatArray, blocks: Index) -> FloatArray:
+    """Return the jackknife's covariance (B, B), from the fits without one block each; infinite below 3 blocks.
+
+    beta without block b = beta - (Y'Y)^-1 Y_b' (I - H_b)^-1 e_b with the leverage H_b = Y_b (Y'Y)^-1 Y_b'.
+    """
+    inverse = _inverse(equations.rows)
+    residual = equations.torques - equations.rows @ values
+    count = int(blocks.max()) + 1
+    if count < 3:
+        return np.full((len(values), len(values)), np.inf)
+    changes = np.empty((count, len(values)))
+    for block in range(count):
+        own = blocks == block
+        rows = equations.rows[own]
+        gain = inverse @ rows.T
+        left = np.eye(int(own.sum())) - rows @ gain
+        changes[block] = gain @ np.linalg.lstsq(left, residual[own], rcond=1e-10)[0]
+    changes -= changes.mean(axis=0)
+    return np.asarray((count - 1.0) / count * changes.T @ changes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Transfer:
+    """What the equations are worth for other motion: random poses at the speeds and accelerations of the runs.
+
+    `excitation` (B,): the independent part of each base column, per window, relative to that of random motion.
+    `uncertainty` (B,): the standard error of a parameter as a share of the torque in random motion, of the joint where
+    it is largest; `together`: that of all parameters.
+    """
+
+    excitation: FloatArray
+    uncertainty: FloatArray
+    together: float
+
+    @classmethod
+    def of(cls, runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, solution: _Solution) -> _Transfer:
+        machine = regressor.machine
+        stick = 10.0 * np.array(machine.stick_speed)
+        speed = np.max([_percentile(run.speed) for run in runs], axis=0)
+        acceleration = np.max([_percentile(run.acceleration()) for run in runs], axis=0)
+        limits = Range(tuple(np.maximum(speed, stick).tolist()), tuple(np.maximum(acceleration, stick).tolist()))
+        random = random_rows(regressor, grouping.base, limits).reshape(-1, len(stick), len(grouping.base))
+        flat = (random * solution.weights[:, np.newaxis]).reshape(-1, len(grouping.base))
+        equations = solution.equations
+        windows = len(np.unique(np.stack((equations.runs, equations.times)), axis=1).T)
+        wanted = independent_norms(flat) / math.sqrt(len(random))
+        seen = independent_norms(equations.rows) / math.sqrt(windows)
+        excitation = np.divide(seen, wanted, out=np.zeros_like(seen), where=wanted > 0.0)
+        # The torque of a joint, as a scale: what the model says, and at least what the runs had.
+        torque = np.sqrt(np.mean((random @ solution.values) ** 2, axis=0))
+        logged = np.sqrt(np.nanmean(np.concatenate([run.torque for run in runs]) ** 2, axis=0))
+        scale = np.maximum(torque, np.nan_to_num(logged)) + 1e-300
+        covariance = np.nan_to_num(solution.covariance, posinf=1e300)
+        single = np.sqrt(np.mean(random**2, axis=0)) * np.sqrt(np.diag(covariance)) / scale[:, np.newaxis]
+        variance = np.mean(np.einsum("njb,bc,njc->nj", random, covariance, random, optimize=True), axis=0)
+        together = float(np.max(np.sqrt(np.maximum(variance, 0.0)) / scale))
+        return cls(excitation, np.max(single, axis=0), together)
+
+
+def _percentile(values: FloatArray) -> FloatArray:
+    """Return the 99th percentile of |values| of each joint (J,); 0 without values."""
+    high = np.zeros(values.shape[1])
+    present = np.isfinite(values).any(axis=0)
+    if present.any():
+        high[present] = np.nanpercentile(np.abs(values[:, present]), 99.0, axis=0)
+    return high
+
+
+def _base_set(
+    columns: tuple[Column, ...], grouping: Grouping, solution: _Solution, transfer: _Transfer
+) -> BaseParameterSet:
+    inertial = [columns[i].group is Group.INERTIAL for i in grouping.base]
+    excited = transfer.excitation >= np.where(inertial, _EXCITED_INERTIAL, _EXCITED)
+    certain = transfer.uncertainty <= np.where(inertial, _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT)
+    trusted = excited & certain & (solution.block_count >= _FEWEST_BLOCKS)
+    return BaseParameterSet(
+        names=tuple(grouping.name(row, columns) for row in range(len(grouping.base))),
+        values=solution.values,
+        standard_errors=np.sqrt(np.diag(solution.covariance)),
+        excitation=transfer.excitation,
+        uncertainty=transfer.uncertainty,
+        identifiable=tuple(trusted.tolist()),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    """What of the free parameters the runs determine, and what would be needed for the rest."""
+
+    runs: Sequence[RobotRun]
+    machine: CoupledMachine
+    columns: tuple[Column, ...]
+    grouping: Grouping
+    base: BaseParameterSet
+    transfer: _Transfer
+    condition: float
+    solution: _Solution
+    slopes: tuple[float, ...]
+
+    def outcome(self) -> Identified:
+        """Return the estimates per joint, and one answer for the whole set of inertial parameters."""
+        estimates: list[Estimate] = []
+        missing: list[NotIdentifiable] = []
+        for joint, (before, slope) in enumerate(zip(self.slopes, self.machine.coulomb_slope, strict=True)):
+            if slope != before:
+                unit = "s/m" if self._slides(joint) else "s/rad"
+                estimates.append(
+                    Estimate("machine", "coulomb_slope", slope, math.nan, unit, Method.LEAST_SQUARES, joint)
+                )
+        for index in self.grouping.columns:
+            column = self.columns[index]
+            if column.group is Group.INERTIAL:
+                continue
+            found = self._of_joint(index, column)
+            if isinstance(found, Estimate):
+                estimates.append(found)
+            else:
+                missing.append(found)
+        missing.extend(self._of_set())
+        return Identified(tuple(estimates), tuple(missing))
+
+    def _of_joint(self, index: int, column: Column) -> Estimate | NotIdentifiable:
+        if not self.grouping.is_alone(index):
+            # A link's inertia takes the place of the rotor's in every motion.
+            return self._refused(column, (Missing.MOTOR_INERTIA,), {})
+        row = self.grouping.base.index(index)
+        if not self.base.identifiable[row]:
+            numbers = {
+                "excitation": float(self.base.excitation[row]),
+                "uncertain_torque_share": float(self.base.uncertainty[row]),
+                "blocks": float(self.solution.block_count),
+                "condition_number": self.condition,
+            }
+            return self._refused(column, self._needed(column, row), numbers)
+        value, error = float(self.base.values[row]), float(self.base.standard_errors[row])
+        unbounded = float(self.solution.unbounded[row])
+        if unbounded < -2.0 * error and value == 0.0:
+            # No noise explains this: the model, or the sign of a channel, is wrong.
+            return self._refused(column, (Missing.OTHER_MOTION,), {"least_squares": unbounded, "standard_error": error})
+        slides = self._slides(column.joint)
+        unit = _UNITS[column.group][slides]
+        return Estimate("machine", column.group.value, value, error, unit, Method.LEAST_SQUARES, column.joint)
+
+    def _refused(self, column: Column, missing: tuple[Missing, ...], numbers: dict[str, float]) -> NotIdentifiable:
+        return NotIdentifiable("machine", column.group.value, missing, numbers, column.joint)
+
+    def _needed(self, column: Column, row: int) -> tuple[Missing, ...]:
+        if self.base.excitation[row] >= _EXCITED:
+            return (Missing.MORE_RECORDINGS,)
+        speed = np.concatenate([run.speed[:, column.joint] for run in self.runs])
+        moving = speed[np.abs(speed) > self.machine.stick_speed[column.joint]]
+        if len(moving) < _FEWEST_EQUATIONS:
+            return (Missing.OTHER_MOTION,)
+        forward = float(np.mean(moving > 0.0))
+        if column.group in (Group.COULOMB, Group.CONSTANT) and min(forward, 1.0 - forward) < _OTHER_DIRECTION:
+            return (Missing.REVERSALS,)
+        if column.group is Group.DRIVE_INERTIA:
+            return (Missing.ACCELERATION,)
+        return (Missing.SECOND_SPEED,) if column.group is not Group.CONSTANT else (Missing.OTHER_MOTION,)
+
+    def _of_set(self) -> list[NotIdentifiable]:
+        """Return why the inertial base parameters are no complete set; empty if they are, or are not free."""
+        inertial = [row for row, i in enumerate(self.grouping.base) if self.columns[i].group is Group.INERTIAL]
+        if not inertial:
+            return []
+        unexcited = [row for row in inertial if not self.base.identifiable[row]]
+        is_certain = self.transfer.together <= _UNCERTAIN_TORQUE
+        if not unexcited and is_certain and self.condition <= _WORST_CONDITION:
+            return []
+        few_blocks = self.solution.block_count < _FEWEST_BLOCKS
+        numbers = {
+            "condition_number": self.condition,
+            "base_parameters": float(len(inertial)),
+            "not_determined": float(len(unexcited)),
+            "least_excitation": float(np.min(self.base.excitation[inertial])),
+            "uncertain_torque_share": self.transfer.together,
+            "blocks": float(self.solution.block_count),
+        }
+        needed = (Missing.OTHER_MOTION, Missing.MORE_RECORDINGS) if few_blocks else (Missing.OTHER_MOTION,)
+        return [NotIdentifiable("machine", "base_parameters", needed, numbers)]
+
+    def _slides(self, joint: int) -> bool:
+        if not isinstance(self.machine, UrdfRobot):
+            return False
+        tree = self.machine.tree
+        return next(item.prismatic for item in tree.joints if item.name == tree.order[joint])
+
+
+def _torque_error(solution: _Solution, start: FloatArray, machine: CoupledMachine) -> TorqueError:
+    equations = solution.equations
+    left_out = np.empty(len(equations.torques))
+    folds = _folds(equations)
+    for fold in np.unique(folds):
+        own = folds == fold
+        rest = replace(equations, rows=equations.rows[~own], torques=equations.torques[~own])
+        values = _solve(rest, start) if len(rest.torques) else start
+        left_out[own] = equations.torques[own] - equations.rows[own] @ values
+    explained = equations.torques - equations.rows @ solution.values
+    return TorqueError(_per_joint(explained, solution, machine), _per_joint(left_out, solution, machine))
+
+
+def _folds(equations: Equations) -> Index:
+    """Return the fold of each equation (m,): its run, or its fifth of the only one."""
+    if len(np.unique(equations.runs)) > 1:
+        return equations.runs.astype(np.int64)
+    start, length = float(equations.times.min()), float(np.ptp(equations.times))
+    if length == 0.0:
+        return np.zeros(len(equations.times), dtype=np.int64)
+    parts = np.floor(_FOLDS * (equations.times - start) / length).astype(np.int64)
+    return np.minimum(parts, _FOLDS - 1)
+
+
+def _per_joint(residual: FloatArray, solution: _Solution, machine: CoupledMachine) -> FloatArray:
+    error = np.full(len(machine.joints), np.nan)
+    for joint, weight in enumerate(solution.weights):
+        own = residual[solution.equations.joints == joint]
+        if len(own):
+            error[joint] = float(np.sqrt(np.mean(own**2))) / weight
+    return error

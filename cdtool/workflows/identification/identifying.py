@@ -1,0 +1,294 @@
+"""`cdtool identify`: parameters of a machine's model from its impact-free logs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from cdtool.axis_model.model_table import ModelTable, finite_values
+from cdtool.axis_model.parameters import Sensors
+from cdtool.bounded_loading import read_text
+from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.evaluation.truth.onset_rule import OnsetRule
+from cdtool.files import write_text
+from cdtool.identification.axis_run import AxisRun, axis_run
+from cdtool.identification.estimate import Estimate, IdentificationError, Method, NotIdentifiable
+from cdtool.identification.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
+from cdtool.identification.speed_controller import ControllerFit, ControllerSettings, identify_controller
+from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.machines.axis import Axis
+from cdtool.recording import Recording
+from cdtool.remote.remote_path import location
+from cdtool.tables import read_toml
+from cdtool.workflows.execution.workers import Progress, Workers
+from cdtool.workflows.identification.machine_update import MachineChange, changes_of, described_runs, updated_text
+from cdtool.workflows.runs import RunReading, find_logs, load_runs
+
+_CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
+
+
+@dataclass(frozen=True, eq=False)
+class JointIdentification:
+    """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
+
+    `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it.
+    """
+
+    joint: str
+    rigid: RigidAxisFit | None = None
+    two_mass: TwoMassFit | None = None
+    controller: ControllerFit | None = None
+    units: tuple[str, str, str, str] = ("kg", "N", "m", "N s/m")
+    has_torque_filter: bool = False
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Return the estimates that the machine file gets; the load's mass is that of the elastic drive, if known."""
+        found: dict[tuple[str, str], Estimate] = {}
+        for fit in (self.rigid, self.two_mass, self.controller):
+            for estimate in fit.identified.estimates if fit else ():
+                found[estimate.section, estimate.key] = estimate
+        return tuple(found.values())
+
+    @property
+    def together(self) -> tuple[Estimate, ...]:
+        """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
+        known = {(item.section, item.key) for item in self.estimates}
+        found: list[Estimate] = []
+        if self.two_mass:
+            numbers = {item.key: item.numbers for item in self.two_mass.identified.not_identifiable}
+            for key, unit in (("viscous", self.units[3]), ("static", self.units[1])):
+                if key in numbers:
+                    value = numbers[key]["value"]
+                    error = value * numbers[key]["relative_standard_error"]
+                    found.append(Estimate("model.friction", key, value, error, unit, Method.OUTPUT_ERROR))
+            found.append(_exact("model.friction", "stribeck_speed", self.two_mass.model.friction.stribeck_speed, "m/s"))
+        if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
+            # The difference of the directions contains the constant force: it must not count twice.
+            found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
+        fit = self.controller
+        if fit is not None and fit.controller is not None:
+            for key, value in finite_values(fit.controller).items():
+                if value or key == "speed_filter_order":
+                    found.append(_exact("model.controller", key, value, _CONTROLLER_UNITS.get(key, "")))
+            if math.isfinite(fit.lag) and fit.lag > 0.0 and not self.has_torque_filter:
+                found.append(_exact("model.sensors", "torque_filter_time", fit.lag, "s"))
+        return tuple(item for item in found if (item.section, item.key) not in known)
+
+    @property
+    def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
+        """Return the parameters that no method could identify."""
+        known = {(item.section, item.key) for item in self.estimates}
+        found: dict[tuple[str, str], NotIdentifiable] = {}
+        for fit in (self.rigid, self.two_mass, self.controller):
+            for item in fit.identified.not_identifiable if fit else ():
+                if (item.section, item.key) not in known:
+                    found.setdefault((item.section, item.key), item)
+        return tuple(found.values())
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedMachine:
+    """The identification of a machine: by joint, the changes of its file, and the text of the updated file."""
+
+    machine: str
+    joints: tuple[JointIdentification, ...]
+    changes: tuple[MachineChange, ...]
+    text: str
+    runs: tuple[str, ...]
+    skipped: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
+    written: str = ""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Return everything but the samples as JSON values."""
+        return {
+            "machine": self.machine,
+            "runs": list(self.runs),
+            "changes": [{**asdict(change), "method": change.method.value} for change in self.changes],
+            "joints": [_joint_summary(joint) for joint in self.joints],
+            "skipped": [asdict(item) for item in self.skipped],
+            "findings": [asdict(item) for item in self.findings],
+            "written": self.written or None,
+        }
+
+
+def identify(
+    logs: Sequence[str | Path],
+    machine: str | Path,
+    output: str | Path | None = None,
+    *,
+    force: bool = False,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> IdentifiedMachine:
+    """Identify the parameters of an axis's model from impact-free logs, and update its machine file.
+
+    Parameters
+    ----------
+    logs : sequence of str or Path
+        Impact-free logs; a log with a contact is left out.
+    machine : str or Path
+        The machine file: the motor's inertia and what is known of the sensors are used.
+    output : str or Path, optional
+        The machine file to write; may be `machine` itself. Every value has its standard error and origin as a
+        comment, and the old value.
+    force : bool, optional
+        Overwrite an existing file other than `machine`.
+    workers : Workers, optional
+        How the logs are read.
+    progress : callable, optional
+        Called after each log with the number done and the total.
+
+    Returns
+    -------
+    IdentifiedMachine
+        What was identified with standard errors, what these logs cannot show, and the changes of the machine file.
+
+    Raises
+    ------
+    IdentificationError
+        Nothing can be identified from these logs; nothing is written.
+    ConfigurationError
+        The machine file is wrong, or its machine has coupled joints.
+    SignatureError
+        No log is left.
+    UsageError
+        The output exists.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> logs = ["sample_logs/gate/free/*.csv"]
+    >>> done = cdtool.identify(logs, "sample_logs/gate/machine.toml", "identified.toml")
+    >>> [change.key for change in done.changes][:2]
+    ['load_mass', 'stiffness']
+    """
+    target = None if output is None else location(output)
+    path = location(machine)
+    if target is not None and target.exists() and not force and not _same(target, path):
+        raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
+    machine_file = read_machine_file(path)
+    if not isinstance(machine_file.machine, Axis):
+        raise ConfigurationError(
+            f"{path}: '{machine_file.machine.name}' has coupled joints", "identify a linear_axis or rotary_axis"
+        )
+    paths = find_logs(map(str, logs), Path(), "LOGS")
+    reading = RunReading("whole", onset=OnsetRule(), base=None, workers=workers or Workers(), progress=progress)
+    runs = load_runs(paths, machine_file, reading)
+    recordings = [operation.recording for operation in runs.operations]
+    if not recordings:
+        reason = runs.skipped[0].reason if runs.skipped else "no log is given"
+        raise IdentificationError(f"no impact-free log is left: {reason}", "give other logs")
+    count = len(machine_file.machine.joints)
+    joints = tuple(_identify_joint(machine_file, joint, recordings) for joint in range(count))
+    estimates = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.estimates]
+    together = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.together]
+    if not estimates:
+        reasons = [reason for joint in joints for reason in joint.refused.values()]
+        raise IdentificationError(
+            f"nothing can be identified from {len(recordings)} logs: {'; '.join(dict.fromkeys(reasons))}",
+            "see docs/identification.md for the motion that is needed",
+        )
+    changes = changes_of(machine_file.machine, read_toml(path, "a machine file"), estimates, together)
+    origin = described_runs(len(recordings), date.today().isoformat())
+    text = updated_text(read_text(path, ConfigurationError), changes, origin)
+    identified = IdentifiedMachine(
+        machine_file.machine.name,
+        joints,
+        changes,
+        text,
+        tuple(recording.name for recording in recordings),
+        runs.skipped,
+        runs.findings,
+    )
+    if target is None:
+        return identified
+    write_text(target, text)
+    return replace(identified, written=str(target))
+
+
+def _joint_summary(joint: JointIdentification) -> dict[str, Any]:
+    validation = joint.rigid.cross_validation if joint.rigid else None
+    return {
+        "joint": joint.joint,
+        "estimates": [{**asdict(item), "method": item.method.value} for item in joint.estimates],
+        "not_identifiable": [
+            {**asdict(item), "missing": [missing.name.lower() for missing in item.missing]}
+            for item in joint.not_identifiable
+        ],
+        "refused": dict(joint.refused),
+        "force_error_on_unseen_runs": validation
+        and {
+            "floor": validation.floor,
+            "repeats": validation.repeats,
+            "forms": {form.value: asdict(error) for form, error in validation.errors.items()},
+        },
+        "two_mass": joint.two_mass
+        and {
+            "condition_number": joint.two_mass.condition_number,
+            "nominal_friction": joint.two_mass.nominal_friction,
+            "relative_error": dict(joint.two_mass.relative_error),
+            "largest_wind_up": joint.two_mass.largest_wind_up,
+        },
+        "controller": joint.controller
+        and {"kind": joint.controller.kind.value, "residual_rms": joint.controller.residual_rms},
+    }
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.resolve() == other.resolve()
+
+
+def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[Recording]) -> JointIdentification:
+    machine: Any = machine_file.machine
+    name = machine.joints[joint]
+    refused: dict[str, str] = {}
+    runs: list[AxisRun] = []
+    for recording in recordings:
+        try:
+            runs.append(axis_run(recording, joint))
+        except RecordingError as fault:
+            refused.setdefault("log", str(fault))
+    if not runs:
+        return JointIdentification(name, refused=refused)
+    is_rotary = machine.force_unit != "N"
+    motor_mass = float(machine.reflected_inertia[joint])
+    table: ModelTable | None = machine_file.model
+    if motor_mass == 0.0 and table is not None:
+        motor_mass = table.of_joint("drive", joint).get("motor_mass", 0.0)
+    sensors = Sensors(**(table.of_joint("sensors", joint) if table else {}))
+    force, travel = ("N m", "rad") if is_rotary else ("N", "m")
+    mass = "kg m2" if is_rotary else "kg"
+    found: dict[str, Any] = {}
+    methods: dict[str, Callable[[], Any]] = {
+        "rigid": lambda: identify_rigid_axis(runs, motor_mass, RigidAxisSettings(rotary=is_rotary)),
+        "two_mass": lambda: identify_two_mass(
+            runs, TwoMassSettings(motor_mass=motor_mass, sensors=sensors, units=(mass, force, travel))
+        ),
+        "controller": lambda: identify_controller(
+            runs,
+            ControllerSettings(torque_filter_time=sensors.torque_filter_time or None, units=(force, travel)),
+        ),
+    }
+    for method, run_method in methods.items():
+        try:
+            found[method] = run_method()
+        except CdtoolError as fault:
+            refused[method] = str(fault)
+    units = (mass, force, travel, f"{force} s/{travel}")
+    return JointIdentification(
+        name, units=units, has_torque_filter=sensors.torque_filter_time > 0.0, refused=refused, **found
+    )
+
+
+def _exact(section: str, key: str, value: float, unit: str) -> Estimate:
+    return Estimate(section, key, value, math.nan, unit, Method.OUTPUT_ERROR)

@@ -1,0 +1,161 @@
+"""Write identified parameters into the text of a machine file: values, standard errors and origin, old values kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cdtool.dynamics import Machine
+from cdtool.identification.estimate import Estimate, Method
+from cdtool.machines.axis import Axis
+from cdtool.plain_text import counted, digits
+
+# Keys of whole numbers.
+_WHOLE = ("speed_filter_order",)
+# Digits of a written value beyond the first digit of its standard error.
+_MORE_DIGITS = 1
+_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class MachineChange:
+    """A value of the machine file: the key's table, name, old values (None where it was not given) and new ones.
+
+    `values`, `standard_errors` in `unit` as the file has them: friction of [machine] at the motor in motor coordinates.
+    One per joint; a joint without a new value keeps the old one. A value that is not `is_known_alone` belongs to the
+    other values of its table: together they describe the logs.
+    """
+
+    section: str
+    key: str
+    old: tuple[float | None, ...]
+    values: tuple[float, ...]
+    standard_errors: tuple[float, ...]
+    unit: str
+    method: Method
+    is_known_alone: bool = True
+
+    @property
+    def is_change(self) -> bool:
+        """Whether a value differs from the old one by more than it is written with."""
+        pairs = zip(self.old, self.values, strict=True)
+        return any(old is None or not math.isclose(old, value, rel_tol=1e-6) for old, value in pairs)
+
+
+def changes_of(
+    machine: Machine, given: Mapping[str, Any], estimates: Sequence[Estimate], together: Sequence[Estimate] = ()
+) -> tuple[MachineChange, ...]:
+    """Return the changes to a machine file with the values `given` that the estimates make, in their order.
+
+    The estimates `together` are not identifiable alone.
+    """
+    return (*_changes(machine, given, estimates, True), *_changes(machine, given, together, False))
+
+
+def _changes(
+    machine: Machine, given: Mapping[str, Any], estimates: Sequence[Estimate], alone: bool
+) -> list[MachineChange]:
+    joints = len(machine.joints)
+    grouped: dict[tuple[str, str], dict[int, Estimate]] = {}
+    for estimate in estimates:
+        grouped.setdefault((estimate.section, estimate.key), {})[estimate.joint] = estimate
+    changes = []
+    for (section, name), by_joint in grouped.items():
+        key = _key_in_file(machine, section, name)
+        old = _old_values(given, section, key, joints)
+        values, errors = [], []
+        for joint in range(joints):
+            estimate_here = by_joint.get(joint)
+            factor = _factor(machine, section, name, joint)
+            values.append((old[joint] or 0.0) if estimate_here is None else estimate_here.value * factor)
+            errors.append(math.nan if estimate_here is None else estimate_here.standard_error * abs(factor))
+        first = next(iter(by_joint.values()))
+        unit = _unit_in_file(machine, section, name, first.unit)
+        changes.append(
+            MachineChange(
+                section, key, old, tuple(map(_rounded, values, errors)), tuple(errors), unit, first.method, alone
+            )
+        )
+    return changes
+
+
+def updated_text(text: str, changes: Sequence[MachineChange], origin: str) -> str:
+    """Return the text of a machine file with the changes, each with a comment; everything else is kept.
+
+    `origin` states the logs and the day, for example "14 runs, 2026-11-27".
+    """
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    for change in changes:
+        table: Any = document
+        for name in change.section.split("."):
+            if name not in table:
+                table[name] = tomlkit.table(is_super_table=name == "model")
+            table = table[name]
+        value: Any = change.values[0] if len(set(change.values)) == 1 else list(change.values)
+        before = table.get(change.key)
+        item = tomlkit.item(int(value) if change.key in _WHOLE else value)
+        item.comment(_comment(change, before, origin))
+        table[change.key] = item
+    return tomlkit.dumps(document)
+
+
+def _comment(change: MachineChange, before: Any, origin: str) -> str:
+    errors = [digits(float(f"{item:.2g}")) if math.isfinite(item) else "-" for item in change.standard_errors]
+    spread = errors[0] if len(set(errors)) == 1 else f"[{', '.join(errors)}]"
+    parts = [f"+- {spread} {change.unit}" if spread != "-" else change.unit, change.method.value, origin]
+    was = ""
+    if before is not None:
+        earlier = before.trivia.comment.strip("# ") if hasattr(before, "trivia") else ""
+        plain = before.unwrap() if hasattr(before, "unwrap") else before
+        was = f"; was {plain}" + (f" ({earlier})" if earlier else "")
+    if not change.is_known_alone:
+        parts.append("valid only together with the other values of this table")
+    return ", ".join(part for part in parts if part) + was
+
+
+def _rounded(value: float, error: float) -> float:
+    """Return a value with one digit more than its standard error has, and at least six."""
+    if not math.isfinite(error) or error <= 0.0 or value == 0.0:
+        return float(f"{value:.{_DIGITS}g}")
+    needed = math.ceil(math.log10(abs(value) / error)) + 1 + _MORE_DIGITS
+    return float(f"{value:.{max(needed, _DIGITS)}g}")
+
+
+def _key_in_file(machine: Machine, section: str, name: str) -> str:
+    return str(getattr(machine, "inertia_key", name)) if (section, name) == ("machine", "load_mass") else name
+
+
+def _old_values(given: Mapping[str, Any], section: str, key: str, joints: int) -> tuple[float | None, ...]:
+    table: Any = given
+    for name in section.split("."):
+        table = table.get(name, {})
+    value = table.get(key)
+    if isinstance(value, list):
+        return tuple(float(item) for item in value)
+    return (None if value is None else float(value),) * joints
+
+
+# How a load-side value of [machine] is written in motor coordinates: times the transmission ratio to this power.
+_POWERS = {"viscous_friction": 2, "coulomb_friction": 1, "constant_force": 1}
+
+
+def _factor(machine: Machine, section: str, name: str, joint: int) -> float:
+    if section != "machine" or not isinstance(machine, Axis) or machine.coordinates != "motor":
+        return 1.0
+    ratio = machine.transmission_ratio[joint]
+    return {2: ratio**2, 1: abs(ratio) if name == "coulomb_friction" else ratio}.get(_POWERS.get(name, 0), 1.0)
+
+
+def _unit_in_file(machine: Machine, section: str, name: str, unit: str) -> str:
+    if section != "machine" or not isinstance(machine, Axis) or machine.coordinates != "motor" or name not in _POWERS:
+        return unit
+    return "N m s/rad" if name == "viscous_friction" else "N m"
+
+
+def described_runs(count: int, day: str) -> str:
+    """Return the origin of identified values in words."""
+    return f"{counted(count, 'run')}, {day}"
