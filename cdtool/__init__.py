@@ -20,6 +20,7 @@ Every command is available as a function:
     cdtool.plan(missed_at_most="5%")                                    -> Plan
     cdtool.identify(logs, "machine.toml", "machine.toml")               -> IdentifiedMachine: parameters with errors
     cdtool.inject("benchmark.toml", "injected")                         -> Injected: impacts made from impact-free logs
+    cdtool.coverage("benchmark.toml")                                   -> Coverage: latency over position and stiffness
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
     cdtool.study_sensors("machine.toml", ...)                           -> SensorStudy
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.benchmark.benchmark import benchmark
     from cdtool.workflows.comparing import compare
     from cdtool.workflows.convert.converting import convert
+    from cdtool.workflows.coverage import coverage
     from cdtool.workflows.detection import detect, detect_runs
     from cdtool.workflows.explaining import explain, explain_runs
     from cdtool.workflows.identification.identifying import identify
@@ -59,6 +61,7 @@ _API = {
     "learn_signature": "cdtool.workflows.signature.learning:learn_signature",
     "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
     "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
+    "coverage": "cdtool.workflows.coverage:coverage",
     "detect": "cdtool.workflows.detection:detect",
     "detect_runs": "cdtool.workflows.detection:detect_runs",
     "explain": "cdtool.workflows.explaining:explain",
@@ -85,6 +88,7 @@ __all__ = [
     "check_signature",
     "compare",
     "convert",
+    "coverage",
     "detect",
     "detect_runs",
     "explain",

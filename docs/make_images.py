@@ -71,6 +71,13 @@ def budget(work: Path) -> None:
         shutil.copyfile(work / name, IMAGES / name)
 
 
+def coverage(_: Path) -> None:
+    """The coverage map of the sample gate."""
+    logs = ROOT / "sample_logs" / "gate"
+    detectors = ("--detectors", "pi,feekf,gm,pt")
+    cdtool("coverage", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
+
+
 def season(work: Path) -> None:
     """An obstruction that grows over a season of simulated runs, as docs/signature.md has it."""
     cdtool("simulate", "gate", "-o", "gate", "--free", 14, "--holdout", 40, "--stiff", 0, "--soft", 0, folder=work)
@@ -114,7 +121,8 @@ def main() -> int:
     IMAGES.mkdir(exist_ok=True)
     arm = DATA / "ur10e"
     samples = ROOT / "sample_logs" / "gate"
-    sources = {gate: samples, budget: samples, season: samples, emps: DATA / "emps", ur10e: arm, ur10e_momentum: arm}
+    sources = dict.fromkeys((gate, budget, season, coverage), samples)
+    sources |= {emps: DATA / "emps", ur10e: arm, ur10e_momentum: arm}
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for make, needed in sources.items():
             if needed.is_dir():

@@ -38,6 +38,7 @@ COMMANDS: Mapping[str, str] = {
     "plan": "cdtool.cli.plan:plan",
     "identify": "cdtool.cli.identify:identify",
     "inject": "cdtool.cli.inject:inject",
+    "coverage": "cdtool.cli.coverage:coverage",
     "convert": "cdtool.cli.convert:convert",
     "recover": "cdtool.cli.recover:recover",
     "list": "cdtool.cli.list_known:list_known",

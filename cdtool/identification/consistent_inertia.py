@@ -11,6 +11,7 @@ torques do not determine the parameters of single links. Needs the extra cdtool[
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -27,11 +28,14 @@ from cdtool.recording import FloatArray
 _PER_BODY = len(BODY_PARAMETERS)
 # The least eigenvalue of a scaled pseudo-inertia, as a share of the robot's mass: the solver ends within 1e-8.
 _MARGIN = 1e-7
+# A body is flat below this eigenvalue of its pseudo-inertia, scaled to a diagonal of 1.
+_FLAT = 1e-12
 # How much the distance to the machine's parameters counts beside the residual.
 _NEARNESS = 1e-8
 _NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.LOAD)
 # Relative to the torques: a rise of the residual below it is the solver's.
 _ROUNDING = 1e-7
+_TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,7 @@ def is_consistent(parameters: FloatArray) -> bool:
         return False
     # Scaled to a diagonal of 1: the eigenvalues of P have different units.
     scale = 1.0 / np.sqrt(diagonal)
-    return bool(np.linalg.eigvalsh(matrix * np.outer(scale, scale))[0] > 0.0)
+    return bool(np.linalg.eigvalsh(matrix * np.outer(scale, scale))[0] > _FLAT)
 
 
 def consistent_fit(fit: RobotFit) -> ConsistentFit:
@@ -180,10 +184,13 @@ class _Problem:
     def _solved(self, objective: Any, constraints: list[Any], pi: Any) -> FloatArray | None:
         """Return the parameters in SI units; None if the problem has no solution."""
         problem = self._cvxpy.Problem(objective, constraints)
-        try:
-            problem.solve(solver=self._cvxpy.CLARABEL, tol_gap_abs=1e-13, tol_gap_rel=1e-13, tol_feas=1e-12)
-        except self._cvxpy.SolverError:
-            return None
+        with warnings.catch_warnings():
+            # That a solution may be inaccurate: whether it is consistent is checked.
+            warnings.simplefilter("ignore", UserWarning)
+            try:
+                problem.solve(solver=self._cvxpy.CLARABEL, **_TOLERANCES)
+            except self._cvxpy.SolverError:
+                return None
         if problem.status not in ("optimal", "optimal_inaccurate") or pi.value is None:
             return None
         values = np.asarray(pi.value, dtype=np.float64)

@@ -20,9 +20,8 @@ _DISTINCT = 1.25
 SPEEDS_NEEDED = 3
 # A direction counts if this share of the moving time is spent in it.
 _DIRECTION_SHARE = 0.05
-# The acceleration must be this many times its own noise, and above this share of that which reaches the highest speed
-# within the moving time.
-_ABOVE_NOISE = 3.0
+# The root mean square of the acceleration, noise included, must be this many times that of the noise.
+_ABOVE_NOISE = 1.1
 # Slow motion: below this share of the highest speed, for this share of the moving time.
 _SLOW_SPEED, _SLOW_SHARE = 0.1, 0.01
 

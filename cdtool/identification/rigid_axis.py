@@ -39,6 +39,8 @@ _FEWEST_EQUATIONS = 50
 _MASS_ERROR, _VISCOUS_ERROR, _COULOMB_ERROR, _STRIBECK_ERROR = 0.5, 0.3, 0.5, 0.5
 # Strokes are the blocks of the standard errors; with fewer per direction they are cut into this many pieces.
 _ENOUGH_STROKES, _PIECES = 3, 6
+# Acceleration with this share of noise [-] is not fitted by least squares, which would lower the mass by its square.
+_NOISY = 0.2
 # Stribeck speeds that are tried, as shares of the highest speed.
 _STRIBECK_SHARES = (0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 # A Stribeck speed this close to the lowest that is tried is not resolved: it stands for the smoothed sign [-].
@@ -61,11 +63,11 @@ class RigidAxisSettings:
     """How a rigid axis is identified.
 
     `low_pass_hz`: corner of the low-pass of every term. `unknown_speed` [m/s, rad/s]: see `filter_run`. `method`:
-    LEAST_SQUARES or INSTRUMENTAL_VARIABLES; None is the latter if every run has a reference. Without references the
-    instruments are the measured signals, delayed. `stribeck`: fit static friction and Stribeck speed too; the other
-    parameters then belong to them. `prediction`: the friction of `predict_force`; None is the one with the smallest
-    error in cross-validation, or COULOMB_VISCOUS without it. `rotary`: the units of the estimates. `seed`: of the
-    random friction profiles of the standard errors.
+    LEAST_SQUARES or INSTRUMENTAL_VARIABLES; None is the latter if every run has a reference, or if the acceleration is
+    noisy. Without references the instruments are the measured signals, delayed. `stribeck`: fit static friction and
+    Stribeck speed too; the other parameters then belong to them. `prediction`: the friction of `predict_force`; None is
+    the one with the smallest error in cross-validation, or COULOMB_VISCOUS without it. `rotary`: the units of the
+    estimates. `seed`: of the random friction profiles of the standard errors.
     """
 
     low_pass_hz: float = 20.0
@@ -384,7 +386,9 @@ def _instruments(run: FilteredRun, columns: FloatArray, method: Method | None) -
 def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings: RigidAxisSettings) -> _Equations:
     columns = [_columns(run.acceleration, run.speed, run.low_pass.value(run.sign)) for run in filtered]
     have_reference = all(run.reference_speed is not None for run in filtered)
-    method = settings.method or (Method.INSTRUMENTAL_VARIABLES if have_reference else Method.LEAST_SQUARES)
+    is_noisy = excitation.acceleration_noise > _NOISY * excitation.acceleration
+    preferred = Method.INSTRUMENTAL_VARIABLES if have_reference or is_noisy else Method.LEAST_SQUARES
+    method = settings.method or preferred
     if method is Method.INSTRUMENTAL_VARIABLES and not have_reference:
         filtered = [replace(run, reference_speed=None, inner_reference_speed=None) for run in filtered]
     instruments = [_instruments(run, column, method) for run, column in zip(filtered, columns, strict=True)]
@@ -466,7 +470,8 @@ def _with_noise_error(solution: _Solution, excitation: Excitation) -> _Solution:
     """Add to the mass's error what noise in the acceleration takes from it by least squares: the share of its power."""
     if solution.method is not Method.LEAST_SQUARES or not excitation.acceleration > 0.0:
         return solution
-    lost = abs(solution.mass) * (excitation.acceleration_noise / excitation.acceleration) ** 2
+    share = (excitation.acceleration_noise / excitation.acceleration) ** 2
+    lost = abs(solution.mass) * share / (1.0 - share) if share < 1.0 else math.inf
     return replace(solution, mass_error=math.hypot(solution.mass_error, lost))
 
 

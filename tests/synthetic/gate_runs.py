@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -41,6 +42,7 @@ def free_recording(gate: GateParameters, seed: int, number: int, *, references: 
     return recording if references else without_references(recording)
 
 
-def free_runs(gate: GateParameters, seed: int, count: int, *, references: bool = True) -> list[AxisRun]:
+@cache
+def free_runs(gate: GateParameters, seed: int, count: int, *, references: bool = True) -> tuple[AxisRun, ...]:
     recordings = (free_recording(gate, seed, number, references=references) for number in range(count))
-    return [axis_run(ON_LOAD_SIDE.referred_to_load(recording)) for recording in recordings]
+    return tuple(axis_run(ON_LOAD_SIDE.referred_to_load(recording)) for recording in recordings)

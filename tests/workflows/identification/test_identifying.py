@@ -65,12 +65,12 @@ def test_what_one_speed_in_one_direction_does_not_show_is_said(identified: tuple
 
 
 def test_the_command_shows_changes_and_what_is_missing(tmp_path: Path) -> None:
-    done = command("identify", GATE / "free" / "*.csv", "-m", GATE / "machine.toml", "-o", tmp_path / "m.toml")
+    done = command("identify", GATE / "free" / "0[3-5].csv", "-m", GATE / "machine.toml", "-o", tmp_path / "m.toml")
     assert done.status == 0
     assert "machine.load_mass" in done.out
     assert "not identifiable: machine.viscous_friction: add runs at a second speed" in done.out
     assert f"written: {tmp_path / 'm.toml'}" in done.out
-    as_json = command("identify", GATE / "free" / "*.csv", "-m", GATE / "machine.toml", "--json")
+    as_json = command("identify", GATE / "free" / "0[3-5].csv", "-m", GATE / "machine.toml", "--json")
     values = json.loads(as_json.out)
     assert values["written"] is None
     assert {item["key"] for item in values["joints"][0]["estimates"]} >= {"load_mass", "stiffness", "speed_gain"}
@@ -85,9 +85,8 @@ def test_an_existing_file_is_kept_unless_it_is_the_machine_file_itself(tmp_path:
     assert other.read_text(encoding="utf-8") == "mine"
     own = tmp_path / "machine.toml"
     shutil.copy(GATE / "machine.toml", own)
-    cdtool.identify(logs, own, own)
     again = cdtool.identify(logs, own, own)
-    assert again.text.count("was ") > 5  # every value knows the one before it
+    assert again.text == own.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("kind", ["stiff", "soft"])
