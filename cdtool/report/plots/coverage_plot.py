@@ -30,8 +30,8 @@ def plot_coverage(coverage: CoverageMap, machine: str, path: Path) -> None:
     with drawing():
         rows = math.ceil(len(coverage.cells) / _COLUMNS)
         columns = min(_COLUMNS, len(coverage.cells))
-        width = max(2.8, 0.58 * len(coverage.positions) + 0.9)
-        height = max(2.0, 0.36 * len(coverage.stiffnesses) + 0.8)
+        width = max(2.8, 0.5 * len(coverage.positions) + 0.9)
+        height = max(2.0, 0.34 * len(coverage.stiffnesses) + 0.8)
         figure = new_figure(columns * width + 0.8, rows * height + 0.5)
         panels = np.atleast_1d(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)).ravel()
         norm = _scale(coverage)
