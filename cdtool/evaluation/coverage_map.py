@@ -23,7 +23,7 @@ class CellKey:
 
 @dataclass(frozen=True)
 class Cell:
-    """The contacts of one cell: their number, those missed and not assessable, and what became of the others.
+    """The contacts of one cell: their number, those missed and not assessable, and the outcome of the others.
 
     `latency_ms`: mean of the detected contacts, `standard_error_ms` of it from log to log (NaN below two), `range_ms`:
     least and greatest mean of the assumptions about an unknown controller, equal to the mean with a known one.
@@ -40,7 +40,7 @@ class Cell:
     unreliable: int
 
     @property
-    def is_blind(self) -> bool:
+    def misses_most(self) -> bool:
         """Whether most of the assessable contacts are missed."""
         return 2 * self.missed > self.contacts - self.not_assessable > 0
 

@@ -35,7 +35,7 @@ from cdtool.recording import BoolArray, FloatArray
 
 SECTION = "model.controller"
 
-# A section with fewer samples than this says nothing of an integral.
+# A section with fewer samples than this does not show an integral.
 _FEWEST_SAMPLES = 100
 # The first samples of a section are simulated, not compared: the filters' states are not known there.
 _SETTLING_SAMPLES = 20
@@ -703,7 +703,7 @@ def _smoothed(values: FloatArray, keep: float) -> FloatArray:
 
 
 def _quantum(values: FloatArray) -> float:
-    """Return the resolution of logged values: the smallest step between two of them that is no rounding of doubles."""
+    """Return the resolution of logged values: the smallest step between two of them beyond rounding."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > 1e-9 * max(float(np.max(np.abs(values), initial=0.0)), 1e-300)]
     return float(np.min(steps, initial=math.inf)) if len(steps) else 0.0

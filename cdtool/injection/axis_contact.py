@@ -24,7 +24,7 @@ from cdtool.identification.axis_run import AxisRun
 from cdtool.injection.channel_change import ChannelChange
 from cdtool.recording import FloatArray
 
-# The forces of an injected contact are reliable for so long [s]: afterwards the model's own error dominates.
+# Time after contact [s] at which the model's own error begins to dominate the forces.
 RELIABLE_FOR = 0.2
 # What is simulated before the contact where the axis is never at rest before it [s].
 _LONGEST_APPROACH = 30.0

@@ -32,7 +32,7 @@ def test_the_series_stiffness_widens_each_point_by_its_force() -> None:
         ((0.0, float("nan")), (0.0, 1.0), "turns back"),
     ],
 )
-def test_a_curve_that_is_no_force_curve_is_refused(
+def test_a_curve_that_is_not_a_force_curve_is_refused(
     deflection: tuple[float, ...], force: tuple[float, ...], message: str
 ) -> None:
     with pytest.raises(ConfigurationError, match=message):

@@ -51,14 +51,14 @@ def test_brackets_are_a_range_and_their_difference_is_no_scatter() -> None:
     assert cell.uncertainty_ms == pytest.approx(20.0 + math.sqrt(2.0))
 
 
-def test_a_cell_is_blind_where_most_assessable_contacts_are_missed() -> None:
+def test_a_cell_misses_most_if_more_than_half_of_its_assessable_contacts_are_missed() -> None:
     names = dict.fromkeys("abcd", (NEAR, "known"))
     rows = [row("a", None, "missed"), row("b", None, "missed"), row("c", 50.0), row("d", None, "not_assessable")]
     cell = made(rows, names).cells["gm"][NEAR]
-    assert cell.is_blind
+    assert cell.misses_most
     assert (cell.missed, cell.not_assessable) == (2, 1)
     only = made([row("a", None, "not_assessable")], names).cells["gm"][NEAR]
-    assert not only.is_blind
+    assert not only.misses_most
     assert math.isnan(only.latency_ms)
 
 

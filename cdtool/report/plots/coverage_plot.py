@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _COLUMNS = 2
 # Pale for fast, dark for slow, distinct in grey print.
 _COLOURS = "viridis_r"
-_BLIND = "0.25"
+_MISSED = "0.25"
 _TICKS = (1, 2, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000, 2000)
 
 
@@ -86,7 +86,7 @@ def _write(axes: Axes, cell: Cell, at: tuple[int, int], norm: Any) -> None:
     if cell.missed:
         from matplotlib.patches import Rectangle
 
-        face = _BLIND if cell.is_blind else "none"
+        face = _MISSED if cell.misses_most else "none"
         axes.add_patch(
             Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, hatch="////", facecolor=face, edgecolor="0.6", zorder=2)
         )
@@ -98,5 +98,5 @@ def _write(axes: Axes, cell: Cell, at: tuple[int, int], norm: Any) -> None:
         text = f"{cell.missed} of {cell.contacts}\nmissed"
     elif math.isfinite(cell.force_n):
         text += f"\n{cell.force_n:.0f} N"
-    dark = cell.is_blind or (math.isfinite(cell.latency_ms) and norm(max(cell.latency_ms, 1.0)) > 0.45)
+    dark = cell.misses_most or (math.isfinite(cell.latency_ms) and norm(max(cell.latency_ms, 1.0)) > 0.45)
     axes.text(column, row, text, ha="center", va="center", fontsize=6.0, color="white" if dark else "black", zorder=3)

@@ -35,7 +35,7 @@ def gate(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_stiffer_the_obstacle_the_sooner_and_inertia_is_blind_to_soft_ones(gate: Path) -> None:
+def test_the_stiffer_the_obstacle_the_sooner_and_inertia_misses_soft_ones(gate: Path) -> None:
     done = cdtool.coverage(gate / "coverage.toml")
     made = done.map
     assert made.positions == (0.3, 1.2)
@@ -44,7 +44,7 @@ def test_the_stiffer_the_obstacle_the_sooner_and_inertia_is_blind_to_soft_ones(g
         cells = [made.cells["momentum"][CellKey(position, stiffness)] for stiffness in made.stiffnesses]
         assert cells[0].latency_ms > cells[1].latency_ms > cells[2].latency_ms
     assert all(cell.contacts == 2 and not cell.missed for cell in made.cells["momentum"].values())
-    assert all(cell.is_blind for key, cell in made.cells["pure_inertia"].items() if key.stiffness == 5e3)
+    assert all(cell.misses_most for key, cell in made.cells["pure_inertia"].items() if key.stiffness == 5e3)
 
 
 def test_the_command_draws_the_map_and_prints_a_table(gate: Path) -> None:
