@@ -34,6 +34,7 @@ from accuracy import written_setup
 from timing import environment, table
 
 from cdtool.activation import Activation
+from cdtool.axis_model.sensor_filters import first_order_low_pass
 from cdtool.detection import Signal
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.explanation.explanation import AlarmExplanation, explain_alarm
@@ -43,7 +44,7 @@ from cdtool.motion import motion_class
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, run_detector
 from cdtool.recording import MEASURED, Recording, Series
-from cdtool.simulation import arm_recordings, gate_recordings, sensors
+from cdtool.simulation import arm_recordings, gate_recordings
 from cdtool.simulation.arm_model import simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters
 from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
@@ -194,7 +195,7 @@ class CountedSpeed:
         for k in range(1, len(held)):
             held[k] = np.where(np.isfinite(held[k]), held[k], held[k - 1])
         speed = np.diff(held, axis=0, prepend=held[:1]) / position.period
-        columns = [sensors.low_pass(speed[:, j], 1.0 / self.cutoff, position.period) for j in range(speed.shape[1])]
+        columns = [first_order_low_pass(speed[:, j], 1.0 / self.cutoff, position.period) for j in range(speed.shape[1])]
         values = np.column_stack(columns)
         return Signal(position.time, values, np.zeros(values.shape, dtype=np.uint8), self.unit(machine), self.signed)
 
@@ -251,7 +252,7 @@ def pulse(time: Array, begin: float, length: float, smooth: float) -> Array:
     shape = ((time >= begin) & (time < begin + length)).astype(float)
     if not shape.any():
         shape[min(int(np.searchsorted(time, begin)), len(time) - 1)] = 1.0
-    return sensors.low_pass(shape, smooth, float(np.median(np.diff(time)))) if smooth else shape
+    return first_order_low_pass(shape, smooth, float(np.median(np.diff(time)))) if smooth else shape
 
 
 def with_added(recording: Recording, channel: str, joint: int, added: Callable[[Array], Array]) -> Recording:

@@ -71,9 +71,10 @@ def budget(work: Path) -> None:
         shutil.copyfile(work / name, IMAGES / name)
 
 
-def coverage(_: Path) -> None:
-    """The coverage map of the sample gate."""
-    logs = ROOT / "sample_logs" / "gate"
+def coverage(work: Path) -> None:
+    """The coverage map of the sample gate, in a copy of its folder: the injected recordings are many."""
+    logs = work / "coverage"
+    shutil.copytree(ROOT / "sample_logs" / "gate", logs)
     detectors = ("--detectors", "pi,feekf,gm,pt")
     cdtool("coverage", "coverage.toml", *detectors, "--jobs", 2, "-o", IMAGES / "coverage.png", folder=logs)
 

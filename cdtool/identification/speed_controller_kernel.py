@@ -37,16 +37,17 @@ INPUTS = ("reference_speed", "position_error", "raw_speed")
 
 
 @kernel(
-    "void(UniTuple(float64, 13), int64[::1], float64[::1], float64[:, ::1], float64[::1])",
+    "void(UniTuple(float64, 13), int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1])",
     rare=True,
 )
 def simulate_controller(
-    parameters: tuple[float, ...], starts: Indices, integrals: Array, inputs: Array, output: Array
+    parameters: tuple[float, ...], starts: Indices, integrals: Array, commands: Array, inputs: Array, output: Array
 ) -> None:
     """Fill `output` (n,) with the force that follows the controller's command [N].
 
     `starts` (sections + 1,): the first sample of each section, and n at the end. `integrals` (sections,): I at the
-    start of each section [N]. A section starts in the steady state of its filters, with an unlimited command.
+    start of each section [N]. `commands` (sections,): the first command of each section [N], NaN for an unlimited one.
+    A section starts in the steady state of its filters.
     `inputs` (3, n): a row per name of `INPUTS`. `delay_samples` may be negative where a log writes the command first.
     """
     (
@@ -95,10 +96,13 @@ def simulate_controller(
             if sample == first:
                 error_before = error
                 command = speed_gain * error + integral
+                if not math.isnan(commands[section]):
+                    command = commands[section]
             for substep in range(int(substeps)):
                 held = error_before + (error - error_before) * (substep + 1.0) / substeps
                 wanted = speed_gain * held + integral
-                command += min(max(wanted - command, -largest_change), largest_change)
+                if sample > first or math.isnan(commands[section]):
+                    command += min(max(wanted - command, -largest_change), largest_change)
                 command = min(max(command, -force_limit), force_limit)
                 integral += (integral_gain * held + anti_windup_rate * (command - wanted)) * step
             error_before = error

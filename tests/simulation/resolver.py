@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from cdtool.simulation.sensors import Array, low_pass
+from cdtool.axis_model.sensor_filters import first_order_low_pass
+from cdtool.simulation.sensors import Array
 
 
 def resolver_speed(position: Array, step: float, frequency: float, period: float) -> Array:
@@ -17,4 +18,4 @@ def resolver_speed(position: Array, step: float, frequency: float, period: float
     counted = np.floor(position / step) * step
     speed = np.diff(counted, prepend=counted[0]) / period
     time_constant = 1.0 / (2.0 * math.pi * frequency)
-    return low_pass(low_pass(speed, time_constant, period), time_constant, period)
+    return first_order_low_pass(first_order_low_pass(speed, time_constant, period), time_constant, period)

@@ -10,8 +10,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.errors import UsageError
-from cdtool.simulation import arm_kernel, sensors
+from cdtool.simulation import arm_kernel
 from cdtool.simulation.arm_model import (
     ArmRun,
     ArmStroke,
@@ -343,13 +344,13 @@ def test_the_noise_of_each_channel_has_its_stated_size() -> None:
     assert np.std(run.load_cell) == pytest.approx(0.1, rel=0.05)
     keep = np.exp(-1.0 / 4.0)
     white = 0.1 / 60.0 * np.sqrt((1.0 - keep) / (1.0 + keep))
-    lagged = sensors.low_pass(run.drive_torque[:, 1] / 60.0, 4e-3, ARM.sample_period)
+    lagged = first_order_low_pass(run.drive_torque[:, 1] / 60.0, 4e-3, ARM.sample_period)
     assert np.std((run.motor_torque[:, 1] - lagged)[still]) == pytest.approx(white, rel=0.2)
     felt = specific_force(ARM, run.joint_position.T, run.joint_speed.T, run.joint_acceleration.T).T
     gravity = 9.81 * np.cos(run.joint_position[still].mean(axis=0))
     np.testing.assert_allclose(run.imu[still].mean(axis=0), gravity + ARM.imu_bias, atol=0.02)
     # White noise of 0.12 m/s2 through 78 Hz; while the arm moves, 0.1 m/s2 of vibration at 30 Hz come on top.
-    passed = [sensors.second_order_low_pass(felt[:, j] - felt[0, j], 78.0, 0.8, ARM.sample_period) for j in (0, 1)]
+    passed = [second_order_low_pass(felt[:, j] - felt[0, j], 78.0, 0.8, ARM.sample_period) for j in (0, 1)]
     added = run.imu - felt[0] - np.column_stack(passed)
     quiet, shaken = (np.std(added[part], axis=0) for part in (still, cruise))
     assert np.all((quiet > 0.03) & (quiet < 0.09))
