@@ -650,7 +650,7 @@ _LOGGED_ALONE = _Source(is_command=False, from_position=False, has_position_loop
 
 
 def _share_needed(source: _Source, before: _Source) -> float:
-    """Return the share of the cost below which a source replaces a likelier one."""
+    """Return the cost ratio below which a less plausible source is preferred."""
     return 1.0 if source.from_position == before.from_position else _OTHER_SOURCE_SHARE
 
 
