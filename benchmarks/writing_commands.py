@@ -45,6 +45,15 @@ def prepare(folder: Path, run: Run) -> None:
         )
         text = f"recording,time_s\ngate/stiff/01.csv,{2.0 if name == 'a' else 2.5}\n"
         (folder / f"t{name}.csv").write_text(text, encoding="utf-8")
+    model = '[model.controller]\nspeed_gain = 4300\nintegral_gain = 8000\nperiod = 0.001\n[model.drive]\nstiffness = 8e4\n'
+    text = (gate / "machine.toml").read_text(encoding="utf-8") + model
+    (gate / "model.toml").write_text(text, encoding="utf-8")
+    for name, stiffness in (("a", 100), ("b", 500)):
+        (folder / f"inject_{name}.toml").write_text(
+            'machine = "gate/model.toml"\ndetectors = ["gm"]\n[learn]\nlogs = ["gate/free/0[123].csv"]\n'
+            f'[signature]\nforce = true\n[inject]\nlogs = ["gate/holdout/*.csv"]\npositions = ["0.9m"]\nstiffnesses_n_per_mm = [{stiffness}]\n',
+            encoding="utf-8",
+        )
     for number in (1, 2):
         lines = (gate / "stiff" / f"0{number}.csv").read_text(encoding="utf-8").splitlines(keepends=True)
         (folder / f"{number}.csv").write_text("".join(lines[:800]), encoding="utf-8")
@@ -119,6 +128,13 @@ def cases(inputs: Path) -> list[Case]:
             ("init", f"{inputs}/2.csv", "-o", "{out}/m.toml", "--force"),
             ("init", f"{inputs}/1.csv", "-o", "{out}/m.toml", "--force"),
         ),
+        Case("identify", _identify(free[:2], machine), _identify(free[1:3], machine)),
+        Case(
+            "inject",
+            ("inject", f"{inputs}/inject_b.toml", "-o", "{out}/injected"),
+            ("simulate", "season", "--runs", "1", "-o", "{out}/logs"),
+        ),
+        Case("coverage", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
         *(
             Case(f"simulate {kind}", ("simulate", kind, *some, "-o", "{out}/logs"))
             for kind, some in (
@@ -143,6 +159,14 @@ def cases(inputs: Path) -> list[Case]:
 
 def _plot(*words: str) -> tuple[str, ...]:
     return (*words, "--plot", "{out}/p.png")
+
+
+def _identify(logs: Sequence[str], machine: Sequence[str]) -> tuple[str, ...]:
+    return ("identify", *logs, *machine, "-o", "{out}/m.toml", "--force")
+
+
+def _coverage(setup: str) -> tuple[str, ...]:
+    return ("coverage", setup, "-o", "{out}/p.png", "--force")
 
 
 def _convert(log: str, suffix: str, *machine: str) -> tuple[str, ...]:

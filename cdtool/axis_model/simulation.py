@@ -121,16 +121,6 @@ def substeps(model: AxisModel, period: float, obstacle: Obstacle | None = None) 
     return max(needed, _FEWEST_SUBSTEPS)
 
 
-def drive_force_at(drive: Drive, wind_up: float) -> float:
-    """Return the static force of the elastic drive at a wind-up."""
-    if wind_up >= drive.take_up_travel:
-        return drive.stiffness * drive.take_up_travel + drive.end_stiffness * (wind_up - drive.take_up_travel)
-    if wind_up >= 0.0:
-        return drive.stiffness * wind_up
-    back = min(wind_up + drive.backlash, 0.0)
-    return (drive.end_stiffness if math.isfinite(drive.end_stiffness) else drive.stiffness) * back
-
-
 def wind_up_at(drive: Drive, force: float) -> float:
     """Return the wind-up at which the elastic drive has a static force; 0 for a rigid drive."""
     if drive.is_rigid:

@@ -25,7 +25,22 @@ class Agreement:
 
 
 def agreements(evaluated: Evaluated) -> Sequence[Agreement]:
-    """Return the agreement of every injected group with the real group that the benchmark file compares it with."""
+    """Return the agreement of every injected group with the real group that the benchmark file compares it with.
+
+    Parameters
+    ----------
+    evaluated : Evaluated
+        The evaluated benchmark; its provenance says which groups are injected.
+
+    Returns
+    -------
+    sequence of Agreement
+        One per detector and injected group; empty without `compare_with` in the benchmark file.
+
+    Examples
+    --------
+    `cdtool.benchmark` returns the evaluated benchmark.
+    """
     by_name = {(row.group, row.detector): row for row in evaluated.summaries}
     found = []
     for group, stated in evaluated.results.provenance.get("injected", {}).items():

@@ -81,7 +81,32 @@ class MappedContact:
 def coverage_map(
     rows: Sequence[ContactResult], contacts: Mapping[str, MappedContact], detectors: Sequence[str], unit: str
 ) -> CoverageMap:
-    """Return the map of scored contacts; `contacts` has the cell of each recording by its name."""
+    """Return latency, force and misses of injected contacts over position and stiffness, per detector.
+
+    Parameters
+    ----------
+    rows : sequence of ContactResult
+        The scored contacts; those of other recordings are left out.
+    contacts : mapping
+        The cell of each injected recording by its name.
+    detectors : sequence of str
+        The detectors to map, in this order.
+    unit : str
+        Unit of the positions: m, rad or s.
+
+    Returns
+    -------
+    CoverageMap
+        A detector without any row is left out.
+
+    Examples
+    --------
+    >>> row = ContactResult("1.csv", "injected", "gm", None, 1.0, 0.0, 1.02, 20.0, "detected", 150.0, 400.0)
+    >>> cell = MappedContact(CellKey(0.9, 5e5), "known", reliable_until=1.5)
+    >>> found = coverage_map([row], {"1.csv": cell}, ["gm"], "m")
+    >>> found.cells["gm"][cell.key].latency_ms
+    20.0
+    """
     grouped: dict[str, dict[CellKey, list[ContactResult]]] = {name: {} for name in detectors}
     for row in rows:
         if row.recording in contacts and row.detector in grouped:

@@ -45,6 +45,9 @@ commands = [
     ("signature", "update", signature, folder / "holdout" / "01.csv", "-m", machine),
     ("simulate", "arm", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", folder / "arm"),
     ("study", "sensors", "-m", machine),
+    ("identify", *sorted(folder.glob("free/*.csv")), "-m", machine, "-o", folder / "identified.toml"),
+    ("inject", folder / "inject.toml", "-o", folder / "injected"),
+    ("coverage", folder / "inject.toml", "-o", folder / "coverage.png"),
 ]
 print(json.dumps([(" ".join(map(str, item[:2])), cdtool(*item).status, "pandas" in sys.modules) for item in commands]))
 """

@@ -20,6 +20,7 @@ from cdtool.findings import (
     channels,
     clocks,
     containers,
+    injection,
     messages,
     motion,
     parts,
@@ -696,6 +697,11 @@ SENTENCES: list[tuple[Fact, str]] = [
             "synchronisation measured: load cell late by 3.1 ms (2.0 to 4.2) against the position; latencies are not "
             "corrected, their resolution includes 4.20 ms"
         ),
+    ),
+    # injection
+    (
+        injection.InjectedContactFact(6.12345, 402.7),
+        "injected: a simulated contact at 6.1235 s, peak 403 N, was added to an impact-free recording",
     ),
     # scoring
     (

@@ -61,6 +61,26 @@ logs = ["stiff/01.csv"]
 [points.p]
 logs = ["stiff/02.csv"]
 """
+_INJECT = """machine = "model.toml"
+detectors = ["gm", "pt"]
+[learn]
+logs = ["free/*.csv"]
+[signature]
+force = true
+[inject]
+logs = ["holdout/*.csv"]
+positions = ["0.9m", "0.5m"]
+[inject.obstacles.hard]
+stiffness_n_per_mm = 500
+"""
+_MODEL = """
+[model.controller]
+speed_gain = 4300
+integral_gain = 8000
+period = 0.001
+[model.drive]
+stiffness = 8e4
+"""
 # A command line, the file to mutate, and numeric options to set; {} stands for the folder.
 _COMMANDS: tuple[tuple[str, str], ...] = (
     ("info stiff/01.csv", "stiff/01.csv"),
@@ -73,6 +93,13 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("info stiff/01.csv -m robot.toml", "robot.toml"),
     ("info stiff/01.csv -m robot.toml", "six.urdf"),
     ("init stiff/01.csv -o out.toml --force", "stiff/01.csv"),
+    ("inject inject.toml -o injected", "inject.toml"),
+    ("inject inject.toml -o injected", "model.toml"),
+    ("inject inject.toml -o injected", "holdout/01.csv"),
+    ("benchmark inject.toml", "inject.toml"),
+    ("coverage inject.toml", "model.toml"),
+    ("identify free/01.csv free/02.csv -m machine.toml -o out.toml --force", "free/01.csv"),
+    ("identify free/01.csv free/02.csv -m model.toml -o out.toml --force", "model.toml"),
     ("detect stiff/01.csv -m machine.toml -d gm --limit 40", "machine.toml"),
     ("detect stiff/01.csv -m machine.toml -d feekf --limit 40", "stiff/01.csv"),
     ("detect stiff/01.csv -m machine.toml -s gate.json", "gate.json"),
@@ -186,6 +213,8 @@ def make_bench(folder: Path) -> None:
     labelled = benchmark.replace("[onset]", '[onset]\nlabels = "labels.csv"')
     (folder / "labelled.toml").write_text(labelled)
     (folder / "labels.csv").write_text(_LABELS)
+    (folder / "inject.toml").write_text(_INJECT)
+    (folder / "model.toml").write_text((folder / "machine.toml").read_text() + _MODEL)
     (folder / "triggers.csv").write_text(_TRIGGERS)
     (folder / "own.toml").write_text(_LIMITS)
     (folder / "six.urdf").write_text(six_joint_urdf())
@@ -235,6 +264,7 @@ def run(attempt: Attempt, folder: Path) -> Outcome:
             return cdtool(*attempt.arguments)
     finally:
         (folder / "gate.json").write_bytes(signature)
+        shutil.rmtree(folder / "injected", ignore_errors=True)
         if path:
             path.write_bytes(before)
 

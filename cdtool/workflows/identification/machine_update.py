@@ -90,17 +90,30 @@ def updated_text(text: str, changes: Sequence[MachineChange], origin: str) -> st
 
     document = tomlkit.parse(text)
     for change in changes:
-        table: Any = document
-        for name in change.section.split("."):
-            if name not in table:
-                table[name] = tomlkit.table(is_super_table=name == "model")
-            table = table[name]
+        table = _opened(document, change.section)
         value: Any = change.values[0] if len(set(change.values)) == 1 else list(change.values)
         before = table.get(change.key)
         item = tomlkit.item(int(value) if change.key in _WHOLE else value)
         item.comment(_comment(change, before, origin))
         table[change.key] = item
     return tomlkit.dumps(document)
+
+
+def _opened(document: Any, section: str) -> Any:
+    """Return a section of a TOML document; one on a single line in braces is spread first: it cannot hold comments."""
+    import tomlkit
+    from tomlkit.items import InlineTable
+
+    table = document
+    for name in section.split("."):
+        if name not in table:
+            table[name] = tomlkit.table(is_super_table=name == "model")
+        elif isinstance(table[name], InlineTable):
+            content = table[name].unwrap()
+            table.remove(name)
+            table.append(name, tomlkit.item(content))  # last: keys below it would become its own
+        table = table[name]
+    return table
 
 
 def _comment(change: MachineChange, before: Any, origin: str) -> str:
