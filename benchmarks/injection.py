@@ -7,6 +7,7 @@ stiffness of the front are given, as a data sheet and a drawing give them).
 
 python benchmarks/injection.py                # 5 seeds, with and without references, 8 pairs each: 8 min
 python benchmarks/injection.py --seeds 1 --pairs 4
+python benchmarks/injection.py --contacts 3   # only: identified, and three stiff contacts with a load cell added
 """
 
 from __future__ import annotations
@@ -27,10 +28,15 @@ from cdtool.activation import Activation  # noqa: E402
 from cdtool.axis_model.obstacle import Obstacle  # noqa: E402
 from cdtool.axis_model.parameters import AxisModel, Drive, Sensors  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402
+from cdtool.evaluation.truth.onset import find_contacts  # noqa: E402
+from cdtool.evaluation.truth.onset_rule import OnsetRule  # noqa: E402
 from cdtool.identification.axis_run import axis_run  # noqa: E402
+from cdtool.identification.contact_fit import ContactSettings, identify_contacts, with_contacts  # noqa: E402
+from cdtool.identification.load_cell_contact import load_cell_contact  # noqa: E402
 from cdtool.identification.speed_controller import identify_controller  # noqa: E402
 from cdtool.identification.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
-from cdtool.injection.axis_contact import ControllerReaction, axis_contact  # noqa: E402
+from cdtool.injection.assumption import Assumption, ControllerReaction  # noqa: E402
+from cdtool.injection.axis_contact import axis_contact  # noqa: E402
 from cdtool.injection.injected_recording import injected_recording  # noqa: E402
 from cdtool.operations import operations_of  # noqa: E402
 from cdtool.pipeline import detect_operation, run_detector  # noqa: E402
@@ -45,7 +51,7 @@ SEEDS, PAIRS, LEARNED = 5, 8, 14
 FIRST_SEED = 7000
 KINDS: tuple[Impact, ...] = ("stiff", "soft")
 # Of the mean paired difference: share of the true latency, and [ms].
-LIMITS = {"true": (0.05, 2.0), "identified": (0.12, 4.0)}
+LIMITS = {"true": (0.05, 2.0), "identified": (0.12, 4.0), "contacts": (0.10, 3.0)}
 WITH_REFERENCES = ("desired_dynamics", "torque_deviation")
 LEFT_OUT = ("torque_deviation",)  # the gate's torque follows its reference closely, hit or not: it misses both
 
@@ -76,8 +82,8 @@ def loaded(recording: Recording, references: bool) -> Recording:
     return ON_LOAD_SIDE.referred_to_load(recording if references else without_references(recording))
 
 
-def identified_model(seed: int, references: bool) -> AxisModel:
-    """The gate's model from its impact-free runs, with what a data sheet states."""
+def identified_model(seed: int, references: bool, contacts: int = 0) -> AxisModel:
+    """The gate's model from its impact-free runs and from real contacts, with what a data sheet states."""
     recordings = [free_recording(GATE, seed, number, references=references) for number in range(LEARNED)]
     runs = [axis_run(ON_LOAD_SIDE.referred_to_load(recording)) for recording in recordings]
     sensors = Sensors(
@@ -85,14 +91,25 @@ def identified_model(seed: int, references: bool) -> AxisModel:
         accelerometer_hz=GATE.accelerometer_frequency,
         accelerometer_damping=GATE.accelerometer_damping,
     )
-    model = identify_two_mass(runs, TwoMassSettings(motor_mass=GATE.motor_mass, sensors=sensors)).model
+    fit = identify_two_mass(runs, TwoMassSettings(motor_mass=GATE.motor_mass, sensors=sensors))
+    model = fit.model
     drive = Drive(
         motor_mass=model.drive.motor_mass,
         load_mass=model.drive.load_mass,
         stiffness=model.drive.stiffness,
         front_stiffness=GATE.post_stiffness,
     )
-    return replace(model, drive=drive, controller=identify_controller(runs).controller)
+    model = replace(model, drive=drive, controller=identify_controller(runs).controller)
+    if not contacts:
+        return model
+    struck = []
+    for number in range(contacts):
+        hit = simulate_gate_run(GATE, np.random.default_rng([seed, 2000 + number]), "stiff")
+        recording = loaded(as_recording(hit, f"contact {number}", GATE), references)
+        struck.append(load_cell_contact(recording, find_contacts(recording, OnsetRule())[0], model))
+    stiffness_error = fit.identified["stiffness"].relative_error
+    settings = ContactSettings(largest_wind_up=fit.largest_wind_up, stiffness_error=stiffness_error)
+    return with_contacts(model, identify_contacts(struck, model, settings))
 
 
 def compare(seed: int, model: AxisModel, kind: Impact, references: bool, pairs: int) -> dict[str, Latencies]:
@@ -118,7 +135,7 @@ def compare(seed: int, model: AxisModel, kind: Impact, references: bool, pairs: 
         clean = clean if references else without_references(clean)
         assert hit.contact_start is not None
         run = axis_run(ON_LOAD_SIDE.referred_to_load(clean))
-        contact = axis_contact(run, model, obstacle, hit.contact_start, 1.1, reaction)
+        contact = axis_contact(run, model, obstacle, hit.contact_start, 1.1, Assumption(controller=reaction))
         injected = injected_recording(clean, ON_LOAD_SIDE, contact.changes, contact.force, (0,))
         both = [ON_LOAD_SIDE.referred_to_load(injected), loaded(as_recording(hit, "hit", GATE), references)]
         for name, (detector, fitted) in judges.items():
@@ -132,14 +149,17 @@ def compare(seed: int, model: AxisModel, kind: Impact, references: bool, pairs: 
     return {name: Latencies(*np.array(items).T) for name, items in found.items()}
 
 
-def measure(seeds: int, pairs: int) -> bool:
+def measure(seeds: int, pairs: int, contacts: int) -> bool:
     met = True
     for parameters, (share, least) in LIMITS.items():
+        if (parameters == "contacts") != (contacts > 0):
+            continue
         for references in (True, False):
             for kind in KINDS:
                 merged: dict[str, list[Latencies]] = {}
                 for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-                    model = gate_as_model(GATE) if parameters == "true" else identified_model(seed, references)
+                    is_true = parameters == "true"
+                    model = gate_as_model(GATE) if is_true else identified_model(seed, references, contacts)
                     for name, item in compare(seed, model, kind, references, pairs).items():
                         merged.setdefault(name, []).append(item)
                 print(f"\n{parameters} parameters, {'with' if references else 'without'} references, {kind}")
@@ -165,5 +185,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--pairs", type=int, default=PAIRS)
+    parser.add_argument("--contacts", type=int, default=0, help="real contacts with a load cell to identify from")
     chosen = parser.parse_args()
-    main("injected and true latencies", lambda: measure(chosen.seeds, chosen.pairs))
+    main("injected and true latencies", lambda: measure(chosen.seeds, chosen.pairs, chosen.contacts))

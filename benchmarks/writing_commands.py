@@ -45,7 +45,9 @@ def prepare(folder: Path, run: Run) -> None:
         )
         text = f"recording,time_s\ngate/stiff/01.csv,{2.0 if name == 'a' else 2.5}\n"
         (folder / f"t{name}.csv").write_text(text, encoding="utf-8")
-    model = '[model.controller]\nspeed_gain = 4300\nintegral_gain = 8000\nperiod = 0.001\n[model.drive]\nstiffness = 8e4\n'
+    model = (
+        "[model.controller]\nspeed_gain = 4300\nintegral_gain = 8000\nperiod = 0.001\n[model.drive]\nstiffness = 8e4\n"
+    )
     text = (gate / "machine.toml").read_text(encoding="utf-8") + model
     (gate / "model.toml").write_text(text, encoding="utf-8")
     for name, stiffness in (("a", 100), ("b", 500)):

@@ -10,11 +10,31 @@ from typing import Any, ClassVar
 from cdtool.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
 from cdtool.errors import ConfigurationError
 from cdtool.machines.axis import Axis
+from cdtool.machines.joint_machine import JointMachine
 from cdtool.tables import Table
 
 # What [machine] gives, so that it must not be repeated in [model.drive].
 _FROM_MACHINE = ("load_mass",)
 _NOT_KEYS = (*_FROM_MACHINE, "stated_rigid")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bristle:
+    """Friction near rest as an elastic bristle, for the joints of a robot; 0: a smooth sign in its place.
+
+    F = stiffness z + damping z' + d v, z' = v - stiffness |v| z / G(v), G the Coulomb friction with its Stribeck rise
+    (LuGre: de Wit and others, 1995); N m/rad and N m s/rad, or N/m and N s/m. Without it a joint at rest creeps.
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ConfigurationError(
+                    f"model.bristle: {name} is {getattr(self, name)}", "a finite number of at least 0"
+                )
 
 
 @dataclass(frozen=True)
@@ -28,6 +48,7 @@ class ModelTable:
         "friction": Friction,
         "controller": Controller,
         "sensors": Sensors,
+        "bristle": Bristle,
     }
 
     @classmethod
@@ -63,8 +84,20 @@ def axis_model(machine: Axis, table: ModelTable | None, joint: int = 0) -> AxisM
     """
     machine.require_inertia("a model of the axis")
     table = table or ModelTable({})
+    if "bristle" in table.sections:
+        raise ConfigurationError(
+            f"machine '{machine.name}': model.bristle applies to robots only", "remove [model.bristle]"
+        )
     motor = float(machine.reflected_inertia[joint])
-    load = float(machine.nominal_inertia[joint]) - motor
+    return joint_model(machine, table, joint, (motor, float(machine.nominal_inertia[joint]) - motor))
+
+
+def joint_model(machine: JointMachine, table: ModelTable, joint: int, masses: tuple[float, float]) -> AxisModel:
+    """Return drive, friction, controller and sensors of one joint with the `masses` of motor and load [kg, kg m2].
+
+    [model.drive] motor_mass is a share of the load's. Raises ConfigurationError for values that contradict one another.
+    """
+    motor, load = masses
     drive: dict[str, Any] = {**table.of_joint("drive", joint)}
     drive["stated_rigid"] = bool(drive.get("stated_rigid", False))
     if "motor_mass" in drive:
@@ -88,7 +121,7 @@ def axis_model(machine: Axis, table: ModelTable | None, joint: int = 0) -> AxisM
     )
 
 
-def _friction(machine: Axis, table: ModelTable, joint: int) -> Friction:
+def _friction(machine: JointMachine, table: ModelTable, joint: int) -> Friction:
     given = table.of_joint("friction", joint)
     ratio = machine.transmission_ratio[joint]
     coulomb = machine.coulomb_friction[joint] / abs(ratio)

@@ -32,6 +32,7 @@ class Drive:
     front_mass: float = 0.0
     front_stiffness: float = math.inf
     front_damping: float = 0.0
+    observed_wind_up: float = 0.0  # the largest one at which the stiffness was identified; 0: not stated
     stated_rigid: bool = False
 
     def __post_init__(self) -> None:
@@ -96,6 +97,7 @@ class Controller:
     position_gain: float = 0.0  # [1/s]
     anti_windup_rate: float = 0.0  # [1/s]
     slew_limit: float = math.inf  # [N/s]
+    observed_slope: float = 0.0  # [N/s], the largest one of the command in the logs; 0: not stated
     force_limit: float = math.inf  # [N]
     speed_filter_hz: float = math.inf
     speed_filter_order: int = 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -24,7 +23,7 @@ from cdtool.cli.options import (
 from cdtool.cli.place import Place, location
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
-from cdtool.plain_text import counted, digits
+from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
@@ -120,18 +119,20 @@ def benchmark(
 
 
 def _show_agreement(evaluated: Evaluated) -> None:
-    """Print how injected contacts agree with the real ones that the benchmark file compares them with."""
+    """Print the latencies of injected contacts that are compared with real ones, and those that are a range."""
     from cdtool.evaluation.agreement import agreements
+    from cdtool.report.tables.injected import median_range, milliseconds
 
-    for item in agreements(evaluated):
-        typer.echo(
-            f"{item.detector}: {plain(item.injected_group)} {_ms(item.injected_ms)}, real ({plain(item.real_group)}) "
-            f"{_ms(item.real_ms)} ms, n = {item.injected_count} and {item.real_count}"
-        )
-
-
-def _ms(value: float) -> str:
-    return digits(float(f"{value:.3g}")) if math.isfinite(value) else "-"
+    shown = [item for item in agreements(evaluated) if item.real_group or item.is_range]
+    for item in shown:
+        line = f"{item.detector}: {plain(item.injected_group)} {median_range(item)}"
+        if item.real_group:
+            line += f", real ({plain(item.real_group)}) {milliseconds(item.real_ms)}"
+            typer.echo(f"{line} ms, n = {item.injected_count} and {item.real_count}")
+        else:
+            typer.echo(f"{line} ms, n = {item.injected_count}")
+    for assumed in dict.fromkeys(text for item in shown if item.is_range for text in item.assumed):
+        typer.echo(f"bracket: {assumed}")
 
 
 def _show_dry_run(

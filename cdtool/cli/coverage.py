@@ -83,7 +83,7 @@ def _show(done: Coverage) -> None:
     for name, cells in made.cells.items():
         for stiffness in made.stiffnesses:
             here = [cell for key, cell in cells.items() if key.stiffness == stiffness]
-            latencies = [cell.latency_ms for cell in here if math.isfinite(cell.latency_ms)]
+            latencies = [value for cell in here for value in cell.range_ms if math.isfinite(value)]
             forces = [cell.force_n for cell in here if math.isfinite(cell.force_n)]
             rows.append(
                 (
@@ -101,7 +101,8 @@ def _show(done: Coverage) -> None:
     places = (
         f"{counted(len(made.positions), 'position')} from {made.positions[0]:g} to {made.positions[-1]:g} {made.unit}"
     )
-    typer.echo(f"{plain(done.machine)}: injected contacts at {places}; least and greatest mean of the positions")
+    means = "least and greatest mean of the positions and brackets"
+    typer.echo(f"{plain(done.machine)}: injected contacts at {places}; {means}")
     telling = made.most_telling()
     if telling:
         typer.echo("a test at the rig would tell most here:")

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
+from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
 from cdtool.cli.options import ForceOption, JobsOption, JsonOption
 from cdtool.cli.place import Place, location
+from cdtool.errors import UsageError, nearest
 from cdtool.plain_text import counted, digits
 
 if TYPE_CHECKING:
     from cdtool.identification.estimate import NotIdentifiable
+    from cdtool.workflows.execution.workers import Workers
+    from cdtool.workflows.identification.fleet_identification import FleetIdentification
     from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification
+
+_DIVISIONS = ("machine", "day")
 
 
 def identify(
@@ -22,10 +31,24 @@ def identify(
     ],
     machine: Annotated[Place, typer.Option("--machine", "-m", parser=location, help="Machine file.")],
     output: Annotated[
-        Place | None,
+        list[Place] | None,
         typer.Option(
-            "--output", "-o", parser=location, help="Machine file to write: the same file or a new one. Default: none."
+            "--output",
+            "-o",
+            parser=location,
+            help="Output, repeatable: .toml (machine file: the same or a new one), .html, .json. Default: none.",
         ),
+    ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option("--by", help="machine or day: one identification for each, and what changes; -o .html, .json."),
+    ] = None,
+    loaded_logs: Annotated[
+        list[str] | None,
+        typer.Option("--loaded-logs", help="Of a robot: logs with a known payload, for torque constants; repeatable."),
+    ] = None,
+    payload: Annotated[
+        float | None, typer.Option("--payload", help="With --loaded-logs: mass of the payload at the last link [kg].")
     ] = None,
     force: ForceOption = False,
     jobs: JobsOption = 1,
@@ -37,20 +60,102 @@ def identify(
 
     Example: cdtool identify 'sample_logs/gate/free/*.csv' -m sample_logs/gate/machine.toml -o machine.toml
     """
+    from cdtool.report.identification_files import check_identification_files
     from cdtool.workflows.execution.workers import Workers
-    from cdtool.workflows.identification.identifying import identify as run
 
+    targets = output or []
+    if by is not None and by not in _DIVISIONS:
+        raise UsageError(f"--by is '{by}'", nearest(by, _DIVISIONS))
+    check_identification_files(targets, machine, force=force, of_fleet=by is not None)
+    if bool(loaded_logs) != (payload is not None):
+        raise UsageError("--loaded-logs and --payload belong together", "give both, or neither")
+    if by is not None and loaded_logs:
+        raise UsageError("--by with --loaded-logs", "identify torque constants of one machine at a time")
+    if by is not None:
+        _identify_fleet(logs, machine, by, targets, Workers(jobs), as_json=as_json)
+    else:
+        loaded = (tuple(loaded_logs), payload) if loaded_logs and payload is not None else None
+        _identify_machine(logs, machine, targets, Workers(jobs), loaded, as_json=as_json)
+
+
+def _identify_machine(
+    logs: Sequence[str],
+    machine: Path,
+    targets: Sequence[Path],
+    workers: Workers,
+    loaded: tuple[tuple[str, ...], float] | None,
+    *,
+    as_json: bool,
+) -> None:
+    from cdtool.report.identification_files import MACHINE, PAGE, write_identification
+    from cdtool.workflows.identification.identification_outputs import evidence_of, identification_summary
+    from cdtool.workflows.identification.identifying import identify as run
+    from cdtool.workflows.identification.identifying_robot import LoadedRuns
+    from cdtool.workflows.runs import find_logs
+
+    runs = None if loaded is None else LoadedRuns(*loaded)
     with progress("identifying") as advance:
-        done = run(logs, machine, output, force=force, workers=Workers(jobs), progress=advance)
+        done = run(logs, machine, workers=workers, progress=advance, payload=runs)
+    needs_samples = any(target.suffix.lower() == PAGE for target in targets)
+    evidence = evidence_of(done, logs, machine, workers) if needs_samples else ()
+    written = write_identification(done, evidence, targets, find_logs(logs, Path(), "LOGS"))
+    done = replace(done, written=", ".join(str(path) for path in written if path.suffix.lower() == MACHINE))
     print_skipped(done.skipped, done.findings)
     if as_json:
-        print_json(done.summary)
+        print_json(identification_summary(done, evidence, written))
     else:
-        _show(done)
+        _show(done, written, targets)
     leave(done.skipped)
 
 
-def _show(done: IdentifiedMachine) -> None:
+def _identify_fleet(
+    logs: Sequence[str], machine: Path, by: str, targets: Sequence[Path], workers: Workers, *, as_json: bool
+) -> None:
+    from cdtool.report.identification_files import write_fleet
+    from cdtool.workflows.identification.fleet_identification import Division, identify_fleet
+    from cdtool.workflows.runs import find_logs
+
+    with progress("identifying") as advance:
+        fleet = identify_fleet(logs, machine, Division(by), workers=workers, progress=advance)
+    write_fleet(fleet, targets, [machine, *find_logs(logs, Path(), "LOGS")])
+    print_skipped(fleet.skipped, fleet.findings)
+    if as_json:
+        print_json(fleet.summary)
+    else:
+        _show_fleet(fleet, targets)
+    leave(fleet.skipped)
+
+
+def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path]) -> None:
+    rows = [
+        (
+            item.machine,
+            series.name,
+            number(series.values[0], 4),
+            number(series.values[-1], 4),
+            series.unit,
+            number(series.drift.standard_errors),
+        )
+        for item in fleet.machines
+        for series in item.changed
+    ]
+    if rows:
+        columns = [("machine", "left"), ("parameter", "left"), ("first", "right"), ("last", "right"), ("unit", "left")]
+        table([*columns, ("change in\nstandard errors", "right")], rows)
+    changed = sum(bool(item.changed) for item in fleet.machines)
+    assessable = sum(any(len(series.periods) > 1 for series in item.series) for item in fleet.machines)
+    typer.echo(
+        f"{counted(len(fleet.machines), 'machine')} identified, {assessable} assessable over time, {changed} changed "
+        f"beyond 3 standard errors"
+    )
+    for target in targets:
+        typer.echo(f"written: {plain(target)}")
+
+
+def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
+    from cdtool.report.identification_words import words_of_plan
+    from cdtool.workflows.identification.identification_outputs import plan_of
+
     runs = counted(len(done.runs), "impact-free run")
     typer.echo(f"{plain(done.machine)}: identified from {runs}")
     _show_changes(done)
@@ -60,11 +165,16 @@ def _show(done: IdentifiedMachine) -> None:
         _show_quality(joint)
         for item in joint.not_identifiable:
             typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
+        for plan in plan_of(joint):
+            typer.echo(f"plan: {words_of_plan(plan, joint.units[2])}: for {', '.join(plan.keys)}")
         for method, reason in joint.refused.items():
             typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
-    if done.written:
-        typer.echo(f"written: {plain(done.written)}")
-    else:
+    for path in written:
+        typer.echo(f"written: {plain(path)}")
+    for target in targets:
+        if target not in written:
+            typer.echo(f"not written: {plain(target)}: nothing new predicts unseen runs better")
+    if not targets:
         typer.echo("nothing is written: give -o machine.toml")
 
 
@@ -85,6 +195,12 @@ def _numbers(values: Any) -> str:
 
 
 def _show_quality(joint: JointIdentification) -> None:
+    if joint.robot is not None:
+        error = joint.robot.errors.get(joint.robot.form, math.nan)
+        typer.echo(
+            f"torque on unseen runs: {number(error)} of {number(joint.robot.torque)} N m or N RMS "
+            f"({joint.robot.form.value})"
+        )
     validation = joint.rigid.cross_validation if joint.rigid else None
     if validation is not None:
         best = validation.errors[validation.best]

@@ -26,7 +26,7 @@ class Cell:
     """The contacts of one cell: their number, those missed and not assessable, and the outcome of the others.
 
     `latency_ms`: mean of the detected contacts, `standard_error_ms` of it from log to log (NaN below two), `range_ms`:
-    least and greatest mean of the assumptions about an unknown controller, equal to the mean with a known one.
+    least and greatest mean of the assumptions about what is not known, equal to the mean if all is known.
     `force_n`: median force at the alarm. `unreliable`: detected later than the injected contact is reliable.
     """
 
@@ -71,10 +71,10 @@ class CoverageMap:
 
 @dataclass(frozen=True)
 class MappedContact:
-    """An injected contact's cell, the assumption about the controller, and until when [s] it is reliable."""
+    """An injected contact's cell, what is assumed about the machine, and until when [s] it is reliable."""
 
     key: CellKey
-    reaction: str
+    assumption: str
     reliable_until: float
 
 
@@ -128,7 +128,7 @@ def _cell(rows: Sequence[ContactResult], contacts: Mapping[str, MappedContact]) 
     for row in rows:
         if row.outcome == _DETECTED and row.latency_ms is not None:
             case = contacts[row.recording]
-            latencies.setdefault(case.reaction, []).append(row.latency_ms)
+            latencies.setdefault(case.assumption, []).append(row.latency_ms)
             unreliable += row.alarm_s is not None and row.alarm_s > case.reliable_until
             if row.force_at_alarm_n is not None:
                 forces.append(row.force_at_alarm_n)

@@ -69,7 +69,7 @@ class Grouping:
 
 @dataclass(frozen=True, eq=False)
 class BaseParameterSet:
-    """Identified base parameters: value and standard error (B,) of each combination, in SI units.
+    """Identified base parameters: `values` (B,) of the combinations and their `covariance` (B, B), in SI units.
 
     `excitation` (B,): the part of the combination's column that is independent of all others, in the logged motion
     relative to random motion of the same speeds. `uncertainty` (B,): the standard error as a share of a joint's torque
@@ -78,13 +78,18 @@ class BaseParameterSet:
 
     names: tuple[str, ...]
     values: FloatArray
-    standard_errors: FloatArray
+    covariance: FloatArray
     excitation: FloatArray
     uncertainty: FloatArray
     identifiable: tuple[bool, ...]
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Return the standard error of each combination (B,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
 def group_columns(regressor: Regressor, columns: tuple[int, ...], limits: Range | None = None) -> Grouping:

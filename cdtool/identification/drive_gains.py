@@ -27,6 +27,7 @@ from cdtool.identification.robot_dynamics import (
     jackknife_blocks,
     jackknife_covariance,
     resting_windows,
+    window_of_column,
 )
 from cdtool.identification.robot_regressor import Group, Regressor, TreeRegressor, regressor_of
 from cdtool.identification.robot_run import RobotRun
@@ -121,20 +122,15 @@ def _run_part(run: RobotRun, index: int, regressor: Regressor, weights: FloatArr
         raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(regressor.machine.joints)}")
     window = Window.of(0.1, run.period)
     chosen = [i for i, column in enumerate(regressor.columns) if column.group is not Group.LOAD]
-    rows = np.stack([_column(run, regressor, window, i) for i in chosen], axis=2)
+    rows = np.stack([window_of_column(run, regressor, window, i) for i in chosen], axis=2)
     torques = window.average(run.torque)
     load = np.zeros_like(torques)
     if weights is not None:
         for column in np.flatnonzero(weights).tolist():
-            load += weights[column] * _column(run, regressor, window, column)
+            load += weights[column] * window_of_column(run, regressor, window, column)
     times = run.start + run.period * (np.arange(len(torques)) * float(window.step) + len(window.weights) // 2)
     moves = ~resting_windows(run, regressor.machine, window)
     return _Part(index, rows, torques, load, moves, np.asarray(times, dtype=np.float64))
-
-
-def _column(run: RobotRun, regressor: Regressor, window: Window, column: int) -> FloatArray:
-    momentum, rest = regressor.momentum(column, run.position, run.speed)
-    return window.rate(momentum) + window.average(rest)
 
 
 def _of_joint(joint: int, parts: Sequence[_Part], present: float, unit: str) -> Estimate | NotIdentifiable:

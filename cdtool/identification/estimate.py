@@ -43,6 +43,8 @@ class Missing(Enum):
     CONTACTS = "contacts with a load cell"
     SLOWER_MOTION = "slow motion, below the speed at which the friction falls"
     HIGHER_RATE = "a higher sampling rate"
+    POSITION = "the position channel"
+    TORQUE_FILTER = "the time constant of the torque's low-pass in [model.sensors]"
 
 
 @dataclass(frozen=True)

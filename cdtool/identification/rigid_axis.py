@@ -269,17 +269,6 @@ def low_passed_force(fit: RigidAxisFit, run: AxisRun) -> FloatArray:
     return _as_fitted(fit, run).force
 
 
-def force_error(fit: RigidAxisFit, runs: Sequence[AxisRun]) -> ForceError:
-    """Return the error of the predicted force in runs that were not used for the fit.
-
-    All samples with a prediction count, those near zero speed included; moving ones are faster than 5 % of the usual
-    highest speed of their run.
-    """
-    filtered = [_as_fitted(fit, run) for run in runs]
-    errors = [fit.prediction.force(run) - run.force for run in filtered]
-    return _force_error(np.concatenate(errors), np.concatenate([_is_fast(run) for run in filtered]))
-
-
 def _as_fitted(fit: RigidAxisFit, run: AxisRun) -> FilteredRun:
     return filter_run(run, fit.settings.low_pass_hz, fit.settings.unknown_speed)
 

@@ -78,10 +78,6 @@ _UNITS = {
     Group.LOAD: ("1", "1"),
 }
 _NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.LOAD)
-_DRY = (Group.COULOMB, Group.LOAD)
-# Slopes of dry friction that are tried [s/rad, s/m], and by how much the sum of squares must fall for a new one.
-_SLOPES = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
-_CLEARLY_BETTER = 0.98
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,9 +85,8 @@ class RobotParameters:
     """Which groups are identified; those that are not keep the machine's values.
 
     `friction`: viscous and Coulomb; `offsets`: constant force; `inertial`: base inertial parameters; `load_friction`:
-    dry friction in proportion to the joint's gravity torque, which no machine file has. `slope`: a machine with a
-    coulomb_slope gets the one that fits best. `half_width` [s]: of the window, a zero-phase low-pass of about
-    0.5 / half_width Hz; at least ten samples. Raises UsageError.
+    dry friction in proportion to the joint's gravity torque, which no machine file has. `half_width` [s]: of the
+    window, a zero-phase low-pass of about 0.5 / half_width Hz; at least ten samples. Raises UsageError.
     """
 
     friction: bool = True
@@ -99,7 +94,6 @@ class RobotParameters:
     drive_inertia: bool = False
     inertial: bool = False
     load_friction: bool = False
-    slope: bool = True
     half_width: float = 0.1
 
     def __post_init__(self) -> None:
@@ -127,11 +121,54 @@ class TorqueError:
     """RMS of the torque that the model does not explain, per joint (J,) [N m, N], through the window's low-pass.
 
     `train`: on the runs it was identified from; `cross_validated`: on runs, or fifths of the only one, left out of the
-    identification; NaN for a joint without motion.
+    identification; `previous`: with the machine's own parameters; NaN for a joint without motion.
     """
 
     train: FloatArray
     cross_validated: FloatArray
+    previous: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Torque (m,) [N m, N] that the model does not explain in parts of the log left out of the identification.
+
+    `residual` with the parameters from the other parts, `previous` with the machine's own. `joints`, `blocks` (m,): the
+    joint, and the block of the log, longer than the residual is correlated, of each window. Two fits of the same runs
+    have the same windows.
+    """
+
+    residual: FloatArray
+    previous: FloatArray
+    joints: Index
+    blocks: Index
+
+    def of_joint(self, joint: int, is_previous: bool = False) -> FloatArray:
+        """Return the residuals of a joint."""
+        chosen = self.previous if is_previous else self.residual
+        return np.asarray(chosen[self.joints == joint])
+
+    def is_better(self, joint: int, than: FloatArray, errors: float) -> bool:
+        """Return whether a joint's squared residual is below another model's by more than so many standard errors."""
+        gain, error = self._gain(joint, than)
+        return gain > errors * error
+
+    def is_worse(self, joint: int, than: FloatArray, errors: float) -> bool:
+        """Return whether a joint's squared residual is above another model's by more than so many standard errors."""
+        gain, error = self._gain(joint, than)
+        return gain < -errors * error
+
+    def _gain(self, joint: int, than: FloatArray) -> tuple[float, float]:
+        """Return by how much the squared residual of a block is smaller than the other's, and the standard error.
+
+        Fewer than eight blocks are no sample: the error is infinite.
+        """
+        own = self.joints == joint
+        blocks = np.unique(self.blocks[own], return_inverse=True)[1].ravel()
+        sums = np.bincount(blocks, weights=than**2 - self.residual[own] ** 2)
+        if len(sums) < _FEWEST_BLOCKS:
+            return 0.0, math.inf
+        return float(sums.mean()), float(sums.std(ddof=1)) / math.sqrt(len(sums))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +191,7 @@ class RobotFit:
 
     `parameters` (P,): every column of the regressor, those not identified as in the machine; `base` and its `grouping`
     for all free columns; `condition_number` of the scaled equations; `equations`, weighted by joint, for what further
-    restricts the parameters; `machine` as it was, but with the fitted slope of dry friction.
+    restricts the parameters; `machine` as it was.
     """
 
     machine: CoupledMachine
@@ -164,6 +201,7 @@ class RobotFit:
     base: BaseParameterSet
     identified: Identified
     torque_error: TorqueError
+    left_out: LeftOut
     condition_number: float
     equations: Equations
 
@@ -179,52 +217,33 @@ def identify_robot(runs: Sequence[RobotRun], machine: CoupledMachine, what: Robo
     UsageError for another machine.
     """
     what = what or RobotParameters()
-    regressor, slopes = regressor_of(machine), machine.coulomb_slope
+    regressor = regressor_of(machine)
     free = tuple(i for i, column in enumerate(regressor.columns) if column.group in what.groups)
     grouping = group_columns(regressor, free)
-    windows = _Windows(tuple(runs), grouping, what)
     known = regressor.values
     start = grouping.combination @ known[list(free)]
-    if what.slope and what.friction and any(machine.coulomb_slope):
-        machine = _with_best_slopes(machine, windows, start)
-        regressor = regressor_of(machine)
     bounded = _bounds(regressor.columns, grouping)
-    solution = _Solution.of(windows.equations(regressor), start, bounded, len(machine.joints))
+    solution = _Solution.of(_windows_of(runs, regressor, grouping, what), start, bounded, len(machine.joints))
     equations = solution.equations
     parameters = known.copy()
     parameters[list(grouping.base)] += solution.values - start
     transfer = _Transfer.of(runs, regressor, grouping, solution)
     base = _base_set(regressor.columns, grouping, solution, transfer)
     condition = condition_number(equations.rows)
-    identified = _Judge(
-        runs, machine, regressor.columns, grouping, base, transfer, condition, solution, slopes
-    ).outcome()
+    judge = _Judge(runs, machine, regressor.columns, grouping, base, transfer, condition, solution)
+    left_out = _left_out(solution, start, bounded)
     return RobotFit(
         machine=machine,
         parameters=parameters,
         columns=regressor.columns,
         grouping=grouping,
         base=base,
-        identified=identified,
-        torque_error=_torque_error(solution, start, machine),
+        identified=judge.outcome(),
+        torque_error=_torque_error(solution, left_out, machine),
+        left_out=left_out,
         condition_number=condition,
         equations=equations,
     )
-
-
-def predict_torque(fit: RobotFit, run: RobotRun) -> FloatArray:
-    """Return the torque (n, J) [N m, N] that the fitted model needs for a run's motion without contact.
-
-    The acceleration is the central derivative of the speed. NaN without it, and for a joint at rest (below its stick
-    speed), where dry friction is unknown.
-    """
-    machine, regressor, acceleration = fit.machine, regressor_of(fit.machine), run.acceleration()
-    torque = machine.required_torque(run.position, run.speed, acceleration)
-    change = fit.parameters - regressor.values
-    for column in np.flatnonzero(change).tolist():
-        torque += change[column] * regressor.torque(column, run.position, run.speed, acceleration)
-    torque[np.abs(run.speed) < np.array(machine.stick_speed)] = np.nan
-    return torque
 
 
 def fitted_robot(fit: RobotFit) -> UrdfRobot:
@@ -248,6 +267,23 @@ def fitted_robot(fit: RobotFit) -> UrdfRobot:
         coulomb_friction=tuple((values[Group.COULOMB] * np.abs(ratio)).tolist()),
         constant_force=tuple((values[Group.CONSTANT] * ratio).tolist()),
     )
+
+
+def joint_estimates(fit: RobotFit, joint: int, method: Method) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...]]:
+    """Return friction and constant force of a joint as fitted: those that are identifiable, and the others.
+
+    The others belong to the values of all joints: together they describe the runs. They have no standard error.
+    """
+    errors = {(item.key, item.joint): item.standard_error for item in fit.identified.estimates}
+    known: list[Estimate] = []
+    together: list[Estimate] = []
+    for group in (Group.VISCOUS, Group.COULOMB, Group.CONSTANT):
+        value = float(fit.parameters[_columns_of(fit, group)[joint]])
+        error = errors.get((group.value, joint), math.nan)
+        unit = _UNITS[group][_slides(fit.machine, joint)]
+        estimate = Estimate("machine", group.value, value, error, unit, method, joint)
+        (known if math.isfinite(error) else together).append(estimate)
+    return tuple(known), tuple(together)
 
 
 def _columns_of(fit: RobotFit, group: Group) -> list[int]:
@@ -293,83 +329,46 @@ def resting_windows(run: RobotRun, machine: CoupledMachine, window: Window) -> B
     return window.average(rests.astype(np.float64)) > _REST_SHARE
 
 
-class _Windows:
-    """The equations of the runs; what does not depend on the shape of dry friction is computed once."""
-
-    def __init__(self, runs: tuple[RobotRun, ...], grouping: Grouping, what: RobotParameters) -> None:
-        self._runs = runs
-        self._grouping = grouping
-        self._what = what
-        self._kept: dict[tuple[int, int], FloatArray] = {}
-
-    def equations(self, regressor: Regressor) -> Equations:
-        """Return all equations, unweighted; what is not free is subtracted. Raises IdentificationError, UsageError."""
-        machine, parts = regressor.machine, []
-        for index, run in enumerate(self._runs):
-            if run.joint_count != len(machine.joints):
-                raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
-            window = Window.of(self._what.half_width, run.period)
-            torque = window.average(run.torque) - self._known(index, regressor, window)
-            rows = np.stack([self._column(index, regressor, window, own) for own in self._grouping.base], axis=2)
-            valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
-            place, joint = np.nonzero(valid)
-            times = run.start + run.period * (place * window.step + len(window.weights) // 2)
-            parts.append(
-                (rows[valid], torque[valid], joint.astype(np.float64), times, np.full(len(place), 1.0 * index))
-            )
-        if not any(len(part[1]) for part in parts):
-            raise IdentificationError(
-                "no joint moves in these runs for longer than a window", "use runs with motion, without contact"
-            )
-        return Equations(*(np.concatenate(item) for item in zip(*parts, strict=True)))
-
-    def _column(self, index: int, regressor: Regressor, window: Window, column: int) -> FloatArray:
-        """Return the windows (K, J) of a column."""
-        key = index, column
-        if key in self._kept:
-            return self._kept[key]
-        momentum, rest = regressor.momentum(column, self._runs[index].position, self._runs[index].speed)
-        values = window.rate(momentum) + window.average(rest)
-        if regressor.columns[column].group not in _DRY:
-            self._kept[key] = values
-        return values
-
-    def _known(self, index: int, regressor: Regressor, window: Window) -> FloatArray:
-        """Return the windows' torques (K, J) of the parameters that are not free."""
-        run, free, values = self._runs[index], self._what.groups, regressor.values
-        total = np.zeros_like(window.average(run.position))
-        if Group.INERTIAL not in free:
-            momentum, velocity_force, gravity = regressor.machine.momentum_terms(run.position, run.speed)
-            total += window.rate(momentum) + window.average(gravity - velocity_force)
-        for column, item in enumerate(regressor.columns):
-            # The machine's momentum contains its drives.
-            contained = item.group is Group.DRIVE_INERTIA and Group.INERTIAL not in free
-            factor = (0.0 if item.group in free else 1.0) - (1.0 if contained else 0.0)
-            if item.group is not Group.INERTIAL and values[column] and factor:
-                total += factor * values[column] * self._column(index, regressor, window, column)
-        return total
+def _windows_of(runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, what: RobotParameters) -> Equations:
+    """Return all equations, unweighted; what is not free is subtracted. Raises IdentificationError, UsageError."""
+    machine, parts = regressor.machine, []
+    for index, run in enumerate(runs):
+        if run.joint_count != len(machine.joints):
+            raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
+        window = Window.of(what.half_width, run.period)
+        torque = window.average(run.torque) - _known_torque(run, regressor, window, what.groups)
+        rows = np.stack([window_of_column(run, regressor, window, own) for own in grouping.base], axis=2)
+        valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
+        place, joint = np.nonzero(valid)
+        times = run.start + run.period * (place * window.step + len(window.weights) // 2)
+        parts.append((rows[valid], torque[valid], joint.astype(np.float64), times, np.full(len(place), 1.0 * index)))
+    if not any(len(part[1]) for part in parts):
+        raise IdentificationError(
+            "no joint moves in these runs for longer than a window", "use runs with motion, without contact"
+        )
+    return Equations(*(np.concatenate(item) for item in zip(*parts, strict=True)))
 
 
-def _with_best_slopes(machine: CoupledMachine, windows: _Windows, start: FloatArray) -> CoupledMachine:
-    """Return the machine with the slope of each joint's dry friction that explains its torques clearly better."""
-    own = machine.coulomb_slope
-    equations = windows.equations(regressor_of(machine))
-    weights = _joint_weights(equations, start, len(own))
-    best, least = list(own), _squares(equations, start, weights) * _CLEARLY_BETTER
-    for slope in _SLOPES:
-        tried = replace(machine, coulomb_slope=tuple(slope if item else 0.0 for item in own))
-        squares = _squares(windows.equations(regressor_of(tried)), start, weights)
-        for joint, square in enumerate(squares.tolist()):
-            if own[joint] and square < least[joint]:
-                best[joint], least[joint] = slope, square
-    return replace(machine, coulomb_slope=tuple(best))
+def window_of_column(run: RobotRun, regressor: Regressor, window: Window, column: int) -> FloatArray:
+    """Return the windows (K, J) of a column of the regressor: int -w' p + w h dt."""
+    momentum, rest = regressor.momentum(column, run.position, run.speed)
+    return window.rate(momentum) + window.average(rest)
 
 
-def _squares(equations: Equations, start: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the sum of squares of each joint's residual (J,)."""
-    joints = equations.joints.astype(np.int64)
-    residual = equations.torques - equations.rows @ _solve(_weighted(equations, weights[joints]), start)
-    return np.asarray(np.bincount(joints, residual**2, minlength=len(weights)), dtype=np.float64)
+def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: frozenset[Group]) -> FloatArray:
+    """Return the windows' torques (K, J) of the parameters that are not free."""
+    values = regressor.values
+    total = np.zeros_like(window.average(run.position))
+    if Group.INERTIAL not in free:
+        momentum, velocity_force, gravity = regressor.machine.momentum_terms(run.position, run.speed)
+        total += window.rate(momentum) + window.average(gravity - velocity_force)
+    for column, item in enumerate(regressor.columns):
+        # The machine's momentum contains its drives.
+        contained = item.group is Group.DRIVE_INERTIA and Group.INERTIAL not in free
+        factor = (0.0 if item.group in free else 1.0) - (1.0 if contained else 0.0)
+        if item.group is not Group.INERTIAL and values[column] and factor:
+            total += factor * values[column] * window_of_column(run, regressor, window, column)
+    return total
 
 
 def _joint_weights(equations: Equations, start: FloatArray, count: int) -> FloatArray:
@@ -404,7 +403,12 @@ class _Solution:
     values: FloatArray
     unbounded: FloatArray
     covariance: FloatArray
-    block_count: int
+    blocks: Index
+
+    @property
+    def block_count(self) -> int:
+        """Return the number of blocks."""
+        return int(self.blocks.max()) + 1
 
     @classmethod
     def of(cls, plain: Equations, start: FloatArray, is_bounded: BoolArray, joint_count: int) -> _Solution:
@@ -414,21 +418,20 @@ class _Solution:
         values = _not_negative(equations, start, unbounded, is_bounded)
         blocks = jackknife_blocks(equations, equations.torques - equations.rows @ unbounded)
         covariance = jackknife_covariance(equations, unbounded, blocks)
-        return cls(equations, weights, values, unbounded, covariance, int(blocks.max()) + 1)
+        return cls(equations, weights, values, unbounded, covariance, blocks)
 
 
 def _weighted(plain: Equations, weights: FloatArray) -> Equations:
     return replace(plain, rows=plain.rows * weights[:, np.newaxis], torques=plain.torques * weights)
 
 
-def _inverse(rows: FloatArray) -> FloatArray:
-    """Return (Y'Y)^-1 (B, B) without the directions that the rows do not contain; columns are scaled to length 1."""
+def _whitening(rows: FloatArray) -> FloatArray:
+    """Return W (B, r) with W W' = (Y'Y)^-1, so that Y W is orthonormal; without directions that Y does not contain."""
     scale = column_scale(rows)
     upper = np.linalg.qr(rows * scale, mode="r")
     _, values, right = np.linalg.svd(upper, full_matrices=False)
     seen = values > _UNSEEN * max(float(values[0]), 1e-300)
-    basis = scale[:, np.newaxis] * right[seen].T / values[seen]
-    return np.asarray(basis @ basis.T)
+    return np.asarray(scale[:, np.newaxis] * right[seen].T / values[seen])
 
 
 def _solve(equations: Equations, start: FloatArray) -> FloatArray:
@@ -495,9 +498,9 @@ def _correlation_time(times: FloatArray, residual: FloatArray) -> float:
 def jackknife_covariance(equations: Equations, values: FloatArray, blocks: Index) -> FloatArray:
     """Return the jackknife's covariance (B, B), from the fits without one block each; infinite below 3 blocks.
 
-    beta without block b = beta - (Y'Y)^-1 Y_b' (I - H_b)^-1 e_b with the leverage H_b = Y_b (Y'Y)^-1 Y_b'.
+    beta without block b = beta - (Y'Y - Y_b'Y_b)^-1 Y_b' e_b with its residual e_b, in orthonormal coordinates.
     """
-    inverse = _inverse(equations.rows)
+    whitening = _whitening(equations.rows)
     residual = equations.torques - equations.rows @ values
     count = int(blocks.max()) + 1
     if count < 3:
@@ -505,10 +508,9 @@ def jackknife_covariance(equations: Equations, values: FloatArray, blocks: Index
     changes = np.empty((count, len(values)))
     for block in range(count):
         own = blocks == block
-        rows = equations.rows[own]
-        gain = inverse @ rows.T
-        left = np.eye(int(own.sum())) - rows @ gain
-        changes[block] = gain @ np.linalg.lstsq(left, residual[own], rcond=1e-10)[0]
+        rows = equations.rows[own] @ whitening
+        left = np.eye(whitening.shape[1]) - rows.T @ rows
+        changes[block] = whitening @ np.linalg.lstsq(left, rows.T @ residual[own], rcond=1e-10)[0]
     changes -= changes.mean(axis=0)
     return np.asarray((count - 1.0) / count * changes.T @ changes)
 
@@ -570,7 +572,7 @@ def _base_set(
     return BaseParameterSet(
         names=tuple(grouping.name(row, columns) for row in range(len(grouping.base))),
         values=solution.values,
-        standard_errors=np.sqrt(np.diag(solution.covariance)),
+        covariance=solution.covariance,
         excitation=transfer.excitation,
         uncertainty=transfer.uncertainty,
         identifiable=tuple(trusted.tolist()),
@@ -589,7 +591,6 @@ class _Judge:
     transfer: _Transfer
     condition: float
     solution: _Solution
-    slopes: tuple[float, ...]
 
     def outcome(self) -> Identified:
         """Return the estimates per joint, and one answer for the whole set of inertial parameters."""
@@ -605,25 +606,7 @@ class _Judge:
             else:
                 missing.append(found)
         missing.extend(self._of_set())
-        estimates.extend(self._new_slopes(estimates))
         return Identified(tuple(estimates), tuple(missing))
-
-    def _new_slopes(self, estimates: Sequence[Estimate]) -> list[Estimate]:
-        """Return the slopes of dry friction that were changed, of joints with a known Coulomb friction."""
-        known = {item.joint for item in estimates if item.key == Group.COULOMB.value and item.value > 0.0}
-        changed = [j for j in sorted(known) if self.machine.coulomb_slope[j] != self.slopes[j]]
-        return [
-            Estimate(
-                "machine",
-                "coulomb_slope",
-                self.machine.coulomb_slope[joint],
-                math.nan,
-                "s/m" if self._slides(joint) else "s/rad",
-                Method.LEAST_SQUARES,
-                joint,
-            )
-            for joint in changed
-        ]
 
     def _of_joint(self, index: int, column: Column) -> Estimate | NotIdentifiable:
         if not self.grouping.is_alone(index):
@@ -643,9 +626,16 @@ class _Judge:
         if unbounded < -2.0 * error and value == 0.0:
             # No noise explains this: the model, or the sign of a channel, is wrong.
             return self._refused(column, (Missing.OTHER_MOTION,), {"least_squares": unbounded, "standard_error": error})
-        slides = self._slides(column.joint)
-        unit = _UNITS[column.group][slides]
-        return Estimate("machine", column.group.value, value, error, unit, Method.LEAST_SQUARES, column.joint)
+        slides = _slides(self.machine, column.joint)
+        return Estimate(
+            "machine",
+            column.group.value,
+            value,
+            error,
+            _UNITS[column.group][slides],
+            Method.LEAST_SQUARES,
+            column.joint,
+        )
 
     def _refused(self, column: Column, missing: tuple[Missing, ...], numbers: dict[str, float]) -> NotIdentifiable:
         return NotIdentifiable("machine", column.group.value, missing, numbers, column.joint)
@@ -685,24 +675,42 @@ class _Judge:
         needed = (Missing.OTHER_MOTION, Missing.MORE_RECORDINGS) if few_blocks else (Missing.OTHER_MOTION,)
         return [NotIdentifiable("machine", "base_parameters", needed, numbers)]
 
-    def _slides(self, joint: int) -> bool:
-        if not isinstance(self.machine, UrdfRobot):
-            return False
-        tree = self.machine.tree
-        return next(item.prismatic for item in tree.joints if item.name == tree.order[joint])
+
+def _slides(machine: CoupledMachine, joint: int) -> bool:
+    """Return whether a joint is prismatic."""
+    if not isinstance(machine, UrdfRobot):
+        return False
+    tree = machine.tree
+    return next(item.prismatic for item in tree.joints if item.name == tree.order[joint])
 
 
-def _torque_error(solution: _Solution, start: FloatArray, machine: CoupledMachine) -> TorqueError:
+def _left_out(solution: _Solution, start: FloatArray, is_bounded: BoolArray) -> LeftOut:
+    """Return the residuals of each fold by the fit without it, unweighted."""
     equations = solution.equations
-    left_out = np.empty(len(equations.torques))
+    residual = np.empty(len(equations.torques))
     folds = _folds(equations)
     for fold in np.unique(folds):
         own = folds == fold
         rest = replace(equations, rows=equations.rows[~own], torques=equations.torques[~own])
-        values = _solve(rest, start) if len(rest.torques) else start
-        left_out[own] = equations.torques[own] - equations.rows[own] @ values
-    explained = equations.torques - equations.rows @ solution.values
-    return TorqueError(_per_joint(explained, solution, machine), _per_joint(left_out, solution, machine))
+        values = _not_negative(rest, start, _solve(rest, start), is_bounded) if len(rest.torques) else start
+        residual[own] = equations.torques[own] - equations.rows[own] @ values
+    joints = equations.joints.astype(np.int64)
+    scale = 1.0 / solution.weights[joints]
+    previous = (equations.torques - equations.rows @ start) * scale
+    return LeftOut(residual * scale, previous, joints, solution.blocks)
+
+
+def _torque_error(solution: _Solution, left_out: LeftOut, machine: CoupledMachine) -> TorqueError:
+    equations, count = solution.equations, len(machine.joints)
+    explained = (equations.torques - equations.rows @ solution.values) / solution.weights[left_out.joints]
+    rest = (explained, left_out.residual, left_out.previous)
+    return TorqueError(*(_per_joint(item, left_out.joints, count) for item in rest))
+
+
+def _per_joint(residual: FloatArray, joints: Index, count: int) -> FloatArray:
+    """Return the RMS of each joint (J,); NaN without a window."""
+    chosen = [residual[joints == joint] for joint in range(count)]
+    return np.array([_rms(item) if len(item) else np.nan for item in chosen])
 
 
 def _folds(equations: Equations) -> Index:
@@ -714,12 +722,3 @@ def _folds(equations: Equations) -> Index:
         return np.zeros(len(equations.times), dtype=np.int64)
     parts = np.floor(_FOLDS * (equations.times - start) / length).astype(np.int64)
     return np.minimum(parts, _FOLDS - 1)
-
-
-def _per_joint(residual: FloatArray, solution: _Solution, machine: CoupledMachine) -> FloatArray:
-    error = np.full(len(machine.joints), np.nan)
-    for joint, weight in enumerate(solution.weights):
-        own = residual[solution.equations.joints == joint]
-        if len(own):
-            error[joint] = float(np.sqrt(np.mean(own**2))) / weight
-    return error

@@ -30,6 +30,7 @@ from cdtool.identification.estimate import (
     Missing,
     NotIdentifiable,
 )
+from cdtool.identification.observed_slope import observed_slope
 from cdtool.identification.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.recording import BoolArray, FloatArray
 
@@ -1012,7 +1013,8 @@ def _reported(
             report.add(key, fitted.get(key), (Missing.ACCELERATION,), {"unexplained_share": _unexplained(fit)})
     limits = (Missing.SATURATION,) if source.is_command else (Missing.SATURATION, Missing.REFERENCE_TORQUE)
     report.add("anti_windup_rate", fitted.get("anti_windup_rate"), limits, {})
-    report.add("slew_limit", fitted.get("slew_limit"), limits, {"largest_n_per_s": _largest_slope(fit, source)})
+    slope = observed_slope(runs, source.is_command, model.values["lag"])
+    report.add("slew_limit", fitted.get("slew_limit"), limits, {"largest_n_per_s": slope})
     report.add("force_limit", fitted.get("force_limit"), limits, {"largest_n": _largest(fit.sections.output)})
     report.add("speed_filter_hz", speed_filter, (Missing.HIGHER_RATE,), {})
     report.add_lag(lag)
@@ -1134,11 +1136,6 @@ def _largest(values: FloatArray) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def _largest_slope(fit: _Fit, source: _Source) -> float:
-    """Return the largest slope of the command [N/s]; NaN where only the noisy torque is known."""
-    return float(np.max(_steps(fit.sections))) / fit.sections.period if source.is_command else math.nan
-
-
 def _speed_filter(
     runs: Sequence[AxisRun], fitted: Mapping[str, _Measured], source: _Source, model: _Model
 ) -> tuple[_Measured | None, int]:
@@ -1206,7 +1203,9 @@ def _without_references(runs: Sequence[AxisRun], settings: ControllerSettings) -
             report.add(key, None, needed, {"constant_speed_sections": float(len(pieces))})
             continue
         report.add(key, _Measured(model.values[key], float(uncertainty.total[index])), needed, {})
-    for key in ("position_gain", "anti_windup_rate", "slew_limit", "force_limit", "delay", "force_lag"):
+    slope = observed_slope(runs, is_command, model.values["lag"])
+    report.add("slew_limit", None, needed, {"largest_n_per_s": slope})
+    for key in ("position_gain", "anti_windup_rate", "force_limit", "delay", "force_lag"):
         report.add(key, None, needed, {})
     speed_filter, order = _speed_filter(runs, {}, _LOGGED_ALONE, model)
     report.method = Method.OUTPUT_ERROR

@@ -20,9 +20,10 @@ from cdtool.axis_model.parameters import AxisModel, Controller
 from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.axis_model.simulation import AxisInputs, AxisMotion, simulate_axis
 from cdtool.errors import RecordingError
-from cdtool.identification.axis_run import AxisRun
+from cdtool.identification.axis_run import USED, AxisRun
+from cdtool.injection.assumption import Assumption, ControllerReaction, DriveBeyond
 from cdtool.injection.channel_change import ChannelChange
-from cdtool.recording import FloatArray
+from cdtool.recording import BoolArray, FloatArray
 
 # Time after contact [s] at which the model's own error begins to dominate the forces.
 RELIABLE_FOR = 0.2
@@ -30,25 +31,28 @@ RELIABLE_FOR = 0.2
 _LONGEST_APPROACH = 30.0
 # A controller without which the motor would not notice the contact: as stiff as the sampling permits.
 _STIFF_SHARE = 0.2
+# Further, or faster, than known: by more than the error of a simulation.
+_BEYOND = 1.05
+# The speed is compared with the log's over so long before the contact [s], and may differ by these shares.
+_COMPARED_TIME = 0.1
+_DOUBTFUL_DEVIATION, _LARGEST_DEVIATION = 0.05, 0.2
+# Correlation of the measured torque and the model's during the approach below which one has the opposite sign.
+_OPPOSITE = -0.3
+# The brackets' controller has at most this period [s], whatever the log's: how it reacts must not depend on the log.
+_LONGEST_PERIOD = 1e-3
 # The load has lost the contact when the force is below this share of the peak so far.
 _SEPARATED = 1e-3
-
-
-class ControllerReaction(Enum):
-    """How the drive reacts to the contact, where its controller is not known: two brackets."""
-
-    KNOWN = "known controller"
-    FROZEN = "controller frozen"
-    STIFF = "controller stiff"
 
 
 class Doubt(Enum):
     """What limits an injected contact."""
 
     RIGID_DRIVE = "the drive is modelled as rigid"
-    WIND_UP_BEYOND_FREE_RUNS = "the drive winds up further than in the impact-free log"
+    WIND_UP_BEYOND_FREE_RUNS = "the drive winds up further than in impact-free logs"
+    SLOPE_BEYOND_FREE_RUNS = "the command rises faster than in impact-free logs, and its limit is not known"
     SEPARATION = "the load separates from the obstacle"
     CONTROLLER_UNKNOWN = "the reaction of the controller is an assumption"
+    APPROACH_SPEED = "before the contact the model's speed differs from the log's by more than 5 %"
     ACCELEROMETER_UNKNOWN = "the bandwidth of the accelerometer is not known"
 
 
@@ -69,7 +73,7 @@ class InjectedContact:
     separation: float
     free_wind_up: float
     wind_up: float
-    reaction: ControllerReaction
+    assumption: Assumption
     doubts: tuple[Doubt, ...]
 
 
@@ -79,20 +83,22 @@ def axis_contact(
     obstacle: Obstacle,
     contact: float,
     duration: float = 1.0,
-    reaction: ControllerReaction = ControllerReaction.KNOWN,
+    assumption: Assumption | None = None,
 ) -> InjectedContact:
     """Return the effect of an obstacle that is reached at the time `contact` [s], for `duration` [s] after it.
 
-    `run` is the impact-free log on the load side. Without a controller in the model, `reaction` must be a bracket.
-    Raises RecordingError where the contact is outside the log, the axis is at rest then, or where the contact changes
-    nothing in the model.
+    `run` is the impact-free log on the load side. `assumption`: one of `assumptions_of(model)`; without a controller in
+    the model, it must be a bracket.
+    Raises RecordingError where the contact is outside the log or in a gap of it, where the axis is at rest then, where
+    the model does not follow the log, or where the contact changes nothing in the model.
     """
-    if not run.start <= contact <= run.time[-1]:
-        raise RecordingError(
-            f"{run.name}: the contact at {contact:.3f} s is outside the log",
-            f"choose a time from {run.start:.3f} to {run.time[-1]:.3f} s",
-        )
-    model = _with_controller(model, run, reaction)
+    _require_samples(run, contact)
+    assumption = assumption or Assumption()
+    if _moves_backward(run, contact) and (assumption.drive is DriveBeyond.RIGID or _has_two_flanks(model)):
+        # The curve of the drive is that of a contact: its take-up lies in the direction of motion.
+        turned = axis_contact(_turned(run), _turned_model(model), obstacle, contact, duration, assumption)
+        return _turned_contact(turned)
+    model = assumption.model(_with_controller(model, run, assumption.controller))
     controller = model.controller
     assert controller is not None
     begin = _beginning(run, contact)
@@ -106,10 +112,59 @@ def axis_contact(
     approach = float(np.interp(at, np.arange(count), speed))
     if abs(approach) < 1e-4 * float(np.max(np.abs(speed)) or 1.0):
         raise RecordingError(f"{run.name}: the axis is at rest at {contact:.3f} s", "choose a contact while it moves")
+    deviation = _deviation_from(run, free, time, contact)
     placed = obstacle.at(place, 1 if approach > 0.0 else -1)
-    against = replace(inputs, command=free["command"]) if reaction is ControllerReaction.FROZEN else inputs
+    frozen = assumption.controller is ControllerReaction.FROZEN
+    against = replace(inputs, command=free["command"]) if frozen else inputs
     hit = simulate_axis(model, against, placed)
-    return _difference(model, free, hit, time, (contact, approach), reaction)
+    return _difference(model, free, hit, time, (contact, approach, deviation), assumption)
+
+
+def _require_samples(run: AxisRun, contact: float) -> None:
+    """Raise RecordingError unless torque and motion are known just before the contact."""
+    if not run.start <= contact <= run.time[-1]:
+        raise RecordingError(
+            f"{run.name}: the contact at {contact:.3f} s is outside the log",
+            f"choose a time from {run.start:.3f} to {run.time[-1]:.3f} s",
+        )
+    channels = {name: getattr(run, name) for name in ("speed", "position")}
+    moves = [name for name, values in channels.items() if values is not None and np.isfinite(values).any()]
+    if not moves:
+        raise RecordingError(f"{run.name}: speed and position have no value", "check [channels]")
+    known = run.known("torque", moves[0])
+    before = int((contact - run.start) / run.period)
+    if not known[max(before - 1, 0) : before + 1].all():
+        raise RecordingError(f"{run.name}: the log has a gap at {contact:.3f} s", "choose another position")
+
+
+def _deviation_from(run: AxisRun, free: AxisMotion, time: FloatArray, contact: float) -> float:
+    """Return by which share the model's speed before the contact differs from the log's.
+
+    Raises RecordingError above 20 %, and where the torque has the opposite sign of the model's: such a model does not
+    describe the log, and what a contact changes in it is not what it would change in the machine.
+    """
+    last = (run.time > contact - _COMPARED_TIME) & (run.time <= contact)
+    logged, clock = _speed(run), run.time
+    simulated = np.interp(clock[last], time, free["motor_speed"])
+    known = np.isfinite(logged[last])
+    speed = float(np.mean(logged[last][known]))
+    deviation = abs(float(np.mean(simulated[known])) - speed) / abs(speed) if speed else math.inf
+    if deviation > _LARGEST_DEVIATION:
+        raise RecordingError(
+            f"{run.name}: before the contact at {contact:.3f} s the model moves at {float(np.mean(simulated)):.3g}, "
+            f"the log at {speed:.3g} m/s or rad/s",
+            "check masses, friction and [model.controller], or identify them",
+        )
+    approach = (clock >= time[0]) & (clock <= contact) & np.isfinite(run.torque)
+    measured, force = run.torque[approach], np.interp(clock[approach], time, free["drive_force"])
+    if len(measured) > 1 and np.std(measured) > 0.0 and np.std(force) > 0.0:
+        correlation = float(np.corrcoef(measured, force)[0, 1])
+        if correlation < _OPPOSITE:
+            raise RecordingError(
+                f"{run.name}: the torque falls where the model's rises",
+                "check the sign (scale) of torque in [channels]",
+            )
+    return deviation
 
 
 def _with_controller(model: AxisModel, run: AxisRun, reaction: ControllerReaction) -> AxisModel:
@@ -120,9 +175,10 @@ def _with_controller(model: AxisModel, run: AxisRun, reaction: ControllerReactio
                 f"{run.name}: the model has no controller", "identify it, or use the brackets 'frozen' and 'stiff'"
             )
         return model
-    gain = _STIFF_SHARE * model.drive.total_mass / run.period
+    period = min(run.period, _LONGEST_PERIOD)
+    gain = _STIFF_SHARE * model.drive.total_mass / period
     follows = Controller(
-        period=run.period, speed_gain=gain, integral_gain=0.1 * gain / run.period * _STIFF_SHARE, speed_filter_order=0
+        period=period, speed_gain=gain, integral_gain=0.1 * gain / period * _STIFF_SHARE, speed_filter_order=0
     )
     return replace(model, controller=follows)
 
@@ -192,10 +248,10 @@ def _difference(
     free: AxisMotion,
     hit: AxisMotion,
     time: FloatArray,
-    contact: tuple[float, float],
-    reaction: ControllerReaction,
+    contact: tuple[float, float, float],
+    assumption: Assumption,
 ) -> InjectedContact:
-    start, approach = contact
+    start, approach, deviation = contact
     change = hit.rows - free.rows
     rows = dict(zip(ROWS, change, strict=True))
     sensors, period = model.sensors, hit.period
@@ -221,13 +277,13 @@ def _difference(
     separation = _separation(time, force)
     free_wind_up, wind_up = (float(np.max(np.abs(item["wind_up"]))) for item in (free, hit))
     until = min(start + RELIABLE_FOR, separation)
-    reached = time <= until
-    beyond = not model.drive.is_rigid and float(np.max(np.abs(hit["wind_up"][reached]))) > 1.05 * free_wind_up
     doubts = {
         Doubt.RIGID_DRIVE: model.drive.is_rigid,
-        Doubt.WIND_UP_BEYOND_FREE_RUNS: beyond,
+        Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, free, hit, time <= until),
+        Doubt.SLOPE_BEYOND_FREE_RUNS: _rises_beyond(model, hit, time <= until),
         Doubt.SEPARATION: separation < start + RELIABLE_FOR,
-        Doubt.CONTROLLER_UNKNOWN: reaction is not ControllerReaction.KNOWN,
+        Doubt.CONTROLLER_UNKNOWN: assumption.controller is not ControllerReaction.KNOWN,
+        Doubt.APPROACH_SPEED: deviation > _DOUBTFUL_DEVIATION,
         Doubt.ACCELEROMETER_UNKNOWN: sensors.accelerometer_hz == 0.0,
     }
     return InjectedContact(
@@ -240,9 +296,58 @@ def _difference(
         separation=separation,
         free_wind_up=free_wind_up,
         wind_up=wind_up,
-        reaction=reaction,
+        assumption=assumption,
         doubts=tuple(doubt for doubt, applies in doubts.items() if applies),
     )
+
+
+def _winds_up_beyond(model: AxisModel, free: AxisMotion, hit: AxisMotion, reliable: BoolArray) -> bool:
+    """Whether the contact winds the drive up by 5 % more than its stiffness is known for."""
+    if model.drive.is_rigid:
+        return False
+    known = max(float(np.max(np.abs(free["wind_up"]))), model.drive.observed_wind_up)
+    return float(np.max(np.abs(hit["wind_up"][reliable]))) > _BEYOND * known
+
+
+def _rises_beyond(model: AxisModel, hit: AxisMotion, reliable: BoolArray) -> bool:
+    """Whether a command without a known slew limit rises by 5 % faster than it was observed to."""
+    controller = model.controller
+    if controller is None or math.isfinite(controller.slew_limit) or controller.observed_slope == 0.0:
+        return False
+    slope = np.abs(np.diff(hit["command"], prepend=hit["command"][0])) / hit.period
+    return float(np.max(slope[reliable])) > _BEYOND * controller.observed_slope
+
+
+def _moves_backward(run: AxisRun, contact: float) -> bool:
+    speed = _filled(run.time, _speed(run), np.array([contact]))
+    return bool(speed[0] < 0.0)
+
+
+def _has_two_flanks(model: AxisModel) -> bool:
+    """Whether the drive has another stiffness in one direction than in the other."""
+    drive = model.drive
+    return math.isfinite(drive.take_up_travel) or math.isfinite(drive.end_stiffness) or drive.backlash > 0.0
+
+
+def _turned(run: AxisRun) -> AxisRun:
+    """Return the run of the same axis with its positive direction reversed."""
+    values = {name: getattr(run, name) for name in USED}
+    return replace(run, **{name: -item for name, item in values.items() if item is not None})
+
+
+def _turned_model(model: AxisModel) -> AxisModel:
+    friction = replace(
+        model.friction,
+        coulomb_forward=model.friction.coulomb_backward,
+        coulomb_backward=model.friction.coulomb_forward,
+        offset=-model.friction.offset,
+    )
+    return replace(model, friction=friction)
+
+
+def _turned_contact(contact: InjectedContact) -> InjectedContact:
+    changes = {name: replace(change, values=-change.values) for name, change in contact.changes.items()}
+    return replace(contact, changes=changes, speed=-contact.speed)
 
 
 def _measured_speed(model: AxisModel, rows: Mapping[str, FloatArray], period: float) -> FloatArray:

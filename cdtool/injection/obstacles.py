@@ -39,7 +39,8 @@ def read_obstacle(table: Table, known: Mapping[str, Obstacle]) -> Obstacle:
     """Return the obstacle that a table describes: `profile`, `stiffness_n_per_mm`, or a force curve.
 
     A curve has `deflection_mm` and `force_n`, from 0. `damping_s_per_m` is that of T (1 + damping * speed),
-    `in_series_n_per_mm` what is in series, such as a load cell. Raises ConfigurationError naming the key.
+    `in_series_n_per_mm` what is in series, such as a load cell. A given damping replaces a profile's, a given series
+    stiffness adds to its. Raises ConfigurationError naming the key.
     """
     forms = [key for key in ("profile", "stiffness_n_per_mm", "force_n") if key in table]
     if len(forms) != 1:
@@ -52,9 +53,9 @@ def read_obstacle(table: Table, known: Mapping[str, Obstacle]) -> Obstacle:
         if name not in known:
             raise table.fault("profile", f"is '{name}'", nearest(name, known))
         spring = known[name]
-        obstacle = Obstacle(
-            spring.deflection, spring.force, damping or spring.damping, min(series, spring.series_stiffness)
-        )
+        damping = damping if "damping_s_per_m" in table else spring.damping
+        compliance = 1.0 / series + 1.0 / spring.series_stiffness
+        obstacle = Obstacle(spring.deflection, spring.force, damping, 1.0 / compliance if compliance else math.inf)
     elif forms == ["stiffness_n_per_mm"]:
         obstacle = Obstacle.spring(table.number("stiffness_n_per_mm", above=0.0) * _PER_MM, damping, series)
     else:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import Enum
 
 from cdtool.axis_model.parameters import AxisModel
-from cdtool.injection.axis_contact import ControllerReaction
+from cdtool.injection.assumption import ControllerReaction
 
 
 class Refusal(Enum):

@@ -17,6 +17,7 @@ from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
 from cdtool.report.table import Log, Table
 from cdtool.report.tables import forces, recordings
+from cdtool.report.tables.injected import injected_table
 from cdtool.report.tables.provenance import provenance_tables
 from cdtool.report.tables.results import (
     calibration_table,
@@ -88,6 +89,10 @@ _NOTES = {
     ),
     "calibration": (
         "Each factor was set on impact-free operations, each assessed with a threshold that was not learned from it."
+    ),
+    "injected": (
+        "Contacts of a model in impact-free recordings; no machine has hit anything. Medians; a range is that of the "
+        "assumptions about what is not known of the machine."
     ),
     "provenance": "All results with all their digits, and the hash of every recording, are in results.json.",
 }
@@ -162,6 +167,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         limits_table(results, met=True),
         results_table(results, summaries),
         kinds_table(results, evaluated.kinds),
+        injected_table(evaluated),
         comparisons_table(evaluated),
         differences_table(evaluated),
         forces.groups_table(results),

@@ -13,7 +13,7 @@ from cdtool.workflows.benchmark.benchmark import benchmark
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.with_injected import injected_logs, with_groups
 from cdtool.workflows.execution.workers import Progress, Workers
-from cdtool.workflows.injection.inject_section import INJECTED, require_section
+from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, require_section
 from cdtool.workflows.runs import shown_path
 
 
@@ -77,16 +77,30 @@ def coverage(
         raise ConfigurationError(
             f"{setup.path}: [inject] positions are in {' and '.join(sorted(units))}", "use one unit"
         )
+    _require_different_stiffness(setup.path, section)
     injected = injected_logs(setup, section, workers, progress)
     scored = with_groups(setup, section, injected)
     impacts = {name: group for name, group in scored.impacts.items() if name.startswith(f"{INJECTED}_")}
     done = benchmark(replace(scored, impacts=impacts, limits=()), workers=workers, progress=progress)
     contacts = {
         shown_path(injected.folder / case.file, setup.path.parent): MappedContact(
-            CellKey(round(case.position_value, 9), float(f"{case.stiffness:.3g}")), case.reaction, case.reliable_until
+            CellKey(round(case.position_value, 9), float(f"{case.stiffness:.3g}")), case.assumption, case.reliable_until
         )
         for case in injected.cases
     }
     made = coverage_map(done.results.contacts, contacts, scored.detectors, units.pop())
-    skipped = (*injected.skipped, *done.results.skipped)
+    skipped = tuple(done.results.skipped)
     return Coverage(setup.machine_file.machine.name, made, skipped, tuple(done.results.findings))
+
+
+def _require_different_stiffness(path: Path, section: InjectSection) -> None:
+    """Raise ConfigurationError for two obstacles in one cell of the map."""
+    names: dict[float, str] = {}
+    for item in section.obstacles:
+        stiffness = float(f"{item.stiffness:.3g}")
+        if stiffness in names:
+            raise ConfigurationError(
+                f"{path}: obstacles {names[stiffness]} and {item.name} both begin with {stiffness / 1e3:g} N/mm",
+                "map one of them at a time: a cell is a position and a stiffness",
+            )
+        names[stiffness] = item.name

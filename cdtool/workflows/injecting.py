@@ -11,6 +11,7 @@ from cdtool.evaluation.results import Skipped
 from cdtool.files import replaced_folder
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.reading import read_as_logged
+from cdtool.log_section import LogSection
 from cdtool.remote.remote_path import location
 from cdtool.tables import read_toml
 from cdtool.version import __version__
@@ -22,6 +23,8 @@ from cdtool.workflows.written_files import require_free_folder
 
 # Tables of the benchmark file that name logs of its own.
 _OF_LOGS = ("inject", "impacts", "learn", "holdout", "limits", "campaigns", "points", "onset", "machine")
+# Keys of [learn] beside its logs and the parts of them.
+_OF_LEARNING = ("until", "guard_s")
 
 
 @dataclass(frozen=True)
@@ -96,12 +99,12 @@ def inject(
     return Injected(str(folder), replace(injected, folder=folder), sum(map(len, copied.values())))
 
 
-def _copy_learned(setup: BenchmarkFile, section: InjectSection, folder: Path) -> dict[str, list[str]]:
+def _copy_learned(setup: BenchmarkFile, section: InjectSection, folder: Path) -> dict[str, list[Any]]:
     """Write the logs to learn from and the hold-out with the same channels, so that one machine file reads all."""
     groups = {"learn": setup.learn}
     if HOLDOUT in setup.impacts:
         groups[HOLDOUT] = setup.impacts[HOLDOUT].logs
-    copied: dict[str, list[str]] = {}
+    copied: dict[str, list[Any]] = {}
     for group, logs in groups.items():
         for number, log in enumerate(logs, 1):
             recording = read_as_logged(log, setup.machine_file, unread="loss").recording
@@ -113,12 +116,21 @@ def _copy_learned(setup: BenchmarkFile, section: InjectSection, folder: Path) ->
                 "origin_s": repr(recording.origin),
             }
             write_recording(folder / name, recording, provenance, setup.machine_file)
-            copied.setdefault(group, []).append(name)
+            used = (setup.learned_sections if group == "learn" else setup.sections).get(log)
+            copied.setdefault(group, []).append(_entry(name, used))
     return copied
 
 
+def _entry(name: str, used: LogSection | None) -> str | dict[str, str]:
+    """Return a log of a benchmark file: its path, with the part of it that is used."""
+    if not used:
+        return name
+    marks = {"from": used.begin, "to": used.end}
+    return {"path": name, **{key: f"{mark.value!r}{mark.unit}" for key, mark in marks.items() if mark is not None}}
+
+
 def _write_benchmark(
-    setup: BenchmarkFile, injected: InjectedLogs, copied: Mapping[str, list[str]], folder: Path
+    setup: BenchmarkFile, injected: InjectedLogs, copied: Mapping[str, list[Any]], folder: Path
 ) -> None:
     import tomlkit
 
@@ -126,7 +138,8 @@ def _write_benchmark(
     values: dict[str, Any] = {"machine": "machine.toml"}
     values |= {key: value for key, value in given.items() if key not in _OF_LOGS}
     values.setdefault("detectors", list(setup.detectors))
-    values |= {group: {"logs": logs} for group, logs in copied.items()}
+    kept = {key: value for key, value in given.get("learn", {}).items() if key in _OF_LEARNING}
+    values |= {group: {**(kept if group == "learn" else {}), "logs": logs} for group, logs in copied.items()}
     groups: dict[str, list[str]] = {}
     for case in injected.cases:
         groups.setdefault(case.group, []).append(case.file)

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 import cdtool
+from cdtool.identification.robot_dynamics import RobotFit
+from cdtool.identification.robot_regressor import regressor_of
 from cdtool.identification.robot_run import RobotRun, robot_run
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.machines.coupled import CoupledMachine
@@ -151,3 +153,36 @@ def ur10e_run(machine: MachineFile, name: str) -> RobotRun:
     for start, end in _UR10E_CONTACTS[name]:
         near |= (time > start - _BEFORE) & (time < end + _AFTER)
     return run.without(near)
+
+
+def predicted_torque(fit: RobotFit, run: RobotRun) -> FloatArray:
+    """The torque (n, J) that a fit needs for a run's motion; NaN for a joint at rest."""
+    machine, regressor, acceleration = fit.machine, regressor_of(fit.machine), run.acceleration()
+    torque = machine.required_torque(run.position, run.speed, acceleration)
+    change = fit.parameters - regressor.values
+    for column in np.flatnonzero(change).tolist():
+        torque += change[column] * regressor.torque(column, run.position, run.speed, acceleration)
+    torque[np.abs(run.speed) < np.array(machine.stick_speed)] = np.nan
+    return torque
+
+
+def write_log(path: Path, run: RobotRun) -> Path:
+    """Write a run as a CSV log: time [s], then torques t0.., positions q0.., speeds v0.. on the load side."""
+    joints = range(run.joint_count)
+    header = ",".join(["t", *(f"{name}{j}" for name in "tqv" for j in joints)])
+    table = np.column_stack((run.time, run.torque, run.position, run.speed))
+    np.savetxt(path, table, fmt="%.9g", delimiter=",", header=header, comments="")
+    return path
+
+
+def channels_of(joints: int, scale: str = "") -> str:
+    """The [channels] of `write_log`; with a scale the torques are currents."""
+    unit = f'unit = "A", scale = {scale}' if scale else 'unit = "N m"'
+    columns = {name: str([f"{name}{j}" for j in range(joints)]).replace("'", '"') for name in "tqv"}
+    return f"""
+[channels]
+time = {{ column = "t", unit = "s" }}
+torque = {{ columns = {columns["t"]}, {unit} }}
+position = {{ columns = {columns["q"]}, unit = "rad" }}
+speed = {{ columns = {columns["v"]}, unit = "rad/s" }}
+"""

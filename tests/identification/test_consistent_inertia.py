@@ -26,7 +26,7 @@ from cdtool.recording import FloatArray
 from tests.identification.robot_motion import coloured, fourier, planar_arm
 from tests.synthetic.robots import six_joint_robot
 
-WHAT = RobotParameters(inertial=True, slope=False)
+WHAT = RobotParameters(inertial=True)
 
 
 def cloud(seed: int, points: int) -> FloatArray:

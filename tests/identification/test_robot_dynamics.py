@@ -15,7 +15,6 @@ from cdtool.identification.robot_dynamics import (
     RobotParameters,
     fitted_robot,
     identify_robot,
-    predict_torque,
 )
 from cdtool.identification.robot_regressor import Group, regressor_of
 from cdtool.identification.robot_run import RobotRun
@@ -28,12 +27,13 @@ from tests.identification.robot_motion import (
     fourier,
     panda,
     planar_arm,
+    predicted_torque,
     ur10e,
     ur10e_run,
 )
 from tests.synthetic.machines import GATE, machine_of
 
-EVERYTHING = RobotParameters(inertial=True, slope=False)
+EVERYTHING = RobotParameters(inertial=True)
 PLANAR = planar_arm(coulomb_slope=50.0)
 
 
@@ -66,7 +66,7 @@ def test_the_base_parameters_of_seven_joints_are_recovered_to_a_millionth(tmp_pa
     np.testing.assert_allclose(fit.base.values, wanted, rtol=1e-5, atol=2e-6)
     assert refused(fit, "base_parameters") == {}
     other = fourier(2, 7, 4.0, 0.002).run(machine)
-    error = predict_torque(fit, other) - other.torque
+    error = predicted_torque(fit, other) - other.torque
     assert np.isfinite(error).mean() > 0.9
     assert np.nanmax(np.abs(error)) < 1e-3
 
@@ -123,7 +123,7 @@ def test_noise_of_the_speed_and_quantised_positions_hardly_matter(tmp_path: Path
     )
     fit = identify_robot([noisy], PLANAR, EVERYTHING)
     other = fourier(5, 2, 10.0, 0.005).run(PLANAR)
-    error = predict_torque(fit, other) - other.torque
+    error = predicted_torque(fit, other) - other.torque
     assert np.sqrt(np.nanmean(error**2, axis=0)) == pytest.approx([0.0, 0.0], abs=0.05)
     assert fit.torque_error.train == pytest.approx(fit.torque_error.cross_validated, rel=0.3)
 
@@ -156,7 +156,7 @@ def test_a_joint_at_rest_has_no_friction_and_its_machine_keeps_the_old_one() -> 
     own = [i for i, column in enumerate(fit.columns) if column.joint == 1]
     np.testing.assert_allclose(fit.parameters[own], regressor_of(PLANAR).values[own], rtol=1e-12)
     assert np.isnan(fit.torque_error.train[1])
-    assert np.isnan(predict_torque(fit, motion.run(PLANAR))[:, 1]).all()
+    assert np.isnan(predicted_torque(fit, motion.run(PLANAR))[:, 1]).all()
 
 
 def ramp(speeds: tuple[float, ...], seconds: float = 6.0, period: float = 0.005) -> list[Motion]:
@@ -224,16 +224,6 @@ def test_a_torque_of_the_wrong_sign_is_not_explained_by_negative_friction() -> N
     assert all(item["least_squares"] < 0.0 for item in numbers)
 
 
-def test_the_slope_of_dry_friction_is_found() -> None:
-    slow = fourier(13, 2, 20.0, 0.005, amplitude=0.1)
-    run = slow.run(replace(PLANAR, coulomb_slope=(20.0, 200.0)), 0.02 * coloured(13, (4000, 2), 5.0))
-    fit = identify_robot([run], PLANAR)
-    assert fit.machine.coulomb_slope == (20.0, 200.0)
-    assert {joint: item.value for joint, item in by_joint(fit, "coulomb_slope").items()} == {0: 20.0, 1: 200.0}
-    kept = identify_robot([run], PLANAR, RobotParameters(slope=False))
-    assert kept.machine.coulomb_slope == PLANAR.coulomb_slope
-
-
 def test_friction_in_proportion_to_gravity_is_separated_from_coulomb_friction() -> None:
     motion = fourier(14, 2)
     run = motion.run(PLANAR, 0.02 * coloured(14, (4000, 2), 5.0))
@@ -292,24 +282,11 @@ def moving_error(run: RobotRun, torque: FloatArray, joint: int) -> float:
 
 
 @needs_data("ur10e")
-def test_friction_from_five_seconds_predicts_another_log_of_the_ur10e_better_than_the_published_one(arm) -> None:
-    machine, learned, other, _ = arm
-    fit = identify_robot([learned], machine)
-    published = machine.required_torque(other.position, other.speed, other.acceleration())
-    predicted = predict_torque(fit, other)
-    # The slope of dry friction is what makes the difference in joint 2, which creeps for six seconds: above 0.03 rad/s
-    # the published friction of that joint predicts better (3.0 against 4.3 N m). Joint 6 stands still in that log.
-    assert np.mean(np.abs(other.speed[:, 5]) > 1e-3) < 0.05
-    for joint in range(5):
-        assert moving_error(other, predicted, joint) <= moving_error(other, published, joint)
-
-
-@needs_data("ur10e")
 def test_friction_that_grows_with_gravity_halves_the_error_of_shoulder_and_elbow(arm) -> None:
     machine, learned, other, _ = arm
     plain, load = (identify_robot([learned], machine, RobotParameters(load_friction=item)) for item in (False, True))
     assert load.torque_error.cross_validated[1] < 0.5 * plain.torque_error.cross_validated[1]
-    errors = [moving_error(other, predict_torque(fit, other), 1) for fit in (plain, load)]
+    errors = [moving_error(other, predicted_torque(fit, other), 1) for fit in (plain, load)]
     assert errors[1] < errors[0]
 
 

@@ -11,8 +11,9 @@ import pytest
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import AxisModel, Drive, Sensors
 from cdtool.errors import RecordingError
-from cdtool.identification.axis_run import axis_run
-from cdtool.injection.axis_contact import ControllerReaction, Doubt, InjectedContact, axis_contact
+from cdtool.identification.axis_run import USED, AxisRun, axis_run
+from cdtool.injection.assumption import Assumption, ControllerReaction, assumptions_of
+from cdtool.injection.axis_contact import Doubt, InjectedContact, axis_contact
 from cdtool.injection.injected_recording import injected_recording
 from cdtool.injection.refusal import Refusal, refusal
 from cdtool.recording import Recording, Series
@@ -37,9 +38,9 @@ def contact_in(
     at: float,
     kind: str = "stiff",
     model: AxisModel = MODEL,
-    reaction: ControllerReaction = ControllerReaction.KNOWN,
+    assumption: Assumption | None = None,
 ) -> InjectedContact:
-    return axis_contact(axis_run(ON_LOAD_SIDE.referred_to_load(recording)), model, OBSTACLES[kind], at, 1.0, reaction)
+    return axis_contact(axis_run(ON_LOAD_SIDE.referred_to_load(recording)), model, OBSTACLES[kind], at, 1.0, assumption)
 
 
 def put(recording: Recording, contact: InjectedContact) -> Recording:
@@ -132,7 +133,7 @@ def test_the_brackets_of_an_unknown_controller_contain_the_known_one() -> None:
         (MODEL, ControllerReaction.KNOWN),
         (unknown, ControllerReaction.STIFF),
     ):
-        contact = contact_in(free, 4.0, "stiff", model, reaction)
+        contact = contact_in(free, 4.0, "stiff", model, Assumption(reaction))
         assert (Doubt.CONTROLLER_UNKNOWN in contact.doubts) == (reaction is not ControllerReaction.KNOWN)
         time = contact.changes["torque"].time
         torques.append(float(np.interp(4.08, time, contact.changes["torque"].values[:, 0])))
@@ -161,11 +162,139 @@ def test_separation_and_wind_up_beyond_the_free_run_are_flagged() -> None:
     assert contact.wind_up > contact.free_wind_up
 
 
+def value_at(contact: InjectedContact, channel: str, time: float) -> float:
+    change = contact.changes[channel]
+    return float(np.interp(time, change.time, change.values[:, 0]))
+
+
+def known_up_to_the_free_run(free: Recording) -> AxisModel:
+    """The model without what impact-free runs do not show of the drive."""
+    drive = MODEL.drive
+    wind_up = contact_in(free, 4.0).free_wind_up
+    return replace(
+        MODEL,
+        drive=replace(
+            drive, take_up_travel=math.inf, end_stiffness=math.inf, end_damping=0.0, observed_wind_up=wind_up
+        ),
+    )
+
+
+def test_the_brackets_of_a_drive_beyond_its_known_wind_up_contain_the_true_torque() -> None:
+    free, _, _ = twins("stiff", 18)
+    model = known_up_to_the_free_run(free)
+    soft, rigid = assumptions_of(model)
+    assert (soft.suffix, rigid.suffix) == ("", "_rigid")
+    true, least, most = contact_in(free, 4.0), *(contact_in(free, 4.0, "stiff", model, item) for item in (soft, rigid))
+    assert Doubt.WIND_UP_BEYOND_FREE_RUNS in least.doubts
+    # Up to the known wind-up all are the same; beyond it a stiffer drive slows the motor sooner.
+    before = [value_at(item, "speed", 4.05) for item in (least, true, most)]
+    assert before == pytest.approx([before[1]] * 3, rel=1e-5)
+    assert before[1] < -1e-3
+    for after in (0.06, 0.07, 0.08):
+        slowed = [value_at(item, "speed", 4.0 + after) for item in (least, true, most)]
+        assert slowed[0] > slowed[1] > slowed[2]
+
+
+def test_a_drive_without_doubt_has_no_bracket() -> None:
+    assert assumptions_of(MODEL) == (Assumption(),)
+    rigid = replace(MODEL, drive=Drive(load_mass=600.0, motor_mass=500.0, observed_wind_up=1e-3))
+    assert assumptions_of(rigid) == (Assumption(),)
+
+
+def test_the_rigid_end_of_a_drive_is_where_the_contact_winds_it_up_in_either_direction() -> None:
+    free, _, _ = twins("stiff", 19)
+    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
+    mirrored = replace(
+        run,
+        **{name: -getattr(run, name) for name in ("torque", "speed", "position", "reference_speed")},
+        acceleration=None,
+        reference_torque=None,
+    )
+    model = known_up_to_the_free_run(free)
+    rigid = assumptions_of(model)[1]
+    forward = axis_contact(run, model, OBSTACLES["stiff"], 4.0, 0.2, rigid)
+    backward = axis_contact(mirrored, model, OBSTACLES["stiff"], 4.0, 0.2, rigid)
+    assert backward.speed == pytest.approx(-forward.speed)
+    for channel in ("speed", "torque", "position", "acceleration"):
+        assert -backward.changes[channel].values == pytest.approx(forward.changes[channel].values, abs=1e-6)
+    assert backward.force.values == pytest.approx(forward.force.values, abs=1e-6)
+
+
+def test_the_brackets_of_an_unknown_slew_limit_contain_the_true_torque() -> None:
+    free, _, _ = twins("stiff", 20)
+    assert MODEL.controller is not None and math.isfinite(MODEL.controller.slew_limit)
+    slow = 0.5 * MODEL.controller.slew_limit
+    unknown = replace(MODEL, controller=replace(MODEL.controller, slew_limit=math.inf, observed_slope=slow))
+    assumptions = assumptions_of(unknown)
+    assert [item.suffix for item in assumptions] == ["", "_limited"]
+    fast, limited = (contact_in(free, 4.0, "stiff", unknown, item) for item in assumptions)
+    assert Doubt.SLOPE_BEYOND_FREE_RUNS in fast.doubts and Doubt.SLOPE_BEYOND_FREE_RUNS not in limited.doubts
+    torques = [value_at(item, "torque", 4.06) for item in (limited, contact_in(free, 4.0), fast)]
+    assert torques[0] < torques[1] < torques[2]
+
+
 @pytest.mark.parametrize(("at", "message"), [(99.0, "outside the log"), (0.1, "at rest")])
 def test_a_contact_that_cannot_be_is_refused(at: float, message: str) -> None:
     free, _, _ = twins("stiff", 15)
     with pytest.raises(RecordingError, match=message):
         contact_in(free, at)
+
+
+def with_values(run: AxisRun, **changed: object) -> AxisRun:
+    return replace(run, **changed)  # type: ignore[arg-type]
+
+
+def test_a_model_that_does_not_follow_the_log_is_refused() -> None:
+    free, _, _ = twins("stiff", 21)
+    assert MODEL.controller is not None
+    weak = replace(MODEL.controller, speed_gain=0.1 * MODEL.controller.speed_gain, integral_gain=0.0)
+    with pytest.raises(RecordingError, match=r"the model moves at .*, the log at 0\.2"):
+        contact_in(free, 4.0, "stiff", replace(MODEL, controller=weak))
+    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
+    with pytest.raises(RecordingError, match="the torque falls where the model's rises"):
+        axis_contact(with_values(run, torque=-run.torque), MODEL, OBSTACLES["stiff"], 4.0)
+
+
+def test_a_model_that_is_a_little_slower_than_the_log_is_flagged() -> None:
+    free, _, _ = twins("stiff", 22)
+    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
+    assert run.reference_speed is not None
+    slower = with_values(run, reference_speed=0.9 * run.reference_speed)
+    assert Doubt.APPROACH_SPEED in axis_contact(slower, MODEL, OBSTACLES["stiff"], 4.0).doubts
+    assert Doubt.APPROACH_SPEED not in contact_in(free, 4.0).doubts
+
+
+@pytest.mark.parametrize(
+    ("samples", "message"), [(slice(3990, 4010), "a gap at 4.000 s"), (slice(None), "speed and position have no value")]
+)
+def test_a_contact_in_a_gap_or_without_speed_is_refused(samples: slice, message: str) -> None:
+    free, _, _ = twins("stiff", 23)
+    run = axis_run(ON_LOAD_SIDE.referred_to_load(without(free, "position")))
+    assert run.speed is not None
+    speed = run.speed.copy()
+    speed[samples] = math.nan
+    with pytest.raises(RecordingError, match=message):
+        axis_contact(with_values(run, speed=speed, position=None), MODEL, OBSTACLES["stiff"], 4.0)
+
+
+def test_the_stiff_bracket_does_not_depend_on_the_sampling_of_the_log() -> None:
+    free, _, _ = twins("stiff", 24)
+    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
+    tenth = {name: getattr(run, name)[::10] for name in USED if getattr(run, name) is not None}
+    slow = with_values(run, period=10.0 * run.period, **tenth)
+    model = replace(MODEL, controller=None)
+    stiff = Assumption(ControllerReaction.STIFF)
+    both = [axis_contact(item, model, OBSTACLES["stiff"], 4.0, 0.3, stiff) for item in (run, slow)]
+    torques = [value_at(item, "torque", 4.1) for item in both]
+    assert torques[1] == pytest.approx(torques[0], rel=0.05)
+
+
+def test_a_drive_takes_up_in_the_direction_of_the_contact() -> None:
+    free, _, _ = twins("stiff", 25)
+    run = axis_run(ON_LOAD_SIDE.referred_to_load(free))
+    mirrored = with_values(run, **{name: -getattr(run, name) for name in USED if getattr(run, name) is not None})
+    forward, backward = (axis_contact(item, MODEL, OBSTACLES["stiff"], 4.0, 0.2) for item in (run, mirrored))
+    assert -backward.changes["speed"].values == pytest.approx(forward.changes["speed"].values, abs=1e-9)
 
 
 def test_without_a_controller_there_is_no_known_reaction() -> None:

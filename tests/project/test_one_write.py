@@ -20,7 +20,7 @@ ELSEWHERE = {
     "cdtool/workflows/store/journal.py": "appends to a file that the next run takes over if this one is killed",
     "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
     "cdtool/workflows/injecting.py": "writes into the folder that replaced_folder gives it",
-    "cdtool/workflows/injection/injected_logs.py": "writes into that folder, or into that of the benchmark's recordings",
+    "cdtool/workflows/injection/injected_logs.py": "writes into that folder, or into the benchmark's own",
 }
 
 

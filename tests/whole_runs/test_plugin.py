@@ -9,19 +9,20 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from cdtool.detectors import DETECTORS
+from tests.command_server import CommandServer, Ended, command_server
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
 CONTRACTS = "torque_rate or robust_limit"
 MAIN = "from cdtool.cli.app import main; main()"
 
-Command = Callable[..., subprocess.CompletedProcess[str]]
+Command = Callable[..., Ended]
 
 
 def python(*arguments: object, site: Path, folder: Path = ROOT) -> subprocess.CompletedProcess[str]:
@@ -43,10 +44,19 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "site"
 
 
+@pytest.fixture(scope="module")
+def server(site: Path) -> Iterator[CommandServer]:
+    """Another interpreter that finds the example package."""
+    found = {"PYTHONPATH": f"{ROOT}{os.pathsep}{site}", "PYTHONDONTWRITEBYTECODE": "1"}
+    with command_server(environment=found) as running:
+        running.warm_up("detect", GATE / "free" / "03.csv", "-m", GATE / "machine.toml", "-d", "gm", "--limit", 1e6)
+        yield running
+
+
 @pytest.fixture
-def command(site: Path, tmp_path: Path) -> Command:
+def command(server: CommandServer, tmp_path: Path) -> Command:
     """Run `cdtool ARGUMENTS` with the example package, in a new folder."""
-    return lambda *arguments: python("-c", MAIN, *arguments, site=site, folder=tmp_path)
+    return lambda *arguments: server.run(*arguments, folder=tmp_path)
 
 
 def machine_with(folder: Path, more: str) -> Path:
@@ -56,31 +66,31 @@ def machine_with(folder: Path, more: str) -> Path:
 
 
 def test_list_shows_the_plugins_with_gains_units_and_defaults(command):
-    entries = {entry["name"]: entry for entry in json.loads(command("list", "detectors", "--json").stdout)}
+    entries = {entry["name"]: entry for entry in json.loads(command("list", "detectors", "--json").out)}
     assert list(entries) == [*DETECTORS.names(), "torque_rate"]
     assert entries["torque_rate"]["short_name"] == "tr" and entries["torque_rate"]["needs"] == ["torque"]
     (gain,) = entries["torque_rate"]["gains"]
     assert (gain["name"], gain["default"], gain["unit"]) == ("cutoff", 2.0, "Hz")
     shown = command("list", "detectors")
-    assert shown.returncode == 0 and "torque_rate (tr): Torque rate; needs torque" in shown.stdout
-    assert "robust_limit" in command("list", "thresholds").stdout
+    assert shown.status == 0 and "torque_rate (tr): Torque rate; needs torque" in shown.out
+    assert "robust_limit" in command("list", "thresholds").out
 
 
 def test_its_signature_is_learned_used_explained_and_refused_for_other_gains(command, tmp_path):
     machine = ("--machine", GATE / "machine.toml")
     free = sorted(GATE.glob("free/*.csv"))
     learned = command("learn-signature", *free, *machine, "-d", "tr", "-o", "tr.json", "--force")
-    assert learned.returncode == 0, learned.stderr
+    assert learned.status == 0, learned.err
     assert json.loads((tmp_path / "tr.json").read_text(encoding="utf-8"))["detector"]["name"] == "torque_rate"
     log = GATE / "stiff" / "03.csv"
-    (found,) = json.loads(command("detect", log, *machine, "-s", "tr.json", "--json").stdout)
+    (found,) = json.loads(command("detect", log, *machine, "-s", "tr.json", "--json").out)
     assert (found["detector"], found["unit"], found["verdict"]) == ("torque_rate", "N/s", "alarm")
     assert 50.0 < found["contacts"][0]["latency_ms"] < 250.0
     explained = command("explain", log, *machine, "-s", "tr.json")
-    assert explained.returncode == 0 and "First input of torque_rate: torque" in explained.stdout
+    assert explained.status == 0 and "First input of torque_rate: torque" in explained.out
     other = machine_with(tmp_path, "\n[detectors.tr]\ncutoff = 3.0\n")
     refused = command("detect", log, "-m", other, "-s", "tr.json")
-    assert refused.returncode == 2 and "learned with cutoff = 2.0" in refused.stderr
+    assert refused.status == 2 and "learned with cutoff = 2.0" in refused.err
     without = python("-c", MAIN, "detect", log, *machine, "-s", tmp_path / "tr.json", site=tmp_path)
     assert without.returncode == 2 and "unknown detector 'torque_rate'" in without.stderr
 
@@ -90,11 +100,11 @@ def test_its_gains_can_be_set_in_the_machine_file_under_either_name(command, tmp
     alarms = []
     for name in ("tr", "torque_rate"):
         machine = machine_with(tmp_path, f"\n[detectors.{name}]\ncutoff = 5.0\n")
-        assert command("info", log, "-m", machine).returncode == 0
-        (found,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").stdout)
+        assert command("info", log, "-m", machine).status == 0
+        (found,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").out)
         alarms.append(found["alarms"])
     machine = GATE / "machine.toml"
-    (plain,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").stdout)
+    (plain,) = json.loads(command("detect", log, "-m", machine, "-d", "tr", "--limit", 400, "--json").out)
     assert alarms[0] == alarms[1] != plain["alarms"]
     for more, words in (
         ("[detectors.tr]\ncut = 5.0\n", "detectors.tr.cut: unknown gain (did you mean cutoff?"),
@@ -102,7 +112,7 @@ def test_its_gains_can_be_set_in_the_machine_file_under_either_name(command, tmp
         ("[detectors.tr]\n[detectors.torque_rate]\n", "torque_rate: repeats torque_rate"),
     ):
         wrong = command("detect", log, "-m", machine_with(tmp_path, "\n" + more), "-d", "tr", "--limit", 4)
-        assert wrong.returncode == 2 and words in wrong.stderr and wrong.stderr.count("\n") == 1, wrong.stderr
+        assert wrong.status == 2 and words in wrong.err and wrong.err.count("\n") == 1, wrong.err
 
 
 def test_a_benchmark_runs_both_and_its_reports_name_the_package(command, tmp_path):
@@ -111,7 +121,7 @@ def test_a_benchmark_runs_both_and_its_reports_name_the_package(command, tmp_pat
     text += '[limits]\n"tr.stiff.contacts" = { min = 2 }\n'
     (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
     done = command("benchmark", "benchmark.toml", "-o", "results.json", "-o", "summary.md", "-o", "report.html")
-    assert done.returncode == 0 and "the limit is met" in done.stdout, done.stdout + done.stderr
+    assert done.status == 0 and "the limit is met" in done.out, done.out + done.err
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert results["detectors"] == ["torque_rate", "momentum"]
     provenance = results["provenance"]
@@ -129,13 +139,13 @@ def test_all_detectors_include_those_of_plugins(command, tmp_path):
     text += f'[impacts.stiff]\nlogs = ["{GATE}/stiff/03.csv"]\n[limits]\n"gm.contacts" = {{ min = 1 }}\n'
     (tmp_path / "benchmark.toml").write_text(text, encoding="utf-8")
     done = command("benchmark", "benchmark.toml", "--detectors", "all", "--json")
-    assert done.returncode == 0, done.stderr
-    results = json.loads(done.stdout)
+    assert done.status == 0, done.err
+    results = json.loads(done.out)
     assert results["detectors"] == [*DETECTORS.names(), "torque_rate"]
-    (one,) = json.loads(command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--limit", 9e9, "--json").stdout)
+    (one,) = json.loads(command("detect", GATE / "stiff/03.csv", *machine, "-d", "TR", "--limit", 9e9, "--json").out)
     assert one["detector"] == "torque_rate"
     only = command("benchmark", "benchmark.toml", "--detectors", "tr")
-    assert only.returncode == 0 and "1 of 1 limits are set for detectors that were not run" in only.stderr
+    assert only.status == 0 and "1 of 1 limits are set for detectors that were not run" in only.err
 
 
 def test_the_examples_in_its_docstrings_run(site):
@@ -169,4 +179,4 @@ def test_the_page_shows_the_package_in_full_and_its_commands_run(command, tmp_pa
         assert words[0] == "cdtool"
         logs = sorted(GATE.glob("free/*"))
         done = command(*(name for word in words[1:] for name in (logs if word.endswith("free/*") else [word])))
-        assert done.returncode == 0, (words, done.stderr)
+        assert done.status == 0, (words, done.err)

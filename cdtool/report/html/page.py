@@ -29,7 +29,19 @@ _FOLDER = Path(__file__).with_name("page_files")
 _REASONS = 10
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
-    *("not_met", "met", "results", "kinds", "comparisons", "force", "points", "forces", "recordings", "cases"),
+    *(
+        "not_met",
+        "met",
+        "results",
+        "kinds",
+        "injected",
+        "comparisons",
+        "force",
+        "points",
+        "forces",
+        "recordings",
+        "cases",
+    ),
     *("not_assessable", "skipped", "damaged", "findings", "calibration"),
 )
 _TEMPLATE, _STYLE = "report.html.j2", "report.css"

@@ -36,7 +36,10 @@ def to_markdown(report: Report, most: int = 60_000) -> str:
         raise UsageError(f"a report of at most {most} characters", f"set at least {_LEAST}")
     model = report.model
     limits, met = _limits(model)
-    results = [Section("", escape(model.notes["results"], None))]
+    results = []
+    if "injected" in model.tables:
+        results.append(_section(model.tables["injected"], escape(model.notes["injected"], None)))
+    results.append(Section("", escape(model.notes["results"], None)))
     results += [Section("", _image(image)) for image in report.images if image.group is None]
     for group, table in model.groups:
         own = [_image(image) for image in report.images if image.group == group]

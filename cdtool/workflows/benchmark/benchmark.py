@@ -170,7 +170,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
         left_out.append(RecordingFinding.of(str(setup.path), unchecked))
     factors = sweep_factors(setup, learned.thresholds)
     gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
-    gathered.skipped += learned.about.skipped
+    gathered.skipped += (*setup.not_injected, *learned.about.skipped)
     gathered.findings += [*measured, *learned.about.findings, *left_out]
     gathered.skipped += [
         Skipped(name, f"{group}: not tested by injected contacts: {reason}")

@@ -17,10 +17,12 @@ from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
+from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.summary import kind_group
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
 from cdtool.ingest.run_reading import split_run
+from cdtool.injection.assumption import assumptions_of
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import RunCut
@@ -33,7 +35,7 @@ from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, read_inject_section
-from cdtool.workflows.injection.injected_logs import model_of, reactions_of
+from cdtool.workflows.injection.injected_logs import model_of
 from cdtool.workflows.named_logs import LogsOf, labels_of, named_logs
 from cdtool.workflows.runs import RunReading, resolve_all, shown_path
 from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
@@ -71,7 +73,8 @@ class BenchmarkFile:
     not known before the logs are audited if `measures_synchronisation`.
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
     versions were read. `sections` are the parts of scored logs that are used, `learned_sections` those of the logs
-    learned from, which end `guard` [s] before their first contact; None: they have no contact.
+    learned from, which end `guard` [s] before their first contact; None: they have no contact. `not_injected`: logs and
+    contacts of `inject` that were left out.
     """
 
     path: Path
@@ -101,6 +104,7 @@ class BenchmarkFile:
     guard: float | None = None
     measures_synchronisation: bool = False
     inject: InjectSection | None = None
+    not_injected: tuple[Skipped, ...] = ()
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -307,7 +311,7 @@ def _read_inject(root: Table, found: LogsOf, operations: str, groups: tuple[str,
 
 
 def _injected_groups(section: InjectSection, machine_file: MachineFile) -> tuple[str, ...]:
-    return tuple(section.groups(reactions_of(model_of(section, machine_file))))
+    return tuple(section.groups(assumptions_of(model_of(section, machine_file))))
 
 
 def _kinds(machine_file: MachineFile, labels: Labels | None) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from cdtool.detectors import DETECTORS
 from cdtool.errors import OutputError
 from cdtool.files import replaced_folder
 from cdtool.ingest.channel_assembly import file_digest
-from cdtool.injection.axis_contact import ControllerReaction
+from cdtool.injection.assumption import Assumption, ControllerReaction, assumptions_of
 from cdtool.injection.refusal import refusal
 from cdtool.machine_file import read_machine_file
 from cdtool.remote.remote_path import joined
@@ -20,11 +20,9 @@ from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, Im
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.injection.inject_section import InjectSection, NamedObstacle
 from cdtool.workflows.injection.injected_logs import (
-    MANIFEST,
     InjectedCase,
     InjectedLogs,
     model_of,
-    reactions_of,
     read_injected,
     write_injected,
 )
@@ -55,7 +53,9 @@ def injected_logs(
     )
     mark = folder / _DIGEST
     if mark.is_file() and mark.read_text(encoding="utf-8").strip() == digest:
-        return read_injected(folder)
+        found = read_injected(folder)
+        if all((folder / case.file).is_file() for case in found.cases):
+            return found
     if folder.exists() and not _may_replace(folder):
         raise OutputError(f"{folder}: exists and holds other files", "set another [inject] folder, or remove it")
     with replaced_folder(folder, _may_replace) as part:
@@ -70,16 +70,16 @@ def with_groups(setup: BenchmarkFile, section: InjectSection, injected: Injected
     machine_file = read_machine_file(injected.machine_path)
     labels = injected.labels(setup.path.parent)
     groups = {}
-    for name, (obstacle, reaction) in section.groups(reactions_of(model)).items():
+    for name, (obstacle, assumption) in section.groups(assumptions_of(model)).items():
         cases = [case for case in injected.cases if case.group == name]
         logs = tuple(injected.folder / case.file for case in cases)
         if logs:
-            refused = _refused(setup, section, reaction)
-            stated = _stated(obstacle, reaction, cases)
+            refused = _refused(setup, section, assumption.controller)
+            stated = _stated(obstacle, assumption, cases)
             groups[name] = ImpactGroup(logs, setup.window, None, machine_file, labels, refused, stated)
     real = {name: group for name, group in setup.impacts.items() if name != HOLDOUT}
     holdout = {HOLDOUT: setup.impacts[HOLDOUT]} if HOLDOUT in setup.impacts else {}
-    return replace(setup, impacts={**real, **groups, **holdout}, inject=None)
+    return replace(setup, impacts={**real, **groups, **holdout}, inject=None, not_injected=injected.skipped)
 
 
 def _refused(setup: BenchmarkFile, section: InjectSection, reaction: ControllerReaction) -> dict[str, str]:
@@ -89,13 +89,14 @@ def _refused(setup: BenchmarkFile, section: InjectSection, reaction: ControllerR
     return {name: reason.value for name, reason in found.items() if reason is not None}
 
 
-def _stated(obstacle: NamedObstacle, reaction: ControllerReaction, cases: Sequence[InjectedCase]) -> dict[str, Any]:
+def _stated(obstacle: NamedObstacle, assumption: Assumption, cases: Sequence[InjectedCase]) -> dict[str, Any]:
     """Return how the contacts of a group were made, for provenance."""
     doubts = Counter(doubt for case in cases for doubt in case.doubts)
     return {
         "obstacle": obstacle.name,
         "stiffness_n_per_m": obstacle.stiffness,
-        "controller": reaction.value,
+        "controller": assumption.controller.value,
+        "assumed": [item.value for item in assumption.deviations],
         "contacts": len(cases),
         "doubts": dict(sorted(doubts.items())),
         "compared_with": obstacle.compare_with or None,
@@ -103,5 +104,5 @@ def _stated(obstacle: NamedObstacle, reaction: ControllerReaction, cases: Sequen
 
 
 def _may_replace(folder: Path) -> bool:
-    """Return whether a folder holds injected recordings, or nothing."""
-    return (folder / MANIFEST).is_file() or not any(folder.iterdir())
+    """Return whether a folder is empty or made by `cdtool benchmark`; one of `cdtool inject` belongs to the user."""
+    return folder.is_dir() and ((folder / _DIGEST).is_file() or not any(folder.iterdir()))

@@ -15,21 +15,36 @@ from cdtool.bounded_loading import read_text
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError, UsageError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset_rule import OnsetRule
-from cdtool.files import write_text
+from cdtool.files import replaced
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import Estimate, IdentificationError, Method, NotIdentifiable
+from cdtool.identification.friction_choice import FrictionForm, JointFriction
 from cdtool.identification.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
 from cdtool.identification.speed_controller import ControllerFit, ControllerSettings, identify_controller
 from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.machines.axis import Axis
+from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import Recording
 from cdtool.remote.remote_path import location
 from cdtool.tables import read_toml
 from cdtool.workflows.execution.workers import Progress, Workers
-from cdtool.workflows.identification.machine_update import MachineChange, changes_of, described_runs, updated_text
-from cdtool.workflows.runs import RunReading, find_logs, load_runs
+from cdtool.workflows.identification.identifying_robot import (
+    LoadedRuns,
+    RobotIdentification,
+    identify_joints,
+    joint_summary,
+)
+from cdtool.workflows.identification.machine_update import (
+    MachineChange,
+    changes_of,
+    described_runs,
+    robot_files,
+    updated_text,
+)
+from cdtool.workflows.runs import RunReading, Runs, find_logs, load_runs
 
+# Reasons that the message of an error lists.
+_MOST_REASONS = 3
 _CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
 
 
@@ -37,7 +52,8 @@ _CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "
 class JointIdentification:
     """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
 
-    `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it.
+    `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`:
+    of a joint of a robot or planar arm, which has none of the others.
     """
 
     joint: str
@@ -47,12 +63,13 @@ class JointIdentification:
     units: tuple[str, str, str, str] = ("kg", "N", "m", "N s/m")
     has_torque_filter: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
+    robot: JointFriction | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
         """Return the estimates that the machine file gets; the load's mass is that of the elastic drive, if known."""
         found: dict[tuple[str, str], Estimate] = {}
-        for fit in (self.rigid, self.two_mass, self.controller):
+        for fit in (self.rigid, self.two_mass, self.controller, self.robot):
             for estimate in fit.identified.estimates if fit else ():
                 found[estimate.section, estimate.key] = estimate
         return tuple(found.values())
@@ -61,7 +78,7 @@ class JointIdentification:
     def together(self) -> tuple[Estimate, ...]:
         """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
         known = {(item.section, item.key) for item in self.estimates}
-        found: list[Estimate] = []
+        found: list[Estimate] = list(self.robot.together) if self.robot else []
         if self.two_mass:
             numbers = {item.key: item.numbers for item in self.two_mass.identified.not_identifiable}
             for key, unit in (("viscous", self.units[3]), ("static", self.units[1])):
@@ -69,6 +86,7 @@ class JointIdentification:
                     value = numbers[key]["value"]
                     error = value * numbers[key]["relative_standard_error"]
                     found.append(Estimate("model.friction", key, value, error, unit, Method.OUTPUT_ERROR))
+            found.append(_exact("model.drive", "observed_wind_up", self.two_mass.largest_wind_up, self.units[2]))
             found.append(_exact("model.friction", "stribeck_speed", self.two_mass.model.friction.stribeck_speed, "m/s"))
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
@@ -78,6 +96,11 @@ class JointIdentification:
             for key, value in finite_values(fit.controller).items():
                 if value or key == "speed_filter_order":
                     found.append(_exact("model.controller", key, value, _CONTROLLER_UNITS.get(key, "")))
+            slope = {item.key: item.numbers for item in fit.identified.not_identifiable}.get("slew_limit", {})
+            if slope.get("largest_n_per_s", 0.0) > 0.0:
+                found.append(
+                    _exact("model.controller", "observed_slope", slope["largest_n_per_s"], f"{self.units[1]}/s")
+                )
             if math.isfinite(fit.lag) and fit.lag > 0.0 and not self.has_torque_filter:
                 found.append(_exact("model.sensors", "torque_filter_time", fit.lag, "s"))
         return tuple(item for item in found if (item.section, item.key) not in known)
@@ -87,7 +110,7 @@ class JointIdentification:
         """Return the parameters that no method could identify."""
         known = {(item.section, item.key) for item in self.estimates}
         found: dict[tuple[str, str], NotIdentifiable] = {}
-        for fit in (self.rigid, self.two_mass, self.controller):
+        for fit in (self.rigid, self.two_mass, self.controller, self.robot):
             for item in fit.identified.not_identifiable if fit else ():
                 if (item.section, item.key) not in known:
                     found.setdefault((item.section, item.key), item)
@@ -96,7 +119,10 @@ class JointIdentification:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedMachine:
-    """The identification of a machine: by joint, the changes of its file, and the text of the updated file."""
+    """The identification of a machine: by joint, the changes of its file, and the text of the updated file.
+
+    `robot`: what belongs to all joints of a robot or planar arm. `source`: the machine file that was read.
+    """
 
     machine: str
     joints: tuple[JointIdentification, ...]
@@ -106,6 +132,19 @@ class IdentifiedMachine:
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
     written: str = ""
+    robot: RobotIdentification | None = None
+    source: Path | None = None
+
+    def files_for(self, target: Path) -> tuple[tuple[Path, str], ...]:
+        """Return the files of an updated machine file `target`, and their texts; none if nothing changes.
+
+        That is the machine file, and for a robot with new inertias its URDF, under a name that does not exist yet.
+        """
+        if not self.changes:
+            return ()
+        if self.source is None or self.robot is None:
+            return ((target, self.text),)
+        return robot_files(self.text, self.robot.urdf, self.source, target)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -118,6 +157,7 @@ class IdentifiedMachine:
             "skipped": [asdict(item) for item in self.skipped],
             "findings": [asdict(item) for item in self.findings],
             "written": self.written or None,
+            "robot": self.robot.summary if self.robot else None,
         }
 
 
@@ -129,8 +169,9 @@ def identify(
     force: bool = False,
     workers: Workers | None = None,
     progress: Progress | None = None,
+    payload: LoadedRuns | None = None,
 ) -> IdentifiedMachine:
-    """Identify the parameters of an axis's model from impact-free logs, and update its machine file.
+    """Identify the parameters of a machine's model from impact-free logs, and update its machine file.
 
     Parameters
     ----------
@@ -140,13 +181,16 @@ def identify(
         The machine file: the motor's inertia and what is known of the sensors are used.
     output : str or Path, optional
         The machine file to write; may be `machine` itself. Every value has its standard error and origin as a
-        comment, and the old value.
+        comment, and the old value. New inertias of a robot are written as a URDF beside it. A robot of which nothing
+        new predicts unseen runs better is not written.
     force : bool, optional
         Overwrite an existing file other than `machine`.
     workers : Workers, optional
         How the logs are read.
     progress : callable, optional
         Called after each log with the number done and the total.
+    payload : LoadedRuns, optional
+        Of a robot: logs of motion with a known payload, which show the torque constants of its joints.
 
     Returns
     -------
@@ -158,11 +202,11 @@ def identify(
     IdentificationError
         Nothing can be identified from these logs; nothing is written.
     ConfigurationError
-        The machine file is wrong, or its machine has coupled joints.
+        The machine file is wrong.
     SignatureError
         No log is left.
     UsageError
-        The output exists.
+        The output exists, or a payload is given for an axis.
 
     Examples
     --------
@@ -177,28 +221,28 @@ def identify(
     if target is not None and target.exists() and not force and not _same(target, path):
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
-    if not isinstance(machine_file.machine, Axis):
-        raise ConfigurationError(
-            f"{path}: '{machine_file.machine.name}' has coupled joints", "identify a linear_axis or rotary_axis"
-        )
-    paths = find_logs(map(str, logs), Path(), "LOGS")
+    if payload is not None and not isinstance(machine_file.machine, CoupledMachine):
+        raise UsageError("a payload is given for an axis", "torque constants are identified for robots only")
     reading = RunReading("whole", onset=OnsetRule(), base=None, workers=workers or Workers(), progress=progress)
-    runs = load_runs(paths, machine_file, reading)
-    recordings = [operation.recording for operation in runs.operations]
-    if not recordings:
-        reason = runs.skipped[0].reason if runs.skipped else "no log is given"
-        raise IdentificationError(f"no impact-free log is left: {reason}", "give other logs")
-    count = len(machine_file.machine.joints)
-    joints = tuple(_identify_joint(machine_file, joint, recordings) for joint in range(count))
+    runs, recordings = _impact_free(logs, "LOGS", machine_file, reading)
+    given = read_toml(path, "a machine file")
+    robot = _identify_robot(machine_file, recordings, given, payload, reading)
+    if robot is not None:
+        rows = zip(machine_file.machine.joints, robot.joints, robot.refused, strict=True)
+        joints = tuple(JointIdentification(name, refused=refused, robot=item) for name, item, refused in rows)
+    else:
+        count = len(machine_file.machine.joints)
+        joints = tuple(_identify_joint(machine_file, joint, recordings) for joint in range(count))
     estimates = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.estimates]
     together = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.together]
-    if not estimates:
-        reasons = [reason for joint in joints for reason in joint.refused.values()]
+    if robot is not None:
+        estimates += robot.gain_estimates
+    if not estimates and not together and not _was_compared(joints):
         raise IdentificationError(
-            f"nothing can be identified from {len(recordings)} logs: {'; '.join(dict.fromkeys(reasons))}",
+            f"nothing can be identified from {len(recordings)} logs: {'; '.join(_reasons(joints))}",
             "see docs/identification.md for the motion that is needed",
         )
-    changes = changes_of(machine_file.machine, read_toml(path, "a machine file"), estimates, together)
+    changes = changes_of(machine_file.machine, given, estimates, together)
     origin = described_runs(len(recordings), date.today().isoformat())
     text = updated_text(read_text(path, ConfigurationError), changes, origin)
     identified = IdentifiedMachine(
@@ -209,11 +253,61 @@ def identify(
         tuple(recording.name for recording in recordings),
         runs.skipped,
         runs.findings,
+        robot=robot,
+        source=path,
     )
-    if target is None:
+    files = identified.files_for(target) if target is not None else ()
+    if not files:
         return identified
-    write_text(target, text)
+    with replaced(*(file for file, _ in files)) as parts:
+        for part, (_, content) in zip(parts, files, strict=True):
+            part.write_bytes(content.encode("utf-8", "replace"))
     return replace(identified, written=str(target))
+
+
+def _impact_free(
+    logs: Sequence[str | Path], key: str, machine_file: MachineFile, reading: RunReading
+) -> tuple[Runs, list[Recording]]:
+    """Return the runs of some logs, and their recordings; raises IdentificationError if none is impact-free."""
+    runs = load_runs(find_logs(map(str, logs), Path(), key), machine_file, reading)
+    recordings = [operation.recording for operation in runs.operations]
+    if not recordings:
+        reason = runs.skipped[0].reason if runs.skipped else "no log is given"
+        raise IdentificationError(f"no impact-free log is left: {reason}", "give other logs")
+    return runs, recordings
+
+
+def _identify_robot(
+    machine_file: MachineFile,
+    recordings: Sequence[Recording],
+    given: Mapping[str, Any],
+    payload: LoadedRuns | None,
+    reading: RunReading,
+) -> RobotIdentification | None:
+    """Return what was identified of a robot; None for an axis."""
+    machine = machine_file.machine
+    if not isinstance(machine, CoupledMachine):
+        return None
+    loaded = None
+    if payload is not None:
+        body = payload.payload(machine)
+        loaded = _impact_free(payload.logs, "payload", machine_file, reading)[1], body
+    return identify_joints(recordings, machine, given, machine_file.path.parent, loaded)
+
+
+def _was_compared(joints: Sequence[JointIdentification]) -> bool:
+    """Return whether the friction of a robot's joint was fitted, even if it predicts worse than the present one."""
+    fitted = (FrictionForm.FRICTION, FrictionForm.FRICTION_ALONE)
+    return any(form in joint.robot.errors for joint in joints if joint.robot for form in fitted)
+
+
+def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
+    """Return why nothing was identified, each reason once."""
+    reasons = [reason for joint in joints for reason in joint.refused.values()]
+    for joint in joints:
+        for item in joint.not_identifiable if joint.robot else ():
+            reasons.append(f"{item.key} needs {', '.join(missing.value for missing in item.missing)}")
+    return list(dict.fromkeys(reasons))[:_MOST_REASONS]
 
 
 def _joint_summary(joint: JointIdentification) -> dict[str, Any]:
@@ -241,6 +335,7 @@ def _joint_summary(joint: JointIdentification) -> dict[str, Any]:
         },
         "controller": joint.controller
         and {"kind": joint.controller.kind.value, "residual_rms": joint.controller.residual_rms},
+        "robot": joint.robot and joint_summary(joint.robot),
     }
 
 
@@ -265,7 +360,8 @@ def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[
     table: ModelTable | None = machine_file.model
     if motor_mass == 0.0 and table is not None:
         motor_mass = table.of_joint("drive", joint).get("motor_mass", 0.0)
-    sensors = Sensors(**(table.of_joint("sensors", joint) if table else {}))
+    stated = table.of_joint("sensors", joint) if table else {}
+    sensors = Sensors(**stated)
     force, travel = ("N m", "rad") if is_rotary else ("N", "m")
     mass = "kg m2" if is_rotary else "kg"
     found: dict[str, Any] = {}
@@ -276,7 +372,8 @@ def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[
         ),
         "controller": lambda: identify_controller(
             runs,
-            ControllerSettings(torque_filter_time=sensors.torque_filter_time or None, units=(force, travel)),
+            # A stated 0 is known: the torque is measured without a low-pass.
+            ControllerSettings(torque_filter_time=stated.get("torque_filter_time"), units=(force, travel)),
         ),
     }
     for method, run_method in methods.items():
@@ -286,7 +383,7 @@ def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[
             refused[method] = str(fault)
     units = (mass, force, travel, f"{force} s/{travel}")
     return JointIdentification(
-        name, units=units, has_torque_filter=sensors.torque_filter_time > 0.0, refused=refused, **found
+        name, units=units, has_torque_filter="torque_filter_time" in stated, refused=refused, **found
     )
 
 

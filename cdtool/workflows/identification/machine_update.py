@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeGuard
 
 from cdtool.dynamics import Machine
 from cdtool.identification.estimate import Estimate, Method
-from cdtool.machines.axis import Axis
+from cdtool.machines.joint_machine import JointMachine
+from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.plain_text import counted, digits
+from cdtool.remote.remote_path import joined, relative_name
 
 # Keys of whole numbers.
 _WHOLE = ("speed_filter_order",)
@@ -37,30 +40,19 @@ class MachineChange:
     method: Method
     is_known_alone: bool = True
 
-    @property
-    def is_change(self) -> bool:
-        """Whether a value differs from the old one by more than it is written with."""
-        pairs = zip(self.old, self.values, strict=True)
-        return any(old is None or not math.isclose(old, value, rel_tol=1e-6) for old, value in pairs)
-
 
 def changes_of(
     machine: Machine, given: Mapping[str, Any], estimates: Sequence[Estimate], together: Sequence[Estimate] = ()
 ) -> tuple[MachineChange, ...]:
     """Return the changes to a machine file with the values `given` that the estimates make, in their order.
 
-    The estimates `together` are not identifiable alone.
+    The estimates `together` are not identifiable alone; a key of which one joint has such a value is one of them.
     """
-    return (*_changes(machine, given, estimates, True), *_changes(machine, given, together, False))
-
-
-def _changes(
-    machine: Machine, given: Mapping[str, Any], estimates: Sequence[Estimate], alone: bool
-) -> list[MachineChange]:
     joints = len(machine.joints)
     grouped: dict[tuple[str, str], dict[int, Estimate]] = {}
-    for estimate in estimates:
-        grouped.setdefault((estimate.section, estimate.key), {})[estimate.joint] = estimate
+    for estimate in (*estimates, *together):
+        grouped.setdefault((estimate.section, estimate.key), {}).setdefault(estimate.joint, estimate)
+    not_alone = {(estimate.section, estimate.key) for estimate in together}
     changes = []
     for (section, name), by_joint in grouped.items():
         key = _key_in_file(machine, section, name)
@@ -69,16 +61,15 @@ def _changes(
         for joint in range(joints):
             estimate_here = by_joint.get(joint)
             factor = _factor(machine, section, name, joint)
-            values.append((old[joint] or 0.0) if estimate_here is None else estimate_here.value * factor)
-            errors.append(math.nan if estimate_here is None else estimate_here.standard_error * abs(factor))
+            error = math.nan if estimate_here is None else estimate_here.standard_error * abs(factor)
+            kept = old[joint] or 0.0
+            values.append(kept if estimate_here is None else _rounded(estimate_here.value * factor, error))
+            errors.append(error)
         first = next(iter(by_joint.values()))
         unit = _unit_in_file(machine, section, name, first.unit)
-        changes.append(
-            MachineChange(
-                section, key, old, tuple(map(_rounded, values, errors)), tuple(errors), unit, first.method, alone
-            )
-        )
-    return changes
+        alone = (section, name) not in not_alone
+        changes.append(MachineChange(section, key, old, tuple(values), tuple(errors), unit, first.method, alone))
+    return tuple(changes)
 
 
 def updated_text(text: str, changes: Sequence[MachineChange], origin: str) -> str:
@@ -97,6 +88,36 @@ def updated_text(text: str, changes: Sequence[MachineChange], origin: str) -> st
         item.comment(_comment(change, before, origin))
         table[change.key] = item
     return tomlkit.dumps(document)
+
+
+def robot_files(text: str, urdf: str, source: Path, target: Path) -> tuple[tuple[Path, str], ...]:
+    """Return the updated machine file of a robot at `target` and its URDF, each with its text.
+
+    `text` of the machine file `source` with its changes; `urdf`: the text of the updated URDF, empty if it stays. The
+    new URDF is named after the target, with a number if that file exists: no URDF is overwritten. One that stays is
+    named from the folder of the target.
+    """
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    table: Any = document["machine"]
+    if "urdf" not in table:
+        return ((target, text),)
+    before = str(table["urdf"])
+    if not urdf:
+        if target.absolute().parent != source.absolute().parent:
+            table["urdf"] = relative_name(joined(source.parent, before), target.parent)
+        return ((target, tomlkit.dumps(document)),)
+    name = _free_name(target)
+    item = tomlkit.item(name.name)
+    item.comment(f"identified inertias; was {before}")
+    table["urdf"] = item
+    return ((target, tomlkit.dumps(document)), (name, urdf))
+
+
+def _free_name(target: Path) -> Path:
+    names = (target.with_name(f"{target.stem}{part}.urdf") for part in ("", *(f"_{i}" for i in range(2, 10_000))))
+    return next(name for name in names if not name.exists())
 
 
 def _opened(document: Any, section: str) -> Any:
@@ -139,6 +160,8 @@ def _rounded(value: float, error: float) -> float:
 
 
 def _key_in_file(machine: Machine, section: str, name: str) -> str:
+    if (section, name) == ("machine", "drive_inertia") and not isinstance(machine, UrdfRobot):
+        return "motor_inertia"
     return str(getattr(machine, "inertia_key", name)) if (section, name) == ("machine", "load_mass") else name
 
 
@@ -153,20 +176,26 @@ def _old_values(given: Mapping[str, Any], section: str, key: str, joints: int) -
 
 
 # How a load-side value of [machine] is written in motor coordinates: times the transmission ratio to this power.
-_POWERS = {"viscous_friction": 2, "coulomb_friction": 1, "constant_force": 1}
+_POWERS = {"viscous_friction": 2, "coulomb_friction": 1, "constant_force": 1, "drive_inertia": 2}
+_MOTOR_UNITS = {"viscous_friction": "N m s/rad", "drive_inertia": "kg m2"}
 
 
 def _factor(machine: Machine, section: str, name: str, joint: int) -> float:
-    if section != "machine" or not isinstance(machine, Axis) or machine.coordinates != "motor":
+    if not _is_at_motor(machine, section, name):
         return 1.0
     ratio = machine.transmission_ratio[joint]
     return {2: ratio**2, 1: abs(ratio) if name == "coulomb_friction" else ratio}.get(_POWERS.get(name, 0), 1.0)
 
 
 def _unit_in_file(machine: Machine, section: str, name: str, unit: str) -> str:
-    if section != "machine" or not isinstance(machine, Axis) or machine.coordinates != "motor" or name not in _POWERS:
-        return unit
-    return "N m s/rad" if name == "viscous_friction" else "N m"
+    return _MOTOR_UNITS.get(name, "N m") if _is_at_motor(machine, section, name) else unit
+
+
+def _is_at_motor(machine: Machine, section: str, name: str) -> TypeGuard[JointMachine]:
+    """Return whether the file has a value of [machine] at the motor; the drives of a URDF are on the load side."""
+    if not isinstance(machine, JointMachine) or machine.coordinates != "motor":
+        return False
+    return section == "machine" and name in _POWERS and not (name == "drive_inertia" and isinstance(machine, UrdfRobot))
 
 
 def described_runs(count: int, day: str) -> str:

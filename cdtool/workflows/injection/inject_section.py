@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from cdtool.axis_model.obstacle import Obstacle
+from cdtool.dynamics import Machine, has_links
 from cdtool.errors import ConfigurationError, UsageError, nearest
-from cdtool.injection.axis_contact import ControllerReaction
+from cdtool.injection.assumption import Assumption
 from cdtool.injection.obstacles import read_obstacle, shipped_obstacles
+from cdtool.injection.robot_contact import StruckPoint
 from cdtool.log_section import MARK_HINT, Mark
 from cdtool.plain_text import digits
 from cdtool.remote.remote_path import joined
 from cdtool.tables import Table
+from cdtool.workflows.injection.joint_mark import JointMark
 from cdtool.workflows.named_logs import LogsOf
 
 # The name of every group of injected contacts begins with this word.
@@ -45,7 +49,8 @@ class InjectSection:
     """Every obstacle is put at every position into every log.
 
     `positions` are marks: distances travelled, or times. `duration` [s] of a recording after its contact. `folder` is
-    where `cdtool benchmark` keeps the recordings. `joint`: the axis that meets the obstacle.
+    where `cdtool benchmark` keeps the recordings. `joint`: the axis that meets the obstacle; `struck`: the point of a
+    robot that does.
     """
 
     logs: tuple[Path, ...]
@@ -56,15 +61,15 @@ class InjectSection:
     joint: int
     folder: str
     file_format: str
+    struck: StruckPoint | None = None
 
-    def groups(self, reactions: tuple[ControllerReaction, ...]) -> dict[str, tuple[NamedObstacle, ControllerReaction]]:
-        """Return the groups of contacts by name: an obstacle, and how the drive is assumed to react."""
-        named = {}
-        for item in self.obstacles:
-            for reaction in reactions:
-                bracket = "" if reaction is ControllerReaction.KNOWN else f"_{reaction.name.lower()}"
-                named[f"{INJECTED}_{item.name}{bracket}"] = (item, reaction)
-        return named
+    def groups(self, assumptions: Sequence[Assumption]) -> dict[str, tuple[NamedObstacle, Assumption]]:
+        """Return the groups of contacts by name: an obstacle, and what is assumed about the machine."""
+        return {
+            f"{INJECTED}_{item.name}{assumption.suffix}": (item, assumption)
+            for item in self.obstacles
+            for assumption in assumptions
+        }
 
 
 def read_inject_section(table: Table, found: LogsOf, joints: tuple[str, ...], groups: tuple[str, ...]) -> InjectSection:
@@ -74,19 +79,50 @@ def read_inject_section(table: Table, found: LogsOf, joints: tuple[str, ...], gr
     """
     shipped = shipped_obstacles(joined(found.base, table.text("obstacle_file")) if "obstacle_file" in table else None)
     obstacles = _obstacles(table, shipped, groups)
+    machine = found.machine_file.machine
+    struck = _struck(table, machine)
     joint = table.choice("joint", joints, joints[0])
     section = InjectSection(
         logs=found.of(Table({"logs": table.raw("logs", [])}, table.where, table.prefix)),
         obstacles=obstacles,
-        positions=_positions(table),
+        positions=_positions(table, machine),
         duration=table.number("duration_s", 1.0, above=0.0),
         seed=table.whole("seed", 0, minimum=0),
         joint=joints.index(joint),
         folder=table.text("folder", INJECTED),
         file_format=table.choice("format", FORMATS, "csv"),
+        struck=struck,
     )
     table.finish()
     return section
+
+
+def _struck(table: Table, machine: Machine) -> StruckPoint | None:
+    """Return the point of a robot that meets the obstacle; None for an axis."""
+    if not has_links(machine):
+        for key in ("link", "point", "direction"):
+            if key in table:
+                raise table.fault(key, "applies to a planar_arm or urdf_robot only", "remove it")
+        return None
+    if "joint" in table:
+        raise table.fault("joint", "applies to axes only", "give link, and the point of it that meets the obstacle")
+    raw = table.raw("link")
+    link = table.whole("link", 0, minimum=0) if isinstance(raw, int) else table.text("link")
+    if not isinstance(table.raw("point"), list):
+        raise table.fault("point", "is missing or no list", "give [x, y, z] in the link's frame, in m")
+    x, y, z = table.numbers("point", 3)
+    return StruckPoint(link, (x, y, z), _direction(table))
+
+
+def _direction(table: Table) -> tuple[float, float, float] | None:
+    """Return the normal of the obstacle in the axes of the base; None for the direction of the point's motion."""
+    if not isinstance(table.raw("direction", "motion"), list):
+        table.choice("direction", ("motion",), "motion")
+        return None
+    x, y, z = table.numbers("direction", 3)
+    if math.hypot(x, y, z) == 0.0:
+        raise table.fault("direction", "has the length 0", 'give a vector such as [0, 0, 1], or "motion"')
+    return x, y, z
 
 
 def _obstacles(table: Table, shipped: Mapping[str, Obstacle], groups: tuple[str, ...]) -> tuple[NamedObstacle, ...]:
@@ -127,27 +163,30 @@ def _stiffnesses(table: Table) -> tuple[float, ...]:
     return tuple(float(f"{value:.2g}") for value in np.geomspace(low, high, count))
 
 
-def _positions(table: Table) -> tuple[Mark, ...]:
+def _positions(table: Table, machine: Machine) -> tuple[Mark, ...]:
     """Return a list of marks, or an equal grid `{ from, to, count }` of marks."""
     raw = table.raw("positions")
     if not isinstance(raw, dict):
-        return tuple(_mark(table, "positions", text) for text in table.texts("positions"))
+        marks = tuple(_mark(table, "positions", text, machine) for text in table.texts("positions"))
+        if len({getattr(mark, "joint", None) for mark in marks}) > 1:
+            raise table.fault("positions", "are those of different joints", "give positions of one joint")
+        return marks
     grid = table.table("positions")
-    begin, end = (_mark(grid, name, grid.text(name)) for name in ("from", "to"))
+    begin, end = (_mark(grid, name, grid.text(name), machine) for name in ("from", "to"))
     count = grid.whole("count", 7, minimum=2)
     grid.finish()
-    if begin.unit != end.unit or not end.value > begin.value:
+    if replace(begin, value=end.value) != end or not end.value > begin.value:
         raise grid.fault("to", "is not after from", "give both in the same unit")
     if count > _MOST_POSITIONS:
         raise grid.fault("count", f"is {count}", f"give at most {_MOST_POSITIONS}")
-    return tuple(Mark(float(value), begin.unit) for value in np.linspace(begin.value, end.value, count))
+    return tuple(replace(begin, value=float(value)) for value in np.linspace(begin.value, end.value, count))
 
 
-def _mark(table: Table, name: str, text: str) -> Mark:
+def _mark(table: Table, name: str, text: str, machine: Machine) -> Mark:
     try:
-        return Mark.parse(text)
+        return JointMark.of_machine(text, machine) if "=" in text else Mark.parse(text)
     except UsageError as fault:
-        raise table.fault(name, fault.message, MARK_HINT) from fault
+        raise table.fault(name, fault.message, fault.hint or MARK_HINT) from fault
 
 
 def require_section(section: InjectSection | None, file: Path) -> InjectSection:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.axis_model.model_table import axis_model
 from cdtool.axis_model.parameters import AxisModel
 from cdtool.columns import Column
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError
@@ -19,20 +18,22 @@ from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.formats.groups import Group, Part
-from cdtool.identification.axis_run import AxisRun, axis_run
+from cdtool.identification.axis_run import AxisRun
 from cdtool.ingest.reading import read_as_logged
-from cdtool.injection.axis_contact import ControllerReaction, InjectedContact, axis_contact
+from cdtool.injection.assumption import Assumption, DriveBeyond, SlewBeyond, assumptions_of
+from cdtool.injection.axis_contact import Doubt, InjectedContact
 from cdtool.injection.injected_recording import injected_recording
+from cdtool.injection.robot_contact import RobotLog
 from cdtool.log_section import Mark
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
-from cdtool.machines.axis import Axis
 from cdtool.plain_text import digits
 from cdtool.recording import Contact, Recording
 from cdtool.version import __version__
 from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.injection.inject_section import InjectSection, NamedObstacle
+from cdtool.workflows.injection.struck_machine import StruckAxis, StruckRobot, struck_machine
 from cdtool.workflows.runs import shown_path, unread
 from cdtool.workflows.written_files import machine_text, writer_of
 
@@ -58,7 +59,7 @@ class InjectedCase:
     separation: float | None
     wind_up: float
     free_wind_up: float
-    reaction: str
+    assumption: str
     doubts: tuple[str, ...]
 
 
@@ -93,8 +94,8 @@ class _Work:
 
     section: InjectSection
     machine_file: MachineFile
-    model: AxisModel
-    reactions: tuple[ControllerReaction, ...]
+    struck: StruckAxis | StruckRobot
+    assumptions: tuple[Assumption, ...]
     onset: OnsetRule
     base: Path
     folder: Path
@@ -115,17 +116,17 @@ class _Work:
             raise RecordingError(
                 f"{log}: a contact at {contacts[0].start:.3f} s", "contacts are put into impact-free logs only"
             )
-        run = axis_run(recording, self.section.joint)
+        run = self.struck.read(recording, logged)
         cases: list[InjectedCase] = []
         skipped, machine_toml = [], ""
-        groups = self.section.groups(self.reactions).items()
+        groups = self.section.groups(self.assumptions).items()
         rng = np.random.default_rng([self.section.seed, number])
         for mark in self.section.positions:
             # The contact is anywhere between two samples, not always on one.
             share = float(rng.random())
-            for group, (obstacle, reaction) in groups:
+            for group, (obstacle, assumption) in groups:
                 try:
-                    contact = self._contact(run, recording, mark, share, obstacle, reaction)
+                    contact = self._contact(run, recording, mark, share, obstacle, assumption)
                     file = f"{group}/{number + 1:03d}_{log.stem}_{digits(mark.value)}{mark.unit}"
                     case, machine_toml = self._write(file, log, logged.recording, group, obstacle, mark, contact)
                     cases.append(case)
@@ -135,18 +136,22 @@ class _Work:
 
     def _contact(
         self,
-        run: AxisRun,
+        run: AxisRun | RobotLog,
         recording: Recording,
         mark: Mark,
         share: float,
         obstacle: NamedObstacle,
-        reaction: ControllerReaction,
+        assumption: Assumption,
     ) -> InjectedContact:
         time = mark.time_in(recording)
         if not math.isfinite(time):
             raise RecordingError(f"the log never reaches {mark}", "choose a position within the travel")
+        if time < run.start:
+            raise RecordingError(f"{mark} is before the log begins, at {run.start:.3f} s", "choose a later position")
         time = max(time - share * run.period, run.start)
-        return axis_contact(run, self.model, obstacle.obstacle, time, self.section.duration, reaction)
+        at: Any = self.struck  # its run is of its own kind
+        contact: InjectedContact = at.contact(run, obstacle.obstacle, time, self.section.duration, assumption)
+        return contact
 
     def _write(
         self,
@@ -159,7 +164,7 @@ class _Work:
         contact: InjectedContact,
     ) -> tuple[InjectedCase, str]:
         recording = injected_recording(
-            logged, self.machine_file.machine, contact.changes, contact.force, (self.section.joint,)
+            logged, self.machine_file.machine, contact.changes, contact.force, self.struck.joints
         )
         name = f"{file}.{self.section.file_format}"
         case = InjectedCase(
@@ -178,7 +183,7 @@ class _Work:
             separation=contact.separation if math.isfinite(contact.separation) else None,
             wind_up=contact.wind_up,
             free_wind_up=contact.free_wind_up,
-            reaction=contact.reaction.value,
+            assumption=contact.assumption.suffix.strip("_"),
             doubts=tuple(doubt.name.lower() for doubt in contact.doubts),
         )
         target = self.folder / name
@@ -242,21 +247,12 @@ def _values(recording: Recording, channel: str) -> Any:
     return series.values if series.joint_count > 1 else series.values[:, 0]
 
 
-def reactions_of(model: AxisModel) -> tuple[ControllerReaction, ...]:
-    """Return how the drive is assumed to react: as its controller does, or without one both brackets."""
-    if model.controller is not None:
-        return (ControllerReaction.KNOWN,)
-    return (ControllerReaction.FROZEN, ControllerReaction.STIFF)
-
-
 def model_of(section: InjectSection, machine_file: MachineFile) -> AxisModel:
-    """Return the model of the axis that meets the obstacle; raises ConfigurationError for other machines."""
-    if not isinstance(machine_file.machine, Axis):
-        raise ConfigurationError(
-            f"{machine_file.path}: contacts cannot be injected into a machine of coupled joints",
-            "use a linear_axis or rotary_axis",
-        )
-    return axis_model(machine_file.machine, machine_file.model, section.joint)
+    """Return the model that decides which detectors are tested: of the axis, or of the least known joint of a robot.
+
+    Raises ConfigurationError where it is incomplete.
+    """
+    return struck_machine(section, machine_file).deciding_model
 
 
 def write_injected(
@@ -273,13 +269,13 @@ def write_injected(
     A log that cannot be used, and a contact that cannot be made, are left out with the reason. Raises RecordingError if
     no contact can be made, ConfigurationError where the model is incomplete.
     """
-    model = model_of(section, machine_file)
-    work = _Work(section, machine_file, model, reactions_of(model), onset, base, folder)
+    struck = struck_machine(section, machine_file)
+    work = _Work(section, machine_file, struck, assumptions_of(struck.deciding_model), onset, base, folder)
     items = list(enumerate(section.logs))
     done: list[_OfLog] = list(
         in_order(work, items, len(items), workers or Workers(), progress=progress, of_lost=_Lost(base))
     )
-    cases = tuple(case for item in done for case in item.cases)
+    cases = _without_needless(work, [case for item in done for case in item.cases])
     skipped = tuple(left for item in done for left in item.skipped)
     if not cases:
         reason = skipped[0].reason if skipped else "no log is given"
@@ -289,6 +285,44 @@ def write_injected(
     injected.machine_path.write_text(machine_toml, encoding="utf-8")
     _write_manifest(injected)
     return injected
+
+
+def _without_needless(work: _Work, cases: Sequence[InjectedCase]) -> tuple[InjectedCase, ...]:
+    """Return the cases without the brackets that make no difference, and remove the recordings of these.
+
+    A bracket of the drive is needed where a contact of the same obstacle winds it up further than is known, one of the
+    slew limit where the command of one rises faster.
+    """
+    doubts: dict[str, set[str]] = {}
+    for case in cases:
+        doubts.setdefault(case.group, set()).update(case.doubts)
+    groups = work.section.groups(work.assumptions)
+    names = {(obstacle.name, assumption): name for name, (obstacle, assumption) in groups.items()}
+    needless = {
+        name
+        for name, (obstacle, assumption) in groups.items()
+        if any(
+            doubt.name.lower() not in doubts.get(names[obstacle.name, usual], ()) for usual, doubt in _usual(assumption)
+        )
+    }
+    for case in cases:
+        if case.group in needless:
+            (work.folder / case.file).unlink()
+    for name in needless:
+        if (work.folder / name).is_dir():
+            (work.folder / name).rmdir()
+    return tuple(case for case in cases if case.group not in needless)
+
+
+def _usual(assumption: Assumption) -> list[tuple[Assumption, Doubt]]:
+    """Return the assumptions without one bracket, and the doubt about them that makes the bracket necessary."""
+    found = []
+    if assumption.drive is not DriveBeyond.AS_BEFORE:
+        usual = replace(assumption, drive=DriveBeyond.AS_BEFORE)
+        found.append((usual, Doubt.WIND_UP_BEYOND_FREE_RUNS))
+    if assumption.slew is not SlewBeyond.NO_LIMIT:
+        found.append((replace(assumption, slew=SlewBeyond.NO_LIMIT), Doubt.SLOPE_BEYOND_FREE_RUNS))
+    return found
 
 
 @dataclass(frozen=True)

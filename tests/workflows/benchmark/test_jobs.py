@@ -3,6 +3,8 @@
 import pickle
 import sys
 import threading
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -51,9 +53,15 @@ def run(folder: Path, threshold: str, jobs: int = 1) -> bytes:
     return to_json(done.results).encode() + encode_traces(done.traces)
 
 
+@pytest.fixture(scope="module")
+def by_one(gate) -> Callable[[str], bytes]:
+    """by_one(threshold): what one process computes; each threshold is computed once."""
+    return cache(partial(run, gate))
+
+
 @pytest.mark.parametrize("threshold", THRESHOLDS.names())
-def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, threshold, monkeypatch):
-    alone = run(gate, threshold)
+def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, by_one, threshold, monkeypatch):
+    alone = by_one(threshold)
     sent = []
 
     def by_pickles(work, items, *_, **__):
@@ -96,14 +104,15 @@ def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):
     assert len(made) == 1
 
 
-@pytest.mark.parametrize("others", [0, 1], ids=["forked", "spawned"])
-def test_results_and_traces_are_the_same_bytes_for_any_number_of_jobs(gate, others):
+@pytest.mark.parametrize(("others", "jobs"), [(0, 3), (1, 2)], ids=["forked", "spawned"])
+def test_results_and_traces_are_the_same_bytes_for_any_number_of_jobs(gate, by_one, others, jobs):
+    alone = by_one("signature")
     stop = threading.Event()
     threads = [threading.Thread(target=stop.wait) for _ in range(others)]
     for thread in threads:
         thread.start()
     try:
-        assert len({run(gate, "signature", jobs) for jobs in (1, 3)}) == 1
+        assert run(gate, "signature", jobs) == alone
     finally:
         stop.set()
 

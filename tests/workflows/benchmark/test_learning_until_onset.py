@@ -7,11 +7,12 @@ import pytest
 
 import cdtool
 from cdtool.errors import ConfigurationError
+from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import to_json
 from cdtool.workflows.benchmark.benchmark import benchmark
-from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
-from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
+from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark, prepare_benchmark
 from cdtool.workflows.runs import load_runs
 from tests.command import cdtool as command
 from tests.command import one_line
@@ -41,11 +42,26 @@ def learned_of(setup):
     return runs, learn_thresholds(setup, runs.operations, detectors, runs.skipped)
 
 
-def test_all_contacts_are_detected_and_nothing_before_them_is_an_alarm(gate):
-    done = benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
-    assert [row.outcome for row in done.results.contacts] == ["detected"] * 7
-    assert not done.results.false_alarms and not done.results.skipped
-    provenance = done.results.provenance
+@pytest.fixture(scope="module")
+def setup(gate) -> BenchmarkFile:
+    """The benchmark of all logs, each learned from until its contact."""
+    return setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
+
+
+@pytest.fixture(scope="module")
+def results(setup) -> Results:
+    return benchmark(setup).results
+
+
+@pytest.fixture(scope="module")
+def prepared(gate) -> PreparedBenchmark:
+    return prepare_benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
+
+
+def test_all_contacts_are_detected_and_nothing_before_them_is_an_alarm(results):
+    assert [row.outcome for row in results.contacts] == ["detected"] * 7
+    assert not results.false_alarms and not results.skipped
+    provenance = results.provenance
     assert provenance["learned_until"] == "0.2 s before the first contact of each log"
     assert sorted(provenance["scored_without_own_part"]) == sorted(provenance["learned_runs"])
 
@@ -56,9 +72,8 @@ def test_the_screen_states_how_it_was_learned(gate):
     assert "7 recordings scored with thresholds learned from the other recordings" in one_line(done.out)
 
 
-def test_what_is_learned_ends_before_the_onset_by_the_guard(gate):
-    plain = benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS)).results
-    onsets = {row.recording: row.onset_s for row in plain.contacts}
+def test_what_is_learned_ends_before_the_onset_by_the_guard(gate, results):
+    onsets = {row.recording: row.onset_s for row in results.contacts}
     for guard in (0.0, 0.2, 1.5):
         runs, _ = learned_of(setup_of(gate, HEAD, LEARN, f"guard_s = {guard}\n", ONSET, GROUPS))
         for operation in runs.operations:
@@ -100,15 +115,12 @@ def test_the_limits_of_a_log_are_those_learned_from_the_others_alone(gate):
 
 
 @pytest.mark.parametrize("jobs", [2, 3])
-def test_the_results_do_not_depend_on_the_number_of_jobs(gate, jobs):
-    setup = setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
-    assert to_json(benchmark(setup).results) == to_json(benchmark(setup, jobs=jobs).results)
+def test_the_results_do_not_depend_on_the_number_of_jobs(setup, results, jobs):
+    assert to_json(results) == to_json(benchmark(setup, jobs=jobs).results)
 
 
-def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate):
-    setup = setup_of(gate, HEAD, LEARN, ONSET, GROUPS)
-    rows = {row.recording: row.latency_ms for row in benchmark(setup).results.contacts}
-    prepared = prepare_benchmark(setup.path)
+def test_detect_and_explain_with_the_benchmark_use_the_same_limits(gate, results, prepared):
+    rows = {row.recording: row.latency_ms for row in results.contacts}
     for log in sorted(gate.glob("s*/*.csv")):
         (scored,) = prepared.score(log)
         assert scored.matched is not None
@@ -187,16 +199,14 @@ def test_a_log_whose_load_cell_is_lost_is_left_out_because_its_contact_would_be_
     assert [row.outcome for row in done.contacts] == ["detected"] * 6
 
 
-def labels_of_contacts(gate):
-    rows = [
-        row for row in benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS)).results.contacts if row.group == "stiff"
-    ]
+def labels_of_contacts(gate, results):
+    rows = [row for row in results.contacts if row.group == "stiff"]
     lines = [f"{row.recording},{row.onset_s},{row.onset_s + 0.2}" for row in rows]
     (gate / "labels.csv").write_text("\n".join(["recording,start_s,end_s", *lines]), encoding="utf-8")
 
 
-def test_the_label_file_keeps_a_contact_out_of_a_part_that_is_learned_from(gate):
-    labels_of_contacts(gate)
+def test_the_label_file_keeps_a_contact_out_of_a_part_that_is_learned_from(gate, results):
+    labels_of_contacts(gate, results)
     machine = (gate / "machine.toml").read_text(encoding="utf-8").splitlines()
     (gate / "blind.toml").write_text("\n".join(line for line in machine if "load_cell" not in line), encoding="utf-8")
     learn = '[learn]\nlogs = ["free/*.csv", { path = "stiff/*.csv", to = "7s" }]\n'
@@ -216,15 +226,13 @@ def test_the_load_cells_synchronisation_is_part_of_the_guard(gate):
         assert before.recording.end - after.recording.end == pytest.approx(0.5, abs=0.002)
 
 
-def test_a_copy_of_a_log_is_said_to_have_been_learned_from(gate, tmp_path):
-    prepared = prepare_benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
+def test_a_copy_of_a_log_is_said_to_have_been_learned_from(gate, prepared, tmp_path):
     assert not cdtool.detect(gate / "stiff" / "01.csv", benchmark=prepared).learned
     shutil.copy(gate / "stiff" / "01.csv", tmp_path / "copy.csv")
     assert cdtool.detect(tmp_path / "copy.csv", benchmark=prepared).learned
 
 
-def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate):
-    prepared = prepare_benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS).path)
+def test_a_log_is_compared_with_the_normal_motion_of_the_others(gate, prepared):
     log = prepared.score(gate / "stiff" / "01.csv")[0].log
     assert log is not None and prepared.normals.motions[0].runs == 7
     assert prepared.normals_for(log).motions[0].runs == 6
@@ -289,13 +297,11 @@ def changed(log, rows, factor, column="i_motor"):
     log.write_text("\n".join([header, *lines]), encoding="utf-8")
 
 
-def test_plausible_ranges_are_those_of_what_is_before_the_contacts(gate):
+def test_plausible_ranges_are_those_of_what_is_before_the_contacts(gate, results):
     plain, _ = learned_of(setup_of(gate, HEAD, LEARN, ONSET, GROUPS))
     folder = gate.parent / "after"
     shutil.copytree(gate, folder, dirs_exist_ok=True)
-    onsets = {
-        row.recording: row.onset_s for row in benchmark(setup_of(gate, HEAD, LEARN, ONSET, GROUPS)).results.contacts
-    }
+    onsets = {row.recording: row.onset_s for row in results.contacts}
     for name, onset in onsets.items():
         rows = len((folder / name).read_text(encoding="utf-8").splitlines()) - 1
         changed(folder / name, range(int(onset * 1000.0), rows), 30.0)

@@ -10,9 +10,10 @@ import pytest
 
 import cdtool
 from cdtool.errors import ConfigurationError
+from cdtool.evaluation.results import Results
 from cdtool.evaluation.results_file import to_json
 from cdtool.workflows.benchmark.benchmark import benchmark
-from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 
 FILE = """
@@ -31,6 +32,7 @@ logs = ["stiff/*.csv"]
 [impacts.soft]
 logs = ["soft/*.csv"]
 """
+MEASURED = 'synchronisation = "measured"'
 
 
 @pytest.fixture(scope="module")
@@ -46,25 +48,38 @@ def written(folder: Path, setting: str) -> Path:
     return file
 
 
-def test_the_measured_offset_is_part_of_every_latencys_resolution_and_is_reported(gate):
-    measured = benchmark(written(gate, 'synchronisation = "measured"')).results
+@pytest.fixture(scope="module")
+def setup(gate) -> BenchmarkFile:
+    return read_benchmark_file(written(gate, MEASURED))
+
+
+@pytest.fixture(scope="module")
+def measured(setup) -> Results:
+    return benchmark(setup).results
+
+
+@pytest.fixture(scope="module")
+def synchronisation(setup) -> float:
+    """The measured offset of the gate [s]."""
+    return with_synchronisation(setup)[0].synchronisation
+
+
+def test_the_measured_offset_is_part_of_every_latencys_resolution_and_is_reported(gate, measured, synchronisation):
     plain = benchmark(written(gate, "")).results
     (note,) = [item for item in measured.findings if item.kind == "measured_synchronisation"]
     assert note.severity == "note" and "latencies are not corrected" in note.reason
-    setup, _ = with_synchronisation(read_benchmark_file(written(gate, 'synchronisation = "measured"')))
-    assert setup.synchronisation > 0.0
+    assert synchronisation > 0.0
     for ours, theirs in zip(measured.contacts, plain.contacts, strict=True):
-        assert ours.resolution_ms == pytest.approx(theirs.resolution_ms + 1e3 * setup.synchronisation)
+        assert ours.resolution_ms == pytest.approx(theirs.resolution_ms + 1e3 * synchronisation)
         assert ours.latency_ms == theirs.latency_ms
     assert measured.provenance["synchronisation_s"] == "measured"
 
 
-def test_the_results_do_not_depend_on_the_number_of_jobs(gate):
-    file = written(gate, 'synchronisation = "measured"')
-    assert to_json(benchmark(file, jobs=2).results) == to_json(benchmark(file).results)
+def test_the_results_do_not_depend_on_the_number_of_jobs(setup, measured):
+    assert to_json(benchmark(setup, jobs=2).results) == to_json(measured)
 
 
-def test_a_late_load_cell_makes_the_resolution_coarser(gate, tmp_path):
+def test_a_late_load_cell_makes_the_resolution_coarser(gate, synchronisation, tmp_path):
     folder = tmp_path / "late"
     shutil.copytree(gate, folder)
     for log in (*folder.glob("stiff/*.csv"), *folder.glob("soft/*.csv")):
@@ -74,11 +89,8 @@ def test_a_late_load_cell_makes_the_resolution_coarser(gate, tmp_path):
         for row, value in zip(rows, late, strict=True):
             row[force] = value
         log.write_text("\n".join(",".join(row) for row in (names, *rows)) + "\n")
-    (first, _), (second, _) = (
-        with_synchronisation(read_benchmark_file(written(item, 'synchronisation = "measured"')))
-        for item in (gate, folder)
-    )
-    assert second.synchronisation > 0.02 > first.synchronisation
+    late_setup, _ = with_synchronisation(read_benchmark_file(written(folder, MEASURED)))
+    assert late_setup.synchronisation > 0.02 > synchronisation
 
 
 def test_without_an_assessable_contact_the_benchmark_stops_with_a_remedy(gate, tmp_path):
@@ -90,7 +102,7 @@ def test_without_an_assessable_contact_the_benchmark_stops_with_a_remedy(gate, t
         for row in rows:
             row[names.index("load_cell")] = f"{1e-3 * rng.standard_normal():.6f}"
         log.write_text("\n".join(",".join(row) for row in (names, *rows)) + "\n")
-    setup = read_benchmark_file(written(folder, 'synchronisation = "measured"'))
+    setup = read_benchmark_file(written(folder, MEASURED))
     with pytest.raises(ConfigurationError, match="measured, but not assessable: none of 6 logs") as raised:
         with_synchronisation(setup)
     assert "synchronisation_s" in str(raised.value.hint)

@@ -1,5 +1,6 @@
 """A benchmark with a store: the same bytes as without it, and nothing computed twice."""
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -55,6 +56,22 @@ def gate(made, tmp_path) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def first_store(made, tmp_path_factory) -> Path:
+    """The store of a first run, of a folder like `gate`."""
+    folder = tmp_path_factory.mktemp("first")
+    shutil.copytree(made, folder / "gate")
+    write(folder / "gate")
+    assert run(folder / "gate", folder / "s")[1] == 6
+    return folder / "s"
+
+
+@pytest.fixture
+def filled(first_store, tmp_path) -> Path:
+    """A store that contains a first run; its files have other paths, so their content is compared."""
+    return shutil.copytree(first_store, tmp_path / "s")
+
+
 def write(folder: Path, threshold: str = "signature", learn: str = "", until: str = "", operations: str = "") -> Path:
     text = FILE.format(threshold=threshold, learn=learn, until=until, operations=operations)
     (folder / "b.toml").write_text(text, encoding="utf-8")
@@ -78,8 +95,18 @@ def run(folder: Path, store: Path | None, **settings) -> tuple[bytes, int | None
     return bytes_of(done), done.stored.computed if done.stored else None
 
 
+WITHOUT_STORE: dict[bytes, bytes] = {}
+"""Results without a store, by the content of the folder: many tests need those of equal folders."""
+
+
 def alone(folder: Path) -> bytes:
-    return run(folder, None)[0]
+    digest = hashlib.sha256()
+    for file in sorted(folder.rglob("*.*")):
+        content = file.read_bytes()
+        digest.update(f"{file.relative_to(folder)} {len(content)}\n".encode() + content)
+    if digest.digest() not in WITHOUT_STORE:
+        WITHOUT_STORE[digest.digest()] = run(folder, None)[0]
+    return WITHOUT_STORE[digest.digest()]
 
 
 def planned(folder: Path, store: Path, **settings) -> dict[str, tuple[str, ...]]:
@@ -113,21 +140,19 @@ def test_of_one_recording_more_only_that_is_computed(gate, tmp_path):
     assert run(gate, tmp_path / "s") == (alone(gate), 1)
 
 
-def test_with_another_gain_only_the_rows_of_that_detector_are_computed(gate, tmp_path):
-    run(gate, tmp_path / "s")
+def test_with_another_gain_only_the_rows_of_that_detector_are_computed(gate, filled):
     with (gate / "machine.toml").open("a", encoding="utf-8") as file:
         file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
-    assert set(planned(gate, tmp_path / "s").values()) == {("momentum",)}
-    assert run(gate, tmp_path / "s") == (alone(gate), 6)
-    assert run(gate, tmp_path / "s") == (alone(gate), 0)
+    assert set(planned(gate, filled).values()) == {("momentum",)}
+    assert run(gate, filled) == (alone(gate), 6)
+    assert run(gate, filled) == (alone(gate), 0)
 
 
-def test_a_detector_more_leaves_the_rows_of_the_others(gate, tmp_path):
-    run(gate, tmp_path / "s")
+def test_a_detector_more_leaves_the_rows_of_the_others(gate, filled):
     text = (gate / "b.toml").read_text(encoding="utf-8")
     (gate / "b.toml").write_text(text.replace('"friction_ekf"]', '"friction_ekf", "pure_torque"]'), encoding="utf-8")
-    assert set(planned(gate, tmp_path / "s").values()) == {("pure_torque",)}
-    assert run(gate, tmp_path / "s") == (alone(gate), 6)
+    assert set(planned(gate, filled).values()) == {("pure_torque",)}
+    assert run(gate, filled) == (alone(gate), 6)
 
 
 @pytest.mark.parametrize(
@@ -138,18 +163,16 @@ def test_a_detector_more_leaves_the_rows_of_the_others(gate, tmp_path):
         ("stiff/", "./stiff/"),
     ],
 )
-def test_another_setting_computes_all_again_another_spelling_of_a_path_nothing(gate, tmp_path, before, after):
-    run(gate, tmp_path / "s")
+def test_another_setting_computes_all_again_another_spelling_of_a_path_nothing(gate, filled, before, after):
     text = (gate / "b.toml").read_text(encoding="utf-8")
     (gate / "b.toml").write_text(text.replace(before, after), encoding="utf-8")
-    assert run(gate, tmp_path / "s") == (alone(gate), 0 if "/" in before else 6)
+    assert run(gate, filled) == (alone(gate), 0 if "/" in before else 6)
 
 
-def test_another_impact_free_run_computes_all_again(gate, tmp_path):
-    run(gate, tmp_path / "s")
+def test_another_impact_free_run_computes_all_again(gate, filled):
     text = (gate / "free" / "01.csv").read_text(encoding="utf-8")
     (gate / "free" / "11.csv").write_text(text.replace("-0.0083", "-0.0084", 1), encoding="utf-8")
-    assert run(gate, tmp_path / "s") == (alone(gate), 6)
+    assert run(gate, filled) == (alone(gate), 6)
 
 
 def test_content_is_compared_unless_times_are_trusted(gate, tmp_path):
@@ -192,8 +215,7 @@ def test_a_log_that_cannot_be_read_stays_one_with_another_detector(gate, tmp_pat
     assert run(gate, tmp_path / "s") == (expected, 0)
 
 
-def test_a_log_that_ends_its_worker_is_left_out_also_if_other_detectors_are_stored(gate, tmp_path, monkeypatch):
-    run(gate, tmp_path / "s")
+def test_a_log_that_ends_its_worker_is_left_out_also_if_other_detectors_are_stored(gate, filled, monkeypatch):
     with (gate / "machine.toml").open("a", encoding="utf-8") as file:
         file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
     call = pieces.PieceScoring.__call__
@@ -205,10 +227,10 @@ def test_a_log_that_ends_its_worker_is_left_out_also_if_other_detectors_are_stor
 
     with monkeypatch.context() as patched:
         patched.setattr(pieces.PieceScoring, "__call__", lost)
-        done = cdtool.benchmark(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+        done = cdtool.benchmark(gate / "b.toml", store=StoreUse(filled))
     left_out = [(item.recording, item.reason) for item in done.results.skipped]
     assert left_out == [("stiff/03.csv", "its worker process was killed")]
-    assert run(gate, tmp_path / "s") == (alone(gate), 1)
+    assert run(gate, filled) == (alone(gate), 1)
 
 
 def test_an_error_of_the_system_is_not_stored(gate, tmp_path, monkeypatch):
@@ -246,9 +268,8 @@ def test_a_log_that_changes_while_it_is_read_is_left_out_with_that_reason(gate, 
     assert run(gate, tmp_path / "s") == (alone(gate), 1 if with_store else 6)
 
 
-def test_a_log_that_changes_before_another_detector_runs_is_computed_whole(gate, tmp_path, monkeypatch):
+def test_a_log_that_changes_before_another_detector_runs_is_computed_whole(gate, filled, monkeypatch):
     """The outcomes that are stored are those of the old content."""
-    run(gate, tmp_path / "s")
     with (gate / "machine.toml").open("a", encoding="utf-8") as file:
         file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
     log = gate / "stiff" / "03.csv"
@@ -261,14 +282,13 @@ def test_a_log_that_changes_before_another_detector_runs_is_computed_whole(gate,
         return score(self, piece)
 
     monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
-    found = run(gate, tmp_path / "s")
+    found = run(gate, filled)
     monkeypatch.undo()
     assert found == (alone(gate), 6)
 
 
-def test_a_trace_of_a_log_that_has_changed_since_is_left_out(gate, tmp_path, monkeypatch):
+def test_a_trace_of_a_log_that_has_changed_since_is_left_out(gate, filled, monkeypatch):
     """The rows are stored; the trace is made again, since another gain changes it, when the log has another content."""
-    run(gate, tmp_path / "s")
     with (gate / "machine.toml").open("a", encoding="utf-8") as file:
         file.write("\n[detectors.momentum]\nbandwidth = 17.0\n")
     log = gate / "stiff" / "03.csv"
@@ -280,12 +300,12 @@ def test_a_trace_of_a_log_that_has_changed_since_is_left_out(gate, tmp_path, mon
         return call(self, piece)
 
     monkeypatch.setattr(pieces.PieceScoring, "__call__", after_a_change)
-    done = cdtool.benchmark(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    done = cdtool.benchmark(gate / "b.toml", store=StoreUse(filled))
     assert log.read_bytes() != text
     assert "stiff/03.csv" not in {item.recording for item in done.traces}
     log.write_bytes(text)
     monkeypatch.undo()
-    assert run(gate, tmp_path / "s") == (alone(gate), 0)
+    assert run(gate, filled) == (alone(gate), 0)
 
 
 def test_logs_that_are_learned_from_and_scored_depend_on_all_others(gate, tmp_path):
@@ -337,8 +357,7 @@ def test_a_part_that_vanishes_after_the_store_was_opened_is_computed_again(gate,
         assert run(gate, tmp_path / "s") == (expected, 6)
 
 
-def test_keys_are_the_same_in_another_process(gate, tmp_path):
-    run(gate, tmp_path / "s")
+def test_keys_are_the_same_in_another_process(gate, filled):
     code = (
         "from pathlib import Path; from cdtool.workflows.benchmark.dry_run import dry_run;"
         "from cdtool.workflows.store.use import StoreUse;"

@@ -11,7 +11,7 @@ import pytest
 
 import cdtool
 from cdtool.axis_model.model_table import axis_model
-from cdtool.errors import ConfigurationError, UsageError
+from cdtool.errors import UsageError
 from cdtool.identification.estimate import Estimate, IdentificationError, Method
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.identification.identifying import IdentifiedMachine
@@ -109,12 +109,6 @@ def test_a_log_at_rest_gives_one_line_and_nothing_is_written(tmp_path: Path) -> 
     assert not (tmp_path / "out.toml").exists()
 
 
-def test_a_machine_of_coupled_joints_is_refused(tmp_path: Path) -> None:
-    arm = ROOT / "sample_logs" / "arm" / "trial_1"
-    with pytest.raises(ConfigurationError, match="coupled joints"):
-        cdtool.identify([str(arm / "free" / "*")], arm / "machine.toml")
-
-
 @needs_data("emps")
 def test_the_real_axis_is_identified_as_published() -> None:
     done = cdtool.identify([DATA / "emps" / "DATA_EMPS.mat"], ROOT / "docs" / "examples" / "emps.toml")
@@ -163,3 +157,12 @@ def test_a_rotary_axis_has_an_inertia(tmp_path: Path) -> None:
     path.write_text('[machine]\ntype = "rotary_axis"\ntransmission_ratio = 0.1\n', encoding="utf-8")
     changes = changes_of(read_machine_file(path).machine, {}, [estimate("load_mass", 2.0, 0)])
     assert [change.key for change in changes] == ["load_inertia"]
+
+
+def test_a_joint_whose_value_is_known_only_together_does_not_undo_that_of_another(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_text(MACHINE, encoding="utf-8")
+    known, vague = estimate("viscous_friction", 30.0, 0), estimate("viscous_friction", 50.0, 1)
+    (change,) = changes_of(read_machine_file(path).machine, tomllib.loads(MACHINE), [known], [vague])
+    assert change.values == pytest.approx((30.0 * 0.01**2, 50.0 * 0.02**2))
+    assert not change.is_known_alone

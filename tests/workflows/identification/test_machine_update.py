@@ -15,7 +15,8 @@ CHANGES = [
     MachineChange("model.drive", "stiffness", (None,), (8.1e4,), (math.nan,), "N/m", Method.OUTPUT_ERROR),
 ]
 LAYOUTS = {
-    "tables": '[machine]\nname = "gate"\nload_mass = 620 # kg\n[model.drive]\nfront_stiffness = 1e6\n[channels]\nx = 1\n',
+    "tables": '[machine]\nname = "gate"\nload_mass = 620 # kg\n[model.drive]\nfront_stiffness = 1e6\n'
+    "[channels]\nx = 1\n",
     "inline": 'machine = { name = "gate", load_mass = 620 }\nmodel = { drive = { front_stiffness = 1e6 } }\n'
     "channels = { x = 1 }\n",
     "inline within": '[machine]\nname = "gate"\nload_mass = 620\n[model]\ndrive = { front_stiffness = 1e6 }\n'

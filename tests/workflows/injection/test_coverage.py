@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ import cdtool
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.coverage_map import CellKey
 from tests.command import cdtool as command
+from tests.workflows.injection.known_drive import known_drive
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 
@@ -19,7 +19,7 @@ GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 @pytest.fixture
 def gate(tmp_path: Path) -> Path:
     """The sample gate with a small grid."""
-    shutil.copy(GATE / "model.toml", tmp_path / "model.toml")
+    (tmp_path / "model.toml").write_text(known_drive(GATE), encoding="utf-8")
     for name in ("holdout", "free"):
         (tmp_path / name).symlink_to(GATE / name)
     text = (GATE / "coverage.toml").read_text(encoding="utf-8")
@@ -70,3 +70,23 @@ def test_another_suffix_is_refused_before_anything_is_computed(gate: Path) -> No
     done = command("coverage", gate / "coverage.toml", "-o", gate / "map.docx")
     assert done.status == 2
     assert not (gate / "injected_coverage").exists()
+
+
+def test_two_obstacles_that_begin_alike_make_no_map(gate: Path) -> None:
+    path = gate / "coverage.toml"
+    bumper = "[inject.obstacles.bumper]\ndeflection_mm = [0, 10, 60]\nforce_n = [0, 500, 510]\n"
+    path.write_text(f"{path.read_text(encoding='utf-8')}{bumper}", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="bumper and 50_n_per_mm both begin with 50 N/mm"):
+        cdtool.coverage(path)
+
+
+def test_a_cell_and_the_table_have_the_range_of_the_brackets(gate: Path) -> None:
+    text = (gate / "model.toml").read_text(encoding="utf-8")
+    (gate / "model.toml").write_text(text.partition("[model.controller]")[0], encoding="utf-8")
+    done = cdtool.coverage(gate / "coverage.toml", detectors=["gm"])
+    cell = done.map.cells["momentum"][CellKey(0.3, 5e3)]
+    assert cell.range_ms[1] > cell.range_ms[0] + 1.0
+    printed = command("coverage", gate / "coverage.toml", "--detectors", "gm").out
+    line = next(line for line in printed.splitlines() if line.startswith("momentum") and " 5 " in line)
+    highest = max(done.map.cells["momentum"][CellKey(position, 5e3)].range_ms[1] for position in (0.3, 1.2))
+    assert f"to {highest:.3g}" in line

@@ -15,15 +15,17 @@ from cdtool.evaluation.agreement import agreements
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from cdtool.workflows.injection.injected_logs import read_injected
 from tests.command import cdtool as command
+from tests.workflows.injection.known_drive import known_drive
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
 
 
 @pytest.fixture
 def gate(tmp_path: Path) -> Path:
-    """The sample gate with its model; the free runs are fewer."""
-    for name in ("machine.toml", "model.toml", "inject.toml"):
+    """The sample gate with its model, whose drive is known."""
+    for name in ("machine.toml", "inject.toml"):
         shutil.copy(GATE / name, tmp_path / name)
+    (tmp_path / "model.toml").write_text(known_drive(GATE), encoding="utf-8")
     for name in ("stiff", "soft", "holdout", "free"):
         (tmp_path / name).symlink_to(GATE / name)
     return tmp_path
@@ -158,6 +160,23 @@ def test_a_log_with_a_contact_is_left_out(gate: Path) -> None:
     assert not (gate / "out").exists()
 
 
+def test_the_folder_learns_from_the_same_parts_of_the_logs(gate: Path) -> None:
+    path = write(gate, INJECT)
+    text = path.read_text(encoding="utf-8").replace(
+        '["free/*.csv"]', '[{ path = "free/*.csv", from = "0.5s", to = "1.2m" }]'
+    )
+    path.write_text(text, encoding="utf-8")
+    assert command("inject", path, "-o", gate / "out").status == 0
+    written = read_benchmark_file(gate / "out" / "benchmark.toml")
+    assert {str(section) for section in written.learned_sections.values()} == {"from 0.5 s to 1.2 m of travel"}
+    assert len(written.learned_sections) == len(written.learn) > 1
+    limits = [
+        [row.limit for row in cdtool.benchmark(item).results.contacts if row.detector == "momentum"]
+        for item in (path, gate / "out" / "benchmark.toml")
+    ]
+    assert limits[0] == pytest.approx(limits[1], rel=1e-6)
+
+
 def test_a_position_that_is_never_reached_is_left_out_and_reported(gate: Path) -> None:
     done = cdtool.inject(write(gate, INJECT.replace('"0.9m"', '"0.9m", "40m"')), gate / "out")
     assert len(done.logs.cases) == 1
@@ -208,3 +227,37 @@ def test_a_file_without_the_section_is_refused(gate: Path) -> None:
     path = write(gate, '[impacts.stiff]\nlogs = ["stiff/03.csv"]\n')
     with pytest.raises(ConfigurationError, match=r"no section \[inject\]"):
         cdtool.inject(path, gate / "out")
+
+
+def test_what_could_not_be_injected_is_counted(gate: Path) -> None:
+    path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "5m"]'))
+    skipped = [item for item in cdtool.benchmark(path).results.skipped if "never reaches 5" in item.reason]
+    assert [item.recording for item in skipped] == ["holdout/03.csv"]
+    assert command("benchmark", path).status == 3
+
+
+def test_a_folder_of_cdtool_inject_is_the_users(gate: Path) -> None:
+    path = write(gate, INJECT)
+    assert command("inject", path, "-o", gate / "injected").status == 0
+    (gate / "injected" / "mine.txt").write_text("mine", encoding="utf-8")
+    done = command("benchmark", path)
+    assert done.status == 2
+    assert "holds other files" in done.err
+    assert (gate / "injected" / "mine.txt").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_file_in_the_place_of_the_folder_is_one_line(gate: Path) -> None:
+    (gate / "injected").write_text("mine", encoding="utf-8")
+    done = command("benchmark", write(gate, INJECT))
+    assert done.status == 2
+    assert "holds other files" in done.err and "Traceback" not in done.err
+
+
+def test_a_recording_that_was_deleted_is_made_again(gate: Path) -> None:
+    path = write(gate, INJECT)
+    first = cdtool.benchmark(path)
+    made = next((gate / "injected" / "injected_stiff").iterdir())
+    made.unlink()
+    again = cdtool.benchmark(path)
+    assert made.is_file() and not again.results.skipped
+    assert again.results.contacts == first.results.contacts
