@@ -65,8 +65,8 @@ class Latencies:
     @property
     def differences(self) -> np.ndarray:
         """Of the pairs that are detected in both."""
-        difference: np.ndarray = self.injected - self.true
-        return difference[np.isfinite(difference)]
+        difference = np.asarray(self.injected - self.true, dtype=np.float64)
+        return np.asarray(difference[np.isfinite(difference)])
 
     @property
     def difference(self) -> float:

@@ -53,7 +53,8 @@ def prepare(folder: Path, run: Run) -> None:
     for name, stiffness in (("a", 100), ("b", 500)):
         (folder / f"inject_{name}.toml").write_text(
             'machine = "gate/model.toml"\ndetectors = ["gm"]\n[learn]\nlogs = ["gate/free/0[123].csv"]\n'
-            f'[signature]\nforce = true\n[inject]\nlogs = ["gate/holdout/*.csv"]\npositions = ["0.9m"]\nstiffnesses_n_per_mm = [{stiffness}]\n',
+            '[signature]\nforce = true\n[inject]\nlogs = ["gate/holdout/*.csv"]\n'
+            f'positions = ["0.9m"]\nstiffnesses_n_per_mm = [{stiffness}]\n',
             encoding="utf-8",
         )
     for number in (1, 2):

@@ -35,7 +35,7 @@ from cdtool.recording import FloatArray
 
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.3
-# The drive force of the contacts must exceed that of the impact-free runs by so much [-].
+# The drive force of the contacts must exceed that of the impact-free runs by this factor [-].
 _BEYOND = 1.1
 # A model that is further off than this share of the torque (RMS) does not describe the contacts.
 _LARGEST_TORQUE_ERROR = 0.25
@@ -152,11 +152,12 @@ def identify_contacts(
 ) -> ContactFit:
     """Return take-up travel, end stiffness, damping and load from contacts of an axis whose stiffness is known.
 
-    `model` is that of the impact-free logs: stiffness, friction, sensors, motor mass; with a front stiffness the front
-    mass is fitted too; without one the front is taken as rigid, and 2 % are added to the standard errors. Standard errors hold for exact scales of torque and load cell and an exact motor mass. Where the
-    drive force of the contacts hardly exceeds that of the impact-free logs, or the second stiffness does not differ
-    from the first, take-up travel and end stiffness are not identifiable. Raises IdentificationError without contacts,
-    if the model's drive is rigid, or if the model cannot follow the contacts.
+    `model` is that of the impact-free logs: stiffness, friction, sensors, motor mass. With a front stiffness the front
+    mass is fitted too; without one the front is taken as rigid, and 2 % are added to the standard errors. These hold
+    for exact scales of torque and load cell and an exact motor mass. Where the drive force of the contacts hardly
+    exceeds that of the impact-free logs, or the second stiffness does not differ from the first, take-up travel and end
+    stiffness are not identifiable. Raises IdentificationError without contacts, if the model's drive is rigid, or if
+    the model cannot follow the contacts.
     """
     if not contacts:
         raise IdentificationError("no contact with a load cell is left", "give logs with a contact and channel 'force'")
@@ -168,8 +169,8 @@ def identify_contacts(
     settings = settings or ContactSettings()
     peak = _largest_drive_force(contacts, model.drive)
     known = (settings.largest_wind_up or model.drive.observed_wind_up) * model.drive.stiffness
-    one_stage = _Problem(contacts, model, settings, two_stage=False).fit()
     if peak <= _BEYOND * known:
+        one_stage = _Problem(contacts, model, settings, two_stage=False).fit()
         numbers = {"drive_force": peak, "drive_force_of_impact_free_runs": known}
         refused = [NotIdentifiable("model.drive", key, (Missing.CONTACTS,), numbers) for key in _SECOND_STAGE[:2]]
         return _checked(_refusing(one_stage, refused))
@@ -177,6 +178,7 @@ def identify_contacts(
     if not math.isinf(fit.drive.take_up_travel):
         return _checked(fit)
     refused = [item for item in fit.identified.not_identifiable if item.key in _SECOND_STAGE[:2]]
+    one_stage = _Problem(contacts, model, settings, two_stage=False).fit()
     # A second stage that is not known well may still be needed to know the load.
     is_needed = fit.relative_error["torque"] < 0.9 * one_stage.relative_error["torque"]
     return _checked(fit if is_needed else _refusing(one_stage, refused))
@@ -279,11 +281,11 @@ class _Problem:
             end_damping=values["end_damping"] * self.unit("end_damping"),
         )
 
-    def friction(self, vector: FloatArray, number: int) -> Friction:
-        """Return the load's friction in one contact: the model's, at the level measured before it [N]."""
+    def friction(self, vector: FloatArray, number: int, level: float) -> Friction:
+        """Return the load's friction in one contact: the model's, at the `level` [N, N m] before the contact."""
         contact, base, values = self.contacts[number], self.frictions[number], self.values(vector)
         share = vector[self.slots(number)][0]
-        level, unit = self.load_level(vector, number), self.levels[number]
+        unit = self.levels[number]
         speed = max(contact.approach_speed, 1e-9)
         viscous = base.viscous + values["viscous"] * _VISCOUS_ERROR * unit / speed
         rise = max(base.static - base.coulomb_forward, 0.0) + values["static"] * _STATIC_ERROR * unit
@@ -299,16 +301,13 @@ class _Problem:
             viscous=max(viscous, 0.0),
         )
 
-    def load_level(self, vector: FloatArray, number: int) -> float:
-        """Return the friction of the load before a contact: the drive force less what acts on the motor [N, N m]."""
-        return self.contacts[number].level - self.drive(vector).motor_friction
-
     def simulated(self, vector: FloatArray, number: int) -> dict[str, FloatArray]:
         """Return the simulated channels of one contact (n,) by name, and rows of the kernel."""
         contact, drive = self.contacts[number], self.drive(vector)
-        friction = self.friction(vector, number)
+        level = contact.level - drive.motor_friction
+        friction = self.friction(vector, number, level)
         _, force_share, speed_share, delay = vector[self.slots(number)]
-        force = self.load_level(vector, number) + force_share * _FORCE_ERROR * self.levels[number]
+        force = level + force_share * _FORCE_ERROR * self.levels[number]
         position = float(contact.motor[0, 0]) - wind_up_at(drive, force)
         speed = float(contact.motor[1, 0]) + speed_share * _SPEED_ERROR * contact.approach_speed
         contact_force = contact.force_at(delay * self.settings.clock_error)

@@ -5,8 +5,8 @@ In the direction of approach, with the wind-up d = x_m - x; F_el(d, d') as in `c
     m v'     = F_el - F_r(v) - offset - F_front
     m_f v_f' = F_front - F_c,  F_front = k_f (x - x_f) + c_f (v - v_f)
 
-Without a front mass F_front = F_c. The damping changes continuously around the take-up travel. Motor and force are given
-once per sample and interpolated between samples; the integration is by classical Runge-Kutta steps.
+Without a front mass F_front = F_c. The damping changes continuously around the take-up travel. Motor and force have one
+value per sample and are interpolated between samples; the integration is by classical Runge-Kutta steps.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ _LEAD, _SHORTEST_LEAD, _LONGEST = 0.1, 0.03, 0.2
 _SHORTEST = 0.01
 # The load has left the load cell below this share of the peak force.
 _SEPARATED = 0.02
-# Standard deviation of the common low-pass: at least so many samples, at most so long [s].
+# Standard deviation of the common low-pass: at least this many samples, at most this time [s].
 _FEWEST_SMOOTHED, _LONGEST_SMOOTHED = 1.5, 0.012
 # The inertia force of the motor may be as noisy as this share of the torque's noise.
 _NOISE_SHARE = 0.5

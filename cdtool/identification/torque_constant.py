@@ -32,12 +32,12 @@ _LEAST_FORCE, _LEAST_COMMON = 0.1, 0.4
 _LEAST_RATE = 0.05
 # The motion is quasi-static where the inertia force is below this share of the peak, at its 95th percentile.
 _LARGEST_INERTIA = 0.03
-# A press or a release is at least so long [s].
+# The shortest press or release [s].
 _SHORTEST = 0.3
 # After the force turned, friction turns too: until then a sample belongs to neither direction [s].
 _AFTER_TURN = 0.1
-# The errors of so long sections are independent [s].
-_BLOCK = 0.2
+# Errors are independent from block to block: number of blocks per contact, and the shortest one [s].
+_BLOCKS, _SHORTEST_BLOCK = 12, 0.2
 # A factor with a larger relative standard error is not worth reporting.
 _LARGEST_ERROR = 0.1
 
@@ -46,7 +46,7 @@ _LARGEST_ERROR = 0.1
 class TorqueScale:
     """The factor by which the scale of the torque channel must be multiplied, with its standard error.
 
-    `friction` [N, N m]: mean friction under load, with the scaled torque. `contacts`: number of press and release pairs.
+    `friction` [N, N m]: mean friction under load, with the scaled torque. `contacts`: number of contacts used.
     """
 
     factor: float
@@ -79,7 +79,7 @@ def identify_torque_scale(
         try:
             parts.append(_press_and_release(recording, contact, total_mass, joint, lever_arm))
         except RecordingError as fault:
-            reasons.append(str(fault))
+            reasons.append(fault.message)
     if not parts:
         reason = reasons[0] if reasons else "no contact with a load cell"
         raise IdentificationError(
@@ -176,24 +176,30 @@ def _check_common(name: str, force: FloatArray, sign: FloatArray, peak: float, p
 def _solve(parts: Sequence[_PressAndRelease]) -> tuple[FloatArray, float]:
     """Return the coefficients of tau = F / s + sign (a + b F) + c by least squares, and the standard error of 1 / s.
 
-    The load cell has less noise than the torque, so that it is the regressor. Errors of sections of 0.2 s count as one.
+    The load cell has less noise than the torque, so that it is the regressor. The standard error is that of blocks,
+    and contains how far the slope moves without the friction that grows with the force.
     """
     force = np.concatenate([item.force for item in parts])
     sign = np.concatenate([item.sign for item in parts])
     torque = np.concatenate([item.torque for item in parts])
     design = np.stack((force, sign, sign * force, np.ones(len(force))), axis=1)
-    scale = np.max(np.abs(design), axis=0)
-    inverse = np.linalg.pinv(design / scale, rcond=1e-6) / scale[:, np.newaxis]
+    inverse = _inverse(design)
     solution: FloatArray = inverse @ torque
-    residual = torque - design @ solution
+    weighed = inverse[0] * (torque - design @ solution)
     blocks: list[float] = []
     begin = 0
     for item in parts:
-        step = max(round(_BLOCK / item.period), 1)
         end = begin + len(item.force)
-        edges = [*range(begin, end, step), end]
-        blocks += [float(inverse[0, low:high] @ residual[low:high]) for low, high in pairwise(edges)]
+        step = max(math.ceil(len(item.force) / _BLOCKS), round(_SHORTEST_BLOCK / item.period), 1)
+        blocks += [float(np.sum(weighed[low:high])) for low, high in pairwise([*range(begin, end, step), end])]
         begin = end
-    count = len(blocks)
-    factor = count / max(count - 4, 1)
-    return solution, math.sqrt(factor * float(np.sum(np.square(blocks))))
+    spread = math.sqrt(len(blocks) / max(len(blocks) - 4, 1) * float(np.sum(np.square(blocks))))
+    without = float(_inverse(design[:, [0, 1, 3]])[0] @ torque)
+    return solution, math.hypot(spread, without - float(solution[0]))
+
+
+def _inverse(design: FloatArray) -> FloatArray:
+    """Return the pseudo-inverse of a design (n, k) with columns of different units."""
+    scale = np.max(np.abs(design), axis=0)
+    inverse: FloatArray = np.linalg.pinv(design / scale, rcond=1e-6) / scale[:, np.newaxis]
+    return inverse

@@ -105,7 +105,7 @@ def test_a_wrong_model_names_its_key(sections: dict[str, dict[str, tuple[float, 
         robot_model(planar_arm(), ModelTable(sections))
 
 
-def test_the_solver_solves_and_refuses_what_is_no_inertia() -> None:
+def test_the_solver_solves_and_returns_nan_without_a_positive_definite_inertia() -> None:
     rng = np.random.default_rng(3)
     root, vector = rng.normal(size=(5, 5)), rng.normal(size=5)
     matrix = root @ root.T + np.eye(5)

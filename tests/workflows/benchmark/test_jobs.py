@@ -20,6 +20,8 @@ from cdtool.workflows.execution.workers import Workers, in_order
 FILE = """machine = "machine.toml"
 threshold = "{threshold}"
 
+[signature]
+force = true
 [learn]
 logs = ["free/*.csv"]
 [holdout]
@@ -35,7 +37,7 @@ back_to_n = 8.0
 @pytest.fixture(scope="module")
 def gate(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("gate")
-    cdtool.simulate_gate(folder, {"free": 11, "holdout": 3, "stiff": 4}, seed=16)
+    cdtool.simulate_gate(folder, {"free": 5, "holdout": 3, "stiff": 4}, seed=16)
     damaged = folder / "damaged"
     damaged.mkdir()
     (damaged / "1.csv").write_text("t,i_motor\nnot,a\nlog,0\n", encoding="utf-8")
@@ -74,7 +76,7 @@ def test_all_that_a_worker_receives_and_returns_can_be_sent(gate, by_one, thresh
     monkeypatch.setattr(gathering, "in_order", by_pickles)
     monkeypatch.setattr(runs, "in_order", by_pickles)
     assert run(gate, threshold) == alone
-    assert len(sent) == 20
+    assert len(sent) == 14
 
 
 def test_many_logs_in_pieces_give_the_same_bytes_and_progress(gate, tmp_path):

@@ -28,6 +28,8 @@ FILE = """machine = "machine.toml"
 detectors = ["momentum", "friction_ekf"]
 threshold = "{threshold}"
 {operations}
+[signature]
+force = true
 [learn]
 logs = ["free/*.csv"{learn}]
 {until}
@@ -44,7 +46,7 @@ back_to_n = 8.0
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("gate")
-    cdtool.simulate_gate(folder, {"free": 10, "holdout": 2, "stiff": 4}, seed=18)
+    cdtool.simulate_gate(folder, {"free": 4, "holdout": 2, "stiff": 4}, seed=18)
     return folder
 
 
