@@ -2,9 +2,9 @@
 
 Every set has 14 impact-free runs, from which stiffness and friction are identified, and three stiff contacts. Every
 third set is the default track, the others have the friction's waves with other phases. The stiffness of the front is
-given, as a drawing gives it.
+given, as a drawing gives it. Then the scale of the torque channel, from slow presses on the load cell and releases.
 
-python benchmarks/identification_contacts.py [SETS]      # 30 sets: 3 min
+python benchmarks/identification_contacts.py [SETS]      # 30 sets and 20 presses: 3 min
 """
 
 from __future__ import annotations
@@ -24,12 +24,17 @@ from cdtool.evaluation.truth.onset import find_contacts  # noqa: E402
 from cdtool.evaluation.truth.onset_rule import OnsetRule  # noqa: E402
 from cdtool.identification.contact_fit import ContactFit, ContactSettings, identify_contacts  # noqa: E402
 from cdtool.identification.load_cell_contact import load_cell_contact  # noqa: E402
+from cdtool.identification.torque_constant import identify_torque_scale  # noqa: E402
 from cdtool.identification.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
-from cdtool.simulation.gate_model import GateParameters, simulate_gate_run  # noqa: E402
+from cdtool.recording import Recording, Series  # noqa: E402
+from cdtool.simulation import sensors  # noqa: E402
+from cdtool.simulation.gate_model import GateParameters, integrate_gate, simulate_gate_run  # noqa: E402
 from cdtool.simulation.gate_recordings import as_recording  # noqa: E402
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, free_runs, on_any_track  # noqa: E402
 
 SETS, RUNS, CONTACTS, FIRST_SEED = 30, 14, 3, 3000
+TORQUE_SCALE = 0.9
+PRESSES = ((0.02, 6.0), (0.01, 12.0))  # speed reference [m/s] and duration [s]
 SENSORS = Sensors(
     torque_filter_time=GATE.torque_filter_time,
     accelerometer_hz=GATE.accelerometer_frequency,
@@ -90,6 +95,51 @@ def measure(sets: int) -> bool:
     return met
 
 
+def press(seed: int, speed: float, duration: float) -> Recording:
+    """A press on the load cell with the speed reference [m/s] and the release of it, `duration` [s] each.
+
+    The torque channel has 1 / TORQUE_SCALE of the true torque.
+    """
+    rng = np.random.default_rng([seed, 5000])
+    period = GATE.sample_period
+    time = period * np.arange(round((3.5 + 2.0 * duration) / period))
+    turn = 1.0 + duration
+    corners = [0.3, 0.4, turn, turn + 0.1, turn + 0.6, turn + 0.7, turn + 1.2 + duration, turn + 1.3 + duration]
+    reference = speed * np.interp(time, corners, [0.0, 1.0, 1.0, 0.0, 0.0, -1.0, -1.0, 0.0])
+    white = rng.standard_normal((3, len(time)))
+    disturbance = sensors.coloured_noise(white[0], GATE.disturbance_force, GATE.disturbance_rate, period)
+    run = (1.0 + GATE.friction_scatter * rng.standard_normal(), rng.uniform(0.0, 2.0 * np.pi), 5e-3)
+    truth, _ = integrate_gate(GATE, np.zeros(7), reference, disturbance, run, "stiff", 5)
+    torque = sensors.measured_torque(truth["motor_force"], white[1], GATE.torque_noise, GATE.torque_filter_time, period)
+    channels = {
+        "torque": Series(time, torque / TORQUE_SCALE, "N"),
+        "speed": Series(time, truth["measured_speed"], "m/s"),
+        "position": Series(time, truth["measured_position"], "m"),
+        "force": Series(time, truth["contact_force"] + GATE.load_cell_noise * white[2], "N"),
+    }
+    return Recording(f"press {seed}", f"press {seed}", ("gate",), channels)
+
+
+def torque_scales() -> bool:
+    rows = []
+    for speed, duration in PRESSES:
+        for seed in range(FIRST_SEED, FIRST_SEED + 10):
+            recording = press(seed, speed, duration)
+            contact = find_contacts(recording, OnsetRule())[0]
+            found = identify_torque_scale([(recording, contact)], GATE.leaf_mass + GATE.motor_mass)
+            rows.append((found.factor / TORQUE_SCALE - 1.0, found.standard_error / TORQUE_SCALE))
+    error, stated = np.array(rows).T
+    covered = float(np.mean(np.abs(error) <= 2.0 * stated))
+    largest = float(np.max(np.abs(error)))
+    good = largest <= 0.05 and covered >= 0.85
+    print(
+        f"{'ok   ' if good else 'WORSE'} torque scale     known {len(rows)}, mean error {100 * np.mean(error):+5.1f} %,"
+        f" RMS {100 * np.sqrt(np.mean(error**2)):5.1f} %, largest {100 * largest:5.1f} %, stated "
+        f"{100 * np.median(stated):4.1f} %, within two {100 * covered:3.0f} %"
+    )
+    return good
+
+
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else SETS
-    main("identified and true parameters of contacts", lambda: measure(count))
+    main("identified and true parameters of contacts", lambda: measure(count) & torque_scales())

@@ -55,7 +55,7 @@ PARAMETER_ORDER = (
 
 
 @kernel(
-    "float64(UniTuple(float64, 31), float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 4), "
+    "float64(UniTuple(float64, 31), float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 5), "
     "float64, int64, float64[:, ::1])",
     rare=True,
 )
@@ -64,7 +64,7 @@ def integrate_axis(
     force_curve: Array,
     initial_state: Array,
     inputs: Array,
-    obstacle: tuple[float, float, float, float],
+    obstacle: tuple[float, float, float, float, float],
     replay: float,
     substeps: int,
     log: Array,
@@ -74,7 +74,7 @@ def integrate_axis(
     `force_curve` (2, points): penetration [m] and force [N], from (0, 0). `initial_state` (8,): the seven states and
     the controller's integral [N]. `replay`: 0 for the controller alone, 1 with the input `command` added to its output,
     2 for this command alone. `obstacle`: 1 where there is one, its position [m], the direction of approach +-1,
-    lambda [s/m].
+    lambda [s/m], and from when on it is there [s].
     """
     (
         motor_mass,
@@ -109,7 +109,7 @@ def integrate_axis(
         force_lag,
         delay_samples,
     ) = parameters
-    has_obstacle, obstacle_position, direction, contact_damping = obstacle
+    has_obstacle, obstacle_position, direction, contact_damping, present_from = obstacle
     step = period / substeps
     keep = 0.0
     if speed_filter_order > 0.0 and speed_filter_hz < math.inf:
@@ -160,6 +160,7 @@ def integrate_axis(
             state[6] = acting
 
         for substep in range(substeps):
+            is_present = has_obstacle > 0.5 and sample * period + substep * step >= present_from
             # Element by element: array assignments would triple the time to compile.
             for index in range(7):
                 total[index] = 0.0
@@ -184,7 +185,7 @@ def integrate_axis(
                 friction = coulomb * math.tanh(v / smoothing_speed) + viscous * v + offset
 
                 contact = 0.0
-                if has_obstacle > 0.5:
+                if is_present:
                     penetration = direction * (x_f - obstacle_position)
                     if penetration > 0.0:
                         last = 1
@@ -259,7 +260,7 @@ def integrate_axis(
                 state[4] = state[2]
                 state[5] = state[3]
             reached = direction * (state[4] - obstacle_position)
-            if has_obstacle > 0.5 and math.isnan(first_contact) and reached > 0.0:
+            if is_present and math.isnan(first_contact) and reached > 0.0:
                 moved = state[4] - before
                 share = (obstacle_position - before) / moved if moved != 0.0 else 1.0
                 first_contact = sample * period + (substep + min(max(share, 0.0), 1.0)) * step

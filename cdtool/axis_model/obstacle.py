@@ -61,6 +61,16 @@ class Obstacle(StoresDerived):
         """Return the obstacle at a position [m], approached in a direction."""
         return replace(self, position=position, direction=direction)
 
+    def on_lever(self, lever: float) -> Obstacle:
+        """Return the obstacle as a rotary axis meets it with the end of a lever [m]: in rad, N m and N m/rad."""
+        return replace(
+            self,
+            deflection=tuple(item / lever for item in self.deflection),
+            force=tuple(item * lever for item in self.force),
+            damping=self.damping * lever,
+            series_stiffness=self.series_stiffness * lever**2,
+        )
+
     @cached_property
     def penetration_curve(self) -> FloatArray:
         """(2, points): penetration [m] and force [N] with the series stiffness folded in."""

@@ -54,11 +54,16 @@ class AxisMotion:
 
 
 def simulate_axis(
-    model: AxisModel, inputs: AxisInputs, obstacle: Obstacle | None = None, period: float | None = None
+    model: AxisModel,
+    inputs: AxisInputs,
+    obstacle: Obstacle | None = None,
+    period: float | None = None,
+    present_from: float = -math.inf,
 ) -> AxisMotion:
     """Simulate the axis from rest, or in steady motion with the initial speed.
 
-    `period` [s]: of the inputs, if the model has no controller. Raises ConfigurationError where the model has neither
+    `period` [s]: of the inputs, if the model has no controller. `present_from` [s]: when the obstacle is put there,
+    after the first input. Raises ConfigurationError where the model has neither
     controller nor command, or where its parameters need more integration steps than are reasonable.
     """
     controller = model.controller
@@ -74,11 +79,11 @@ def simulate_axis(
         if values is not None:
             table[row] = values
     rows = np.zeros((len(axis_loop_kernel.ROWS), count))
-    against = (0.0, 0.0, 1.0, 0.0)
+    against = (0.0, 0.0, 1.0, 0.0, -math.inf)
     curve = np.array([[0.0, 1.0], [0.0, 0.0]])
     if obstacle is not None:
         obstacle = _behind_front(model.drive, obstacle)
-        against = (1.0, obstacle.position, float(obstacle.direction), obstacle.damping)
+        against = (1.0, obstacle.position, float(obstacle.direction), obstacle.damping, present_from)
         curve = obstacle.penetration_curve
     first_contact = axis_loop_kernel.integrate_axis(
         _numbers(model, step),

@@ -116,7 +116,8 @@ def axis_contact(
     placed = obstacle.at(place, 1 if approach > 0.0 else -1)
     frozen = assumption.controller is ControllerReaction.FROZEN
     against = replace(inputs, command=free["command"]) if frozen else inputs
-    hit = simulate_axis(model, against, placed)
+    # An axis that moves to and fro may have been beyond that place before: the obstacle is put there for this contact.
+    hit = simulate_axis(model, against, placed, present_from=contact - begin - controller.period)
     return _difference(model, free, hit, time, (contact, approach, deviation), assumption)
 
 

@@ -84,7 +84,7 @@ def inject(
     >>> import cdtool
     >>> done = cdtool.inject("sample_logs/gate/inject.toml", "injected")
     >>> len(done.logs.cases), done.logs.cases[0].group
-    (16, 'injected_stiff')
+    (32, 'injected_stiff')
     """
     setup = read_benchmark_file(file)
     section = require_section(setup.inject, setup.path)

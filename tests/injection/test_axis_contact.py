@@ -10,6 +10,7 @@ import pytest
 
 from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import AxisModel, Drive, Sensors
+from cdtool.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import USED, AxisRun, axis_run
 from cdtool.injection.assumption import Assumption, ControllerReaction, assumptions_of
@@ -332,3 +333,18 @@ def test_detectors_that_need_what_the_model_does_not_know_are_refused(
 ) -> None:
     assert refusal(needs, model, reaction) is expected
     assert math.isfinite(model.drive.load_mass)
+
+
+def test_an_axis_that_was_beyond_the_place_before_meets_the_obstacle_only_at_the_contact() -> None:
+    """A reciprocating axis that never rests, whose second forward stroke is shorter than its first."""
+    time = np.arange(6000) * 1e-3
+    rate = 2.0 * math.pi / 3.0
+    speed = np.where(time < 3.0, 0.3, 0.2) * np.sin(rate * time)
+    assert MODEL.controller is not None
+    motion = simulate_axis(MODEL, AxisInputs(speed))
+    run = AxisRun("reciprocating", 0.0, 1e-3, motion["drive_force"], speed=motion["motor_speed"], reference_speed=speed)
+    contact = axis_contact(run, MODEL, OBSTACLES["stiff"], 3.8, 0.3)
+    before = contact.force.time < 3.8 - 1e-9
+    assert not np.any(contact.force.values[before])
+    assert not np.any(contact.changes["speed"].values[before])
+    assert contact.peak_force > 100.0

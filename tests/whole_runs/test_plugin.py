@@ -49,7 +49,10 @@ def server(site: Path) -> Iterator[CommandServer]:
     """Another interpreter that finds the example package."""
     found = {"PYTHONPATH": f"{ROOT}{os.pathsep}{site}", "PYTHONDONTWRITEBYTECODE": "1"}
     with command_server(environment=found) as running:
-        running.warm_up("detect", GATE / "free" / "03.csv", "-m", GATE / "machine.toml", "-d", "gm", "--limit", 1e6)
+        log = (GATE / "free" / "03.csv", "-m", GATE / "machine.toml")
+        running.warm_up("info", *log)
+        running.warm_up("detect", *log, "-d", "gm", "--limit", 1e6)
+        running.warm_up("benchmark", GATE / "benchmark.toml", "--detectors", "gm", "--json")
         yield running
 
 

@@ -16,6 +16,7 @@ from cdtool.injection.assumption import Assumption
 from cdtool.injection.obstacles import read_obstacle, shipped_obstacles
 from cdtool.injection.robot_contact import StruckPoint
 from cdtool.log_section import MARK_HINT, Mark
+from cdtool.machines.axis import Axis
 from cdtool.plain_text import digits
 from cdtool.remote.remote_path import joined
 from cdtool.tables import Table
@@ -49,8 +50,8 @@ class InjectSection:
     """Every obstacle is put at every position into every log.
 
     `positions` are marks: distances travelled, or times. `duration` [s] of a recording after its contact. `folder` is
-    where `cdtool benchmark` keeps the recordings. `joint`: the axis that meets the obstacle; `struck`: the point of a
-    robot that does.
+    where `cdtool benchmark` keeps the recordings. `joint`: the axis that meets the obstacle; `lever` [m]: its distance
+    from a rotary axis, 0 for the others; `struck`: the point of a robot that meets it.
     """
 
     logs: tuple[Path, ...]
@@ -62,6 +63,7 @@ class InjectSection:
     folder: str
     file_format: str
     struck: StruckPoint | None = None
+    lever: float = 0.0
 
     def groups(self, assumptions: Sequence[Assumption]) -> dict[str, tuple[NamedObstacle, Assumption]]:
         """Return the groups of contacts by name: an obstacle, and what is assumed about the machine."""
@@ -92,6 +94,7 @@ def read_inject_section(table: Table, found: LogsOf, joints: tuple[str, ...], gr
         folder=table.text("folder", INJECTED),
         file_format=table.choice("format", FORMATS, "csv"),
         struck=struck,
+        lever=_lever(table, machine),
     )
     table.finish()
     return section
@@ -112,6 +115,17 @@ def _struck(table: Table, machine: Machine) -> StruckPoint | None:
         raise table.fault("point", "is missing or no list", "give [x, y, z] in the link's frame, in m")
     x, y, z = table.numbers("point", 3)
     return StruckPoint(link, (x, y, z), _direction(table))
+
+
+def _lever(table: Table, machine: Machine) -> float:
+    """Return the distance of the obstacle from a rotary axis [m]; 0 for other machines."""
+    if isinstance(machine, Axis) and machine.force_unit != "N":
+        if "lever_arm_m" not in table:
+            raise table.fault("lever_arm_m", "is missing", "give the obstacle's distance from the axis of rotation")
+        return table.number("lever_arm_m", above=0.0)
+    if "lever_arm_m" in table:
+        raise table.fault("lever_arm_m", "applies to a rotary_axis only", "remove it")
+    return 0.0
 
 
 def _direction(table: Table) -> tuple[float, float, float] | None:
@@ -170,6 +184,8 @@ def _positions(table: Table, machine: Machine) -> tuple[Mark, ...]:
         marks = tuple(_mark(table, "positions", text, machine) for text in table.texts("positions"))
         if len({getattr(mark, "joint", None) for mark in marks}) > 1:
             raise table.fault("positions", "are those of different joints", "give positions of one joint")
+        if len({f"{digits(mark.value)} {mark.unit}" for mark in marks}) < len(marks):
+            raise table.fault("positions", "repeats a position", "list each position once")
         return marks
     grid = table.table("positions")
     begin, end = (_mark(grid, name, grid.text(name), machine) for name in ("from", "to"))

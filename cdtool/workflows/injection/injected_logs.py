@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -121,37 +123,46 @@ class _Work:
         skipped, machine_toml = [], ""
         groups = self.section.groups(self.assumptions).items()
         rng = np.random.default_rng([self.section.seed, number])
+        at: Any = self.struck  # its run is of its own kind
         for mark in self.section.positions:
             # The contact is anywhere between two samples, not always on one.
             share = float(rng.random())
+            reasons: dict[tuple[str, str], None] = {}
+            try:
+                time = self._time(run, recording, mark, share)
+            except RecordingError as fault:
+                skipped.append(Skipped(recording.name, f"{mark}: {fault}"))
+                continue
             for group, (obstacle, assumption) in groups:
                 try:
-                    contact = self._contact(run, recording, mark, share, obstacle, assumption)
+                    contact = at.contact(run, obstacle.obstacle, time, self.section.duration, assumption)
                     file = f"{group}/{number + 1:03d}_{log.stem}_{digits(mark.value)}{mark.unit}"
                     case, machine_toml = self._write(file, log, logged.recording, group, obstacle, mark, contact)
                     cases.append(case)
                 except RecordingError as fault:
-                    skipped.append(Skipped(recording.name, f"{group} at {mark}: {fault}"))
+                    # The brackets of an obstacle fail for one reason.
+                    reasons[obstacle.name, str(fault)] = None
+            skipped += [Skipped(recording.name, f"{name} at {mark}: {reason}") for name, reason in reasons]
         return _OfLog(tuple(cases), tuple(skipped), machine_toml)
 
-    def _contact(
-        self,
-        run: AxisRun | RobotLog,
-        recording: Recording,
-        mark: Mark,
-        share: float,
-        obstacle: NamedObstacle,
-        assumption: Assumption,
-    ) -> InjectedContact:
+    def _time(self, run: AxisRun | RobotLog, recording: Recording, mark: Mark, share: float) -> float:
+        """Return when the axis or the robot is at a mark [s], up to a period earlier."""
+        if isinstance(self.struck, StruckAxis):
+            recording = _of_joint(recording, self.struck.joint)  # not that of the joint that moves most
         time = mark.time_in(recording)
         if not math.isfinite(time):
             raise RecordingError(f"the log never reaches {mark}", "choose a position within the travel")
         if time < run.start:
             raise RecordingError(f"{mark} is before the log begins, at {run.start:.3f} s", "choose a later position")
         time = max(time - share * run.period, run.start)
-        at: Any = self.struck  # its run is of its own kind
-        contact: InjectedContact = at.contact(run, obstacle.obstacle, time, self.section.duration, assumption)
-        return contact
+        left = recording.end - time
+        if left < self.section.duration - run.period:
+            # A detector that has not alarmed by then would count as one that missed.
+            raise RecordingError(
+                f"the log ends {left:.2f} s after {mark}",
+                f"choose an earlier position, or a duration_s below {self.section.duration:g}",
+            )
+        return time
 
     def _write(
         self,
@@ -333,10 +344,22 @@ class _Lost:
         return _OfLog((), (Skipped(shown_path(item[1], self.base), reason),))
 
 
+def _of_joint(recording: Recording, joint: int) -> Recording:
+    """Return the motion of one joint."""
+    channels = {
+        name: recording[name].with_values(recording[name].values[:, [joint]], recording[name].unit)
+        for name in ("position", "speed")
+        if name in recording
+    }
+    return replace(recording, channels=channels, joints=(recording.joints[joint],))
+
+
 def _write_manifest(injected: InjectedLogs) -> None:
-    rows = ["recording,start_s,end_s,kind,uncertainty_s"]
-    rows += [f"{case.file},{case.start!r},{case.end!r},{case.obstacle},0" for case in injected.cases]
-    (injected.folder / CONTACTS).write_text("\n".join(rows) + "\n", encoding="utf-8")
+    rows = io.StringIO()
+    table = csv.writer(rows, lineterminator="\n")
+    table.writerow(("recording", "start_s", "end_s", "kind", "uncertainty_s"))
+    table.writerows((case.file, repr(case.start), repr(case.end), case.obstacle, 0) for case in injected.cases)
+    (injected.folder / CONTACTS).write_text(rows.getvalue(), encoding="utf-8")
     manifest = {
         "tool": "cdtool",
         "tool_version": __version__,

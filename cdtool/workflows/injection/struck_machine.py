@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cdtool.axis_model.model_table import axis_model
 from cdtool.axis_model.obstacle import Obstacle
@@ -23,10 +23,11 @@ from cdtool.workflows.injection.inject_section import InjectSection
 
 @dataclass(frozen=True)
 class StruckAxis:
-    """An axis that meets the obstacle with its load; `joint` is its index."""
+    """An axis that meets the obstacle with its load; `joint` is its index, `lever` [m] 0 for a linear axis."""
 
     model: AxisModel
     joint: int
+    lever: float = 0.0
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -45,8 +46,15 @@ class StruckAxis:
     def contact(
         self, run: AxisRun, obstacle: Obstacle, time: float, duration: float, assumption: Assumption
     ) -> InjectedContact:
-        """Return the contact at a time [s]; raises RecordingError if it cannot be."""
-        return axis_contact(run, self.model, obstacle, time, duration, assumption)
+        """Return the contact at a time [s]; raises RecordingError if it cannot be.
+
+        On a rotary axis the obstacle acts on a lever: torque = lever * force, deflection = lever * angle.
+        """
+        if not self.lever:
+            return axis_contact(run, self.model, obstacle, time, duration, assumption)
+        contact = axis_contact(run, self.model, obstacle.on_lever(self.lever), time, duration, assumption)
+        force = replace(contact.force, values=contact.force.values / self.lever)
+        return replace(contact, force=force, peak_force=contact.peak_force / self.lever)
 
 
 @dataclass(frozen=True)
@@ -84,7 +92,7 @@ def struck_machine(section: InjectSection, machine_file: MachineFile) -> StruckA
     """Return the machine of a section [inject]; raises ConfigurationError for an incomplete model or unknown link."""
     machine = machine_file.machine
     if isinstance(machine, Axis):
-        return StruckAxis(axis_model(machine, machine_file.model, section.joint), section.joint)
+        return StruckAxis(axis_model(machine, machine_file.model, section.joint), section.joint, section.lever)
     if isinstance(machine, CoupledMachine) and section.struck is not None:
         model = robot_model(machine, machine_file.model)
         model.link(section.struck.link)

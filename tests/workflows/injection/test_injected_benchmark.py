@@ -229,6 +229,12 @@ def test_a_file_without_the_section_is_refused(gate: Path) -> None:
         cdtool.inject(path, gate / "out")
 
 
+@pytest.mark.parametrize("positions", ['["0.9m", "900mm"]', '["4s", "4000 ms"]'])
+def test_a_position_that_is_given_twice_is_refused(gate: Path, positions: str) -> None:
+    with pytest.raises(ConfigurationError, match="repeats a position"):
+        read_benchmark_file(write(gate, INJECT.replace('["0.9m"]', positions)))
+
+
 def test_what_could_not_be_injected_is_counted(gate: Path) -> None:
     path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "5m"]'))
     skipped = [item for item in cdtool.benchmark(path).results.skipped if "never reaches 5" in item.reason]
@@ -261,3 +267,27 @@ def test_a_recording_that_was_deleted_is_made_again(gate: Path) -> None:
     again = cdtool.benchmark(path)
     assert made.is_file() and not again.results.skipped
     assert again.results.contacts == first.results.contacts
+
+
+def test_a_contact_too_near_the_end_of_the_log_is_left_out_not_missed(gate: Path) -> None:
+    path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "1.39m"]\nduration_s = 2.0'))
+    results = cdtool.benchmark(path).results
+    assert {row.outcome for row in results.contacts} == {"detected"}
+    reasons = [item.reason for item in results.skipped]
+    assert any("the log ends" in reason and "choose an earlier position" in reason for reason in reasons)
+
+
+def test_a_comma_in_the_name_of_a_log_is_kept(gate: Path) -> None:
+    shutil.copy(GATE / "holdout" / "03.csv", gate / "run 3, door.csv")
+    path = write(gate, INJECT.replace("holdout/03.csv", "run 3, door.csv"))
+    assert command("inject", path, "-o", gate / "out").status == 0
+    done = cdtool.benchmark(gate / "out" / "benchmark.toml")
+    assert [row.outcome for row in done.results.contacts if row.detector == "momentum"] == ["detected"]
+
+
+def test_a_reason_is_stated_once_per_obstacle_not_per_bracket(gate: Path) -> None:
+    shutil.copy(GATE / "model.toml", gate / "model.toml")  # two brackets
+    path = write(gate, INJECT.replace('["0.9m"]', '["0.9m", "0.1s"]'))
+    reasons = [item.reason for item in cdtool.benchmark(path).results.skipped]
+    assert sum("at rest" in reason for reason in reasons) == 1
+    assert any(reason.startswith("stiff at 0.1 s: ") for reason in reasons)

@@ -71,11 +71,18 @@ def _separator(header: str, columns: Sequence[str]) -> str:
     return next((mark for mark in "\t;, " if header.split(mark) == list(columns)), "")
 
 
+_KEPT: dict[tuple[str, str], bytes] = {}
+"""What a layout writes, by its name and the state of the generator: all its variants need it."""
+
+
 def _written(layout: Layout, generator: Generator) -> str:
-    with TemporaryDirectory() as folder:
-        whole = Path(folder) / "whole.csv"
-        layout.write(whole, generator)
-        content = whole.read_bytes()
+    key = layout.name, str(generator.bit_generator.state)
+    if key not in _KEPT:
+        with TemporaryDirectory() as folder:
+            whole = Path(folder) / "whole.csv"
+            layout.write(whole, generator)
+            _KEPT[key] = whole.read_bytes()
+    content = _KEPT[key]
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
