@@ -33,7 +33,7 @@ _LONGEST_APPROACH = 30.0
 _STIFF_SHARE = 0.2
 # Further, or faster, than known: by more than the error of a simulation.
 _BEYOND = 1.05
-# The speed is compared with the log's over so long before the contact [s], and may differ by these shares.
+# The speed is compared with the log's during the last time before the contact [s], and may differ by these shares.
 _COMPARED_TIME = 0.1
 _DOUBTFUL_DEVIATION, _LARGEST_DEVIATION = 0.05, 0.2
 # Correlation of the measured torque and the model's during the approach below which one has the opposite sign.
@@ -116,7 +116,7 @@ def axis_contact(
     placed = obstacle.at(place, 1 if approach > 0.0 else -1)
     frozen = assumption.controller is ControllerReaction.FROZEN
     against = replace(inputs, command=free["command"]) if frozen else inputs
-    # An axis that moves to and fro may have been beyond that place before: the obstacle is put there for this contact.
+    # A reciprocating axis may have been beyond that place before: the obstacle is put there for this contact.
     hit = simulate_axis(model, against, placed, present_from=contact - begin - controller.period)
     return _difference(model, free, hit, time, (contact, approach, deviation), assumption)
 
