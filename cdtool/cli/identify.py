@@ -95,7 +95,7 @@ def _identify_machine(
 
     runs = None if loaded is None else LoadedRuns(*loaded)
     with progress("identifying") as advance:
-        done = run(logs, machine, workers=workers, progress=advance, payload=runs)
+        done = run(logs, machine, workers=workers, progress=advance, other_logs=runs)
     needs_samples = any(target.suffix.lower() == PAGE for target in targets)
     evidence = evidence_of(done, logs, machine, workers) if needs_samples else ()
     written = write_identification(done, evidence, targets, find_logs(logs, Path(), "LOGS"))

@@ -17,10 +17,12 @@ from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.files import replaced
 from cdtool.identification.axis_run import AxisRun, axis_run
+from cdtool.identification.contact_fit import ContactFit
 from cdtool.identification.estimate import Estimate, IdentificationError, Method, NotIdentifiable
 from cdtool.identification.friction_choice import FrictionForm, JointFriction
 from cdtool.identification.rigid_axis import RigidAxisFit, RigidAxisSettings, identify_rigid_axis
 from cdtool.identification.speed_controller import ControllerFit, ControllerSettings, identify_controller
+from cdtool.identification.torque_constant import TorqueScale
 from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.machines.coupled import CoupledMachine
@@ -28,6 +30,15 @@ from cdtool.recording import Recording
 from cdtool.remote.remote_path import location
 from cdtool.tables import read_toml
 from cdtool.workflows.execution.workers import Progress, Workers
+from cdtool.workflows.identification.identifying_contacts import (
+    ContactLogs,
+    LoadCellLogs,
+    identify_struck,
+    read_contacts,
+    scale_estimates,
+    scaled,
+    torque_scale,
+)
 from cdtool.workflows.identification.identifying_robot import (
     LoadedRuns,
     RobotIdentification,
@@ -53,7 +64,8 @@ class JointIdentification:
     """What was identified of one joint, by each method; a method that could not be used has its reason in `refused`.
 
     `units`: of inertia, force, travel and viscous friction. `has_torque_filter`: the machine file states it. `robot`:
-    of a joint of a robot or planar arm, which has none of the others.
+    of a joint of a robot or planar arm, which has none of the others. `contacts`: what contacts with a load cell add.
+    `torque_scale`: the factor by which all torques were multiplied before; None without presses.
     """
 
     joint: str
@@ -64,53 +76,84 @@ class JointIdentification:
     has_torque_filter: bool = False
     refused: Mapping[str, str] = field(default_factory=dict)
     robot: JointFriction | None = None
+    contacts: ContactFit | None = None
+    torque_scale: TorqueScale | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Return the estimates that the machine file gets; the load's mass is that of the elastic drive, if known."""
+        """Return the estimates that the machine file gets.
+
+        The load's mass is that of the contacts, else that of the elastic drive, else that of the rigid axis. Friction
+        of the load that the contacts show to act on the motor is among the values known only together.
+        """
         found: dict[tuple[str, str], Estimate] = {}
-        for fit in (self.rigid, self.two_mass, self.controller, self.robot):
+        for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
             for estimate in fit.identified.estimates if fit else ():
                 found[estimate.section, estimate.key] = estimate
-        return tuple(found.values())
+        for item in self.contacts.together if self.contacts else ():
+            found.pop((item.section, item.key), None)
+        return tuple(map(self._with_scale_error, found.values()))
+
+    def _with_scale_error(self, estimate: Estimate) -> Estimate:
+        """Return an estimate whose standard error has that of the torque's scale, on which masses and forces depend."""
+        if self.torque_scale is None or not estimate.unit.startswith(("kg", "N")):
+            return estimate
+        relative = self.torque_scale.standard_error / self.torque_scale.factor
+        return replace(estimate, standard_error=math.hypot(estimate.standard_error, relative * estimate.value))
 
     @property
     def together(self) -> tuple[Estimate, ...]:
         """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
-        known = {(item.section, item.key) for item in self.estimates}
+        of_contacts = self.contacts.together if self.contacts else ()
+        known = {(item.section, item.key) for item in (*self.estimates, *of_contacts)}
         found: list[Estimate] = list(self.robot.together) if self.robot else []
-        if self.two_mass:
-            numbers = {item.key: item.numbers for item in self.two_mass.identified.not_identifiable}
-            for key, unit in (("viscous", self.units[3]), ("static", self.units[1])):
-                if key in numbers:
-                    value = numbers[key]["value"]
-                    error = value * numbers[key]["relative_standard_error"]
-                    found.append(Estimate("model.friction", key, value, error, unit, Method.OUTPUT_ERROR))
-            found.append(_exact("model.drive", "observed_wind_up", self.two_mass.largest_wind_up, self.units[2]))
-            found.append(_exact("model.friction", "stribeck_speed", self.two_mass.model.friction.stribeck_speed, "m/s"))
+        found += [*self._of_starts(), *self._of_controller()]
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
+        return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
+
+    def _of_starts(self) -> list[Estimate]:
+        """Return what the starts show of friction and drive together with the identified values."""
+        if not self.two_mass:
+            return []
+        found = []
+        numbers = {item.key: item.numbers for item in self.two_mass.identified.not_identifiable}
+        for key, unit in (("viscous", self.units[3]), ("static", self.units[1])):
+            if key in numbers:
+                value = numbers[key]["value"]
+                error = value * numbers[key]["relative_standard_error"]
+                found.append(Estimate("model.friction", key, value, error, unit, Method.OUTPUT_ERROR))
+        drive = self.contacts.drive if self.contacts else None
+        wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
+        if wind_up > 0.0:
+            found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
+        found.append(_exact("model.friction", "stribeck_speed", self.two_mass.model.friction.stribeck_speed, "m/s"))
+        return found
+
+    def _of_controller(self) -> list[Estimate]:
+        """Return what is needed to simulate the identified controller."""
         fit = self.controller
-        if fit is not None and fit.controller is not None:
-            for key, value in finite_values(fit.controller).items():
-                if value or key == "speed_filter_order":
-                    found.append(_exact("model.controller", key, value, _CONTROLLER_UNITS.get(key, "")))
-            slope = {item.key: item.numbers for item in fit.identified.not_identifiable}.get("slew_limit", {})
-            if slope.get("largest_n_per_s", 0.0) > 0.0:
-                found.append(
-                    _exact("model.controller", "observed_slope", slope["largest_n_per_s"], f"{self.units[1]}/s")
-                )
-            if math.isfinite(fit.lag) and fit.lag > 0.0 and not self.has_torque_filter:
-                found.append(_exact("model.sensors", "torque_filter_time", fit.lag, "s"))
-        return tuple(item for item in found if (item.section, item.key) not in known)
+        if fit is None or fit.controller is None:
+            return []
+        found = []
+        for key, value in finite_values(fit.controller).items():
+            if value or key == "speed_filter_order":
+                found.append(_exact("model.controller", key, value, _CONTROLLER_UNITS.get(key, "")))
+        slope = {item.key: item.numbers for item in fit.identified.not_identifiable}.get("slew_limit", {})
+        if slope.get("largest_n_per_s", 0.0) > 0.0:
+            found.append(_exact("model.controller", "observed_slope", slope["largest_n_per_s"], f"{self.units[1]}/s"))
+        if math.isfinite(fit.lag) and fit.lag > 0.0 and not self.has_torque_filter:
+            found.append(_exact("model.sensors", "torque_filter_time", fit.lag, "s"))
+        return found
 
     @property
     def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
         """Return the parameters that no method could identify."""
         known = {(item.section, item.key) for item in self.estimates}
+        known |= {(item.section, item.key) for item in self.contacts.together} if self.contacts else set()
         found: dict[tuple[str, str], NotIdentifiable] = {}
-        for fit in (self.rigid, self.two_mass, self.controller, self.robot):
+        for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
             for item in fit.identified.not_identifiable if fit else ():
                 if (item.section, item.key) not in known:
                     found.setdefault((item.section, item.key), item)
@@ -169,7 +212,7 @@ def identify(
     force: bool = False,
     workers: Workers | None = None,
     progress: Progress | None = None,
-    payload: LoadedRuns | None = None,
+    other_logs: LoadedRuns | ContactLogs | None = None,
 ) -> IdentifiedMachine:
     """Identify the parameters of a machine's model from impact-free logs, and update its machine file.
 
@@ -189,8 +232,10 @@ def identify(
         How the logs are read.
     progress : callable, optional
         Called after each log with the number done and the total.
-    payload : LoadedRuns, optional
-        Of a robot: logs of motion with a known payload, which show the torque constants of its joints.
+    other_logs : LoadedRuns or ContactLogs, optional
+        Of a robot: logs of motion with a known payload, which show the torque constants of its joints. Of an axis: logs
+        of contacts with a load cell, which show its drive beyond the starts and its load, and of slow presses, which
+        show the scale of its torque.
 
     Returns
     -------
@@ -206,7 +251,7 @@ def identify(
     SignatureError
         No log is left.
     UsageError
-        The output exists, or a payload is given for an axis.
+        The output exists, a payload is given for an axis, or contacts for a robot or several joints.
 
     Examples
     --------
@@ -221,8 +266,7 @@ def identify(
     if target is not None and target.exists() and not force and not _same(target, path):
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
-    if payload is not None and not isinstance(machine_file.machine, CoupledMachine):
-        raise UsageError("a payload is given for an axis", "torque constants are identified for robots only")
+    payload, contacts = _for_this_machine(other_logs, machine_file)
     reading = RunReading("whole", onset=OnsetRule(), base=None, workers=workers or Workers(), progress=progress)
     runs, recordings = _impact_free(logs, "LOGS", machine_file, reading)
     given = read_toml(path, "a machine file")
@@ -232,11 +276,14 @@ def identify(
         joints = tuple(JointIdentification(name, refused=refused, robot=item) for name, item, refused in rows)
     else:
         count = len(machine_file.machine.joints)
-        joints = tuple(_identify_joint(machine_file, joint, recordings) for joint in range(count))
+        struck = read_contacts(contacts, machine_file) if contacts else LoadCellLogs()
+        joints = tuple(_identify_joint(machine_file, joint, recordings, struck) for joint in range(count))
     estimates = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.estimates]
     together = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.together]
     if robot is not None:
         estimates += robot.gain_estimates
+    for number, joint in enumerate(joints):
+        estimates += scale_estimates(joint.torque_scale, given, number) if joint.torque_scale else []
     if not estimates and not together and not _was_compared(joints):
         raise IdentificationError(
             f"nothing can be identified from {len(recordings)} logs: {'; '.join(_reasons(joints))}",
@@ -251,7 +298,7 @@ def identify(
         changes,
         text,
         tuple(recording.name for recording in recordings),
-        runs.skipped,
+        (*runs.skipped, *(struck.skipped if robot is None else ())),
         runs.findings,
         robot=robot,
         source=path,
@@ -263,6 +310,20 @@ def identify(
         for part, (_, content) in zip(parts, files, strict=True):
             part.write_bytes(content.encode("utf-8", "replace"))
     return replace(identified, written=str(target))
+
+
+def _for_this_machine(
+    logs: LoadedRuns | ContactLogs | None, machine_file: MachineFile
+) -> tuple[LoadedRuns | None, ContactLogs | None]:
+    """Return the runs with a payload of a robot, and the contacts of an axis; raises UsageError if they do not fit."""
+    machine = machine_file.machine
+    if isinstance(logs, LoadedRuns):
+        if not isinstance(machine, CoupledMachine):
+            raise UsageError("a payload is given for an axis", "press and release a load cell to identify its torque")
+        return logs, None
+    if logs is not None and (isinstance(machine, CoupledMachine) or len(machine.joints) > 1):
+        raise UsageError("contacts with a load cell are given for several joints", "they are used for one axis only")
+    return None, logs
 
 
 def _impact_free(
@@ -336,6 +397,15 @@ def _joint_summary(joint: JointIdentification) -> dict[str, Any]:
         "controller": joint.controller
         and {"kind": joint.controller.kind.value, "residual_rms": joint.controller.residual_rms},
         "robot": joint.robot and joint_summary(joint.robot),
+        "contacts": joint.contacts
+        and {
+            "condition_number": joint.contacts.condition_number,
+            "relative_error": dict(joint.contacts.relative_error),
+            "delays_of_load_cell": list(joint.contacts.delays),
+            "largest_wind_up": joint.contacts.wind_up,
+            "largest_drive_force": joint.contacts.drive_force,
+        },
+        "torque_scale": joint.torque_scale and asdict(joint.torque_scale),
     }
 
 
@@ -343,10 +413,13 @@ def _same(one: Path, other: Path) -> bool:
     return one.resolve() == other.resolve()
 
 
-def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[Recording]) -> JointIdentification:
+def _identify_joint(
+    machine_file: MachineFile, joint: int, recordings: Sequence[Recording], struck: LoadCellLogs
+) -> JointIdentification:
     machine: Any = machine_file.machine
     name = machine.joints[joint]
     refused: dict[str, str] = {}
+    scale, recordings, struck = _by_presses(recordings, struck, float(machine.nominal_inertia[joint]), refused)
     runs: list[AxisRun] = []
     for recording in recordings:
         try:
@@ -382,9 +455,45 @@ def _identify_joint(machine_file: MachineFile, joint: int, recordings: Sequence[
         except CdtoolError as fault:
             refused[method] = str(fault)
     units = (mass, force, travel, f"{force} s/{travel}")
-    return JointIdentification(
-        name, units=units, has_torque_filter="torque_filter_time" in stated, refused=refused, **found
+    identified = JointIdentification(
+        name,
+        units=units,
+        has_torque_filter="torque_filter_time" in stated,
+        refused=refused,
+        torque_scale=scale,
+        **found,
     )
+    return _with_contacts(identified, struck, machine_file, joint) if struck.struck else identified
+
+
+def _by_presses(
+    recordings: Sequence[Recording], logs: LoadCellLogs, total_mass: float, refused: dict[str, str]
+) -> tuple[TorqueScale | None, Sequence[Recording], LoadCellLogs]:
+    """Return the scale of the torque that presses show, and the recordings with torques by it."""
+    try:
+        scale = torque_scale(logs, total_mass, 0)
+    except CdtoolError as fault:
+        refused["torque_scale"] = str(fault)
+        return None, recordings, logs
+    if scale is None:
+        return None, recordings, logs
+    struck = tuple((scaled(item, scale.factor, 0), contact) for item, contact in logs.struck)
+    return scale, [scaled(item, scale.factor, 0) for item in recordings], replace(logs, struck=struck)
+
+
+def _with_contacts(
+    identified: JointIdentification, logs: LoadCellLogs, machine_file: MachineFile, joint: int
+) -> JointIdentification:
+    """Return an axis with what its contacts show, or with the reason why they show nothing."""
+    refused = dict(identified.refused)
+    if identified.two_mass is None:
+        refused["contacts"] = f"contacts need the drive that starts show: {refused.get('two_mass', '')}"
+        return replace(identified, refused=refused)
+    try:
+        fits = (identified.two_mass, identified.controller)
+        return replace(identified, contacts=identify_struck(logs, machine_file, joint, fits, identified.units[:3]))
+    except CdtoolError as fault:
+        return replace(identified, refused={**refused, "contacts": str(fault)})
 
 
 def _exact(section: str, key: str, value: float, unit: str) -> Estimate:

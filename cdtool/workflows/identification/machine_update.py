@@ -130,9 +130,11 @@ def _opened(document: Any, section: str) -> Any:
         if name not in table:
             table[name] = tomlkit.table(is_super_table=name == "model")
         elif isinstance(table[name], InlineTable):
-            content = table[name].unwrap()
+            content, comment = table[name].unwrap(), table[name].trivia.comment.strip("# ")
             table.remove(name)
             table.append(name, tomlkit.item(content))  # last: keys below it would become its own
+            if comment:
+                table[name].comment(comment)
         table = table[name]
     return table
 
