@@ -35,7 +35,7 @@ from cdtool.identification.contact_fit import ContactSettings, identify_contacts
 from cdtool.identification.load_cell_contact import load_cell_contact  # noqa: E402
 from cdtool.identification.speed_controller import identify_controller  # noqa: E402
 from cdtool.identification.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
-from cdtool.injection.assumption import Assumption, ControllerReaction  # noqa: E402
+from cdtool.injection.assumption import assumptions_of  # noqa: E402
 from cdtool.injection.axis_contact import axis_contact  # noqa: E402
 from cdtool.injection.injected_recording import injected_recording  # noqa: E402
 from cdtool.operations import operations_of  # noqa: E402
@@ -58,24 +58,49 @@ LEFT_OUT = ("torque_deviation",)  # the gate's torque follows its reference clos
 
 @dataclass(frozen=True)
 class Latencies:
-    """Injected and true latencies [ms] of one detector, pair by pair; NaN where the contact is missed."""
+    """Injected (assumptions, pairs) and true (pairs,) latencies [ms] of one detector; NaN where the contact is missed.
+
+    A parameter that is not known has two bounds, each an assumption: the injected latency is a range.
+    """
 
     injected: np.ndarray
     true: np.ndarray
 
     @property
+    def differences(self) -> np.ndarray:
+        """Mean paired difference of each assumption."""
+        return np.nanmean(self.injected - self.true, axis=1)
+
+    @property
     def difference(self) -> float:
-        return float(np.nanmean(self.injected - self.true))
+        """How far the true mean is outside the range: 0 within it, else the difference of the nearer bound."""
+        if np.min(self.differences) <= 0.0 <= np.max(self.differences):
+            return 0.0
+        return float(self.differences[np.argmin(np.abs(self.differences))])
 
     @property
     def standard_error(self) -> float:
-        difference = self.injected - self.true
+        difference = self.injected[0] - self.true
         known = difference[np.isfinite(difference)]
         return float(np.std(known, ddof=1) / math.sqrt(len(known))) if len(known) > 1 else 0.0
 
     @property
     def same_misses(self) -> bool:
-        return bool(np.array_equal(np.isnan(self.injected), np.isnan(self.true)))
+        """Whether every true miss is one under some assumption, and every miss under all assumptions is true."""
+        missed = np.isnan(self.injected)
+        return bool(
+            np.all(missed.all(axis=0) <= np.isnan(self.true)) and np.all(np.isnan(self.true) <= missed.any(axis=0))
+        )
+
+
+def joined(items: list[Latencies]) -> Latencies:
+    """The pairs of several seeds; a seed without a bracket has its one latency for both bounds."""
+    most = max(len(item.injected) for item in items)
+    injected = [
+        np.broadcast_to(item.injected, (most, len(item.true))) if len(item.injected) == 1 else item.injected
+        for item in items
+    ]
+    return Latencies(np.concatenate(injected, axis=1), np.concatenate([item.true for item in items]))
 
 
 def loaded(recording: Recording, references: bool) -> Recording:
@@ -98,8 +123,14 @@ def identified_model(seed: int, references: bool, contacts: int = 0) -> AxisMode
         load_mass=model.drive.load_mass,
         stiffness=model.drive.stiffness,
         front_stiffness=GATE.post_stiffness,
+        observed_wind_up=fit.largest_wind_up,
     )
-    model = replace(model, drive=drive, controller=identify_controller(runs).controller)
+    of_controller = identify_controller(runs)
+    slope = {item.key: item.numbers for item in of_controller.identified.not_identifiable}.get("slew_limit", {})
+    controller = of_controller.controller
+    if controller is not None:
+        controller = replace(controller, observed_slope=slope.get("largest_n_per_s", 0.0))
+    model = replace(model, drive=drive, controller=controller)
     if not contacts:
         return model
     struck = []
@@ -126,8 +157,7 @@ def compare(seed: int, model: AxisModel, kind: Impact, references: bool, pairs: 
         runs = [operations_of(recording)[0] for recording in free]
         pairs_to_fit = [(run.recording, run_detector(run, ON_LOAD_SIDE, detector)) for run in runs]
         judges[name] = (detector, Signature().fit(pairs_to_fit))
-    found: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
-    reaction = ControllerReaction.KNOWN if model.controller else ControllerReaction.FROZEN
+    found: dict[str, list[list[float]]] = {name: [] for name in names}
     for number in range(pairs):
         rng = (seed, 1000 + number)
         hit = simulate_gate_run(GATE, np.random.default_rng(rng), kind)
@@ -135,18 +165,21 @@ def compare(seed: int, model: AxisModel, kind: Impact, references: bool, pairs: 
         clean = clean if references else without_references(clean)
         assert hit.contact_start is not None
         run = axis_run(ON_LOAD_SIDE.referred_to_load(clean))
-        contact = axis_contact(run, model, obstacle, hit.contact_start, 1.1, Assumption(controller=reaction))
-        injected = injected_recording(clean, ON_LOAD_SIDE, contact.changes, contact.force, (0,))
-        both = [ON_LOAD_SIDE.referred_to_load(injected), loaded(as_recording(hit, "hit", GATE), references)]
+        recordings = []
+        for assumption in assumptions_of(model):
+            contact = axis_contact(run, model, obstacle, hit.contact_start, 1.1, assumption)
+            injected = injected_recording(clean, ON_LOAD_SIDE, contact.changes, contact.force, (0,))
+            recordings.append(ON_LOAD_SIDE.referred_to_load(injected))
+        recordings.append(loaded(as_recording(hit, "hit", GATE), references))
         for name, (detector, fitted) in judges.items():
-            pair = []
-            for recording in both:
+            latencies = []
+            for recording in recordings:
                 operation = operations_of(recording)[0]
                 verdict = detect_operation(operation, ON_LOAD_SIDE, detector, (fitted,), Activation()).verdict
                 after = [alarm.time for alarm in verdict.alarms if alarm.time > hit.contact_start]
-                pair.append(1e3 * (after[0] - hit.contact_start) if after else math.nan)
-            found[name].append((pair[0], pair[1]))
-    return {name: Latencies(*np.array(items).T) for name, items in found.items()}
+                latencies.append(1e3 * (after[0] - hit.contact_start) if after else math.nan)
+            found[name].append(latencies)
+    return {name: Latencies(np.array(items).T[:-1], np.array(items).T[-1]) for name, items in found.items()}
 
 
 def measure(seeds: int, pairs: int, contacts: int) -> bool:
@@ -164,19 +197,19 @@ def measure(seeds: int, pairs: int, contacts: int) -> bool:
                         merged.setdefault(name, []).append(item)
                 print(f"\n{parameters} parameters, {'with' if references else 'without'} references, {kind}")
                 for name, items in merged.items():
-                    both = Latencies(
-                        np.concatenate([item.injected for item in items]), np.concatenate([item.true for item in items])
-                    )
+                    both = joined(items)
                     true = float(np.nanmean(both.true))
                     limit = max(share * true, least)
                     limit += 2.0 * both.standard_error if parameters == "identified" else 0.0
                     good = abs(both.difference) <= limit and both.same_misses
                     met &= good
                     words = "ok   " if good else "WORSE"
-                    misses = [int(np.isnan(values).sum()) for values in (both.injected, both.true)]
+                    misses = [int(np.isnan(values).sum()) for values in (both.injected[0], both.true)]
                     missed = f"misses {misses[0]} and {misses[1]} of {len(both.true)}"
                     difference = f"{both.difference:+5.1f} +- {both.standard_error:.1f} of {limit:.1f}"
-                    latencies = f"injected {np.nanmean(both.injected):6.1f} true {true:6.1f} ms"
+                    means = np.nanmean(both.injected, axis=1)
+                    bounds = f"{np.min(means):6.1f}" + (f" to {np.max(means):.1f}" if np.ptp(means) > 0.05 else "")
+                    latencies = f"injected {bounds} true {true:6.1f} ms"
                     print(f"{words} {name:18s} {latencies}, difference {difference}, {missed}")
     return met
 

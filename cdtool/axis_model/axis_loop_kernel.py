@@ -55,7 +55,7 @@ PARAMETER_ORDER = (
 
 
 @kernel(
-    "float64(UniTuple(float64, 31), float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 5), "
+    "float64(UniTuple(float64, 31), float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 6), "
     "float64, int64, float64[:, ::1])",
     rare=True,
 )
@@ -64,7 +64,7 @@ def integrate_axis(
     force_curve: Array,
     initial_state: Array,
     inputs: Array,
-    obstacle: tuple[float, float, float, float, float],
+    obstacle: tuple[float, float, float, float, float, float],
     replay: float,
     substeps: int,
     log: Array,
@@ -74,7 +74,7 @@ def integrate_axis(
     `force_curve` (2, points): penetration [m] and force [N], from (0, 0). `initial_state` (8,): the seven states and
     the controller's integral [N]. `replay`: 0 for the controller alone, 1 with the input `command` added to its output,
     2 for this command alone. `obstacle`: 1 where there is one, its position [m], the direction of approach +-1,
-    lambda [s/m], and from when on it is there [s].
+    lambda [s/m], from when on it is there [s], and from when on the slew limit applies [s].
     """
     (
         motor_mass,
@@ -109,7 +109,7 @@ def integrate_axis(
         force_lag,
         delay_samples,
     ) = parameters
-    has_obstacle, obstacle_position, direction, contact_damping, present_from = obstacle
+    has_obstacle, obstacle_position, direction, contact_damping, present_from, limited_from = obstacle
     step = period / substeps
     keep = 0.0
     if speed_filter_order > 0.0 and speed_filter_hz < math.inf:
@@ -149,7 +149,7 @@ def integrate_axis(
             wanted = speed_gain * error + integral
             if replay > 0.5:
                 wanted += inputs[2, sample]
-            largest_change = slew_limit * period
+            largest_change = slew_limit * period if sample * period >= limited_from else math.inf
             command += min(max(wanted - command, -largest_change), largest_change)
             command = min(max(command, -force_limit), force_limit)
             # Back-calculation: a comparison "is it limited?" would make the result jump with the step size.

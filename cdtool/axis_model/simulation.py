@@ -58,13 +58,13 @@ def simulate_axis(
     inputs: AxisInputs,
     obstacle: Obstacle | None = None,
     period: float | None = None,
-    present_from: float = -math.inf,
+    changes_at: tuple[float, float] = (-math.inf, -math.inf),
 ) -> AxisMotion:
     """Simulate the axis from rest, or in steady motion with the initial speed.
 
-    `period` [s]: of the inputs, if the model has no controller. `present_from` [s]: when the obstacle is put there,
-    after the first input. Raises ConfigurationError where the model has neither
-    controller nor command, or where its parameters need more integration steps than are reasonable.
+    `period` [s]: of the inputs, if the model has no controller. `changes_at` [s after the first input]: when the
+    obstacle is put there, and when the slew limit begins to apply. Raises ConfigurationError where the model has
+    neither controller nor command, or where its parameters need more integration steps than are reasonable.
     """
     controller = model.controller
     if controller is None and (inputs.command is None or inputs.feed_forward):
@@ -79,11 +79,11 @@ def simulate_axis(
         if values is not None:
             table[row] = values
     rows = np.zeros((len(axis_loop_kernel.ROWS), count))
-    against = (0.0, 0.0, 1.0, 0.0, -math.inf)
+    against = (0.0, 0.0, 1.0, 0.0, *changes_at)
     curve = np.array([[0.0, 1.0], [0.0, 0.0]])
     if obstacle is not None:
         obstacle = _behind_front(model.drive, obstacle)
-        against = (1.0, obstacle.position, float(obstacle.direction), obstacle.damping, present_from)
+        against = (1.0, obstacle.position, float(obstacle.direction), obstacle.damping, *changes_at)
         curve = obstacle.penetration_curve
     first_contact = axis_loop_kernel.integrate_axis(
         _numbers(model, step),

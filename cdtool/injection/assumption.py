@@ -67,14 +67,18 @@ class Assumption:
         return tuple(value for value, usual in both if value is not usual)
 
     def model(self, model: AxisModel) -> AxisModel:
-        """Return the model under this assumption about its drive and its slew limit."""
-        if self.drive is DriveBeyond.RIGID:
-            model = replace(model, drive=_rigid_beyond(model))
-        if self.slew is SlewBeyond.OBSERVED:
-            assert model.controller is not None
-            limited = replace(model.controller, slew_limit=model.controller.observed_slope)
-            model = replace(model, controller=limited)
-        return model
+        """Return the model under this assumption about its drive."""
+        return replace(model, drive=_rigid_beyond(model)) if self.drive is DriveBeyond.RIGID else model
+
+    def after_contact(self, model: AxisModel) -> AxisModel:
+        """Return the model with the assumed slew limit, which applies from the contact on.
+
+        Before it the command is that of the log, whose limit is not known: with the limit as observed it would be late,
+        and its integral would wind up.
+        """
+        if self.slew is SlewBeyond.NO_LIMIT or model.controller is None:
+            return model
+        return replace(model, controller=replace(model.controller, slew_limit=model.controller.observed_slope))
 
 
 def assumptions_of(model: AxisModel) -> tuple[Assumption, ...]:

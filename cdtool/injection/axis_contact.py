@@ -21,7 +21,7 @@ from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_
 from cdtool.axis_model.simulation import AxisInputs, AxisMotion, simulate_axis
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import USED, AxisRun
-from cdtool.injection.assumption import Assumption, ControllerReaction, DriveBeyond
+from cdtool.injection.assumption import Assumption, ControllerReaction, DriveBeyond, SlewBeyond
 from cdtool.injection.channel_change import ChannelChange
 from cdtool.recording import BoolArray, FloatArray
 
@@ -117,7 +117,9 @@ def axis_contact(
     frozen = assumption.controller is ControllerReaction.FROZEN
     against = replace(inputs, command=free["command"]) if frozen else inputs
     # A reciprocating axis may have been beyond that place before: the obstacle is put there for this contact.
-    hit = simulate_axis(model, against, placed, present_from=contact - begin - controller.period)
+    just_before = contact - begin - controller.period
+    limited_from = -math.inf if assumption.slew is SlewBeyond.NO_LIMIT else just_before
+    hit = simulate_axis(assumption.after_contact(model), against, placed, changes_at=(just_before, limited_from))
     return _difference(model, free, hit, time, (contact, approach, deviation), assumption)
 
 
@@ -281,7 +283,8 @@ def _difference(
     doubts = {
         Doubt.RIGID_DRIVE: model.drive.is_rigid,
         Doubt.WIND_UP_BEYOND_FREE_RUNS: _winds_up_beyond(model, free, hit, time <= until),
-        Doubt.SLOPE_BEYOND_FREE_RUNS: _rises_beyond(model, hit, time <= until),
+        Doubt.SLOPE_BEYOND_FREE_RUNS: assumption.slew is SlewBeyond.NO_LIMIT
+        and _rises_beyond(model, hit, (time <= until) & (time >= start)),
         Doubt.SEPARATION: separation < start + RELIABLE_FOR,
         Doubt.CONTROLLER_UNKNOWN: assumption.controller is not ControllerReaction.KNOWN,
         Doubt.APPROACH_SPEED: deviation > _DOUBTFUL_DEVIATION,

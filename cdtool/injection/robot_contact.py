@@ -192,7 +192,7 @@ def _assumed(model: RobotModel, assumption: Assumption) -> RobotModel:
             axis = replace(axis, drive=Assumption(drive=assumption.drive).model(axis).drive)
         own = [item for item in assumptions_of(axis) if item.slew is assumption.slew]
         if own and assumption.slew is not Assumption().slew:
-            axis = Assumption(slew=assumption.slew).model(axis)
+            axis = Assumption(slew=assumption.slew).after_contact(axis)
         axes.append(axis)
     return replace(model, axes=tuple(axes))
 
