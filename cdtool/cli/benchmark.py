@@ -158,6 +158,8 @@ def _show_dry_run(
     time = "" if found.seconds is None else f", about {_duration(found.seconds)}"
     total = counted(found.total, "recording")
     typer.echo(f"{len(found.logs)} of {total} would be computed: {decimal(found.bytes)}{time}")
+    if found.to_inject:
+        typer.echo(f"{counted(found.to_inject, 'contact')} of [inject] would be made first, and computed too")
 
 
 def _duration(seconds: float) -> str:

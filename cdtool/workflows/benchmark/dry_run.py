@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cdtool.workflows.benchmark.benchmark import BenchmarkWork, sweep_factors
@@ -12,6 +12,7 @@ from cdtool.workflows.benchmark.learned import Teaching
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.pieces import source_files
 from cdtool.workflows.benchmark.stored_learned import StoreOfRun
+from cdtool.workflows.benchmark.with_injected import made_before, with_groups
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.store.store import read_speed
@@ -32,13 +33,15 @@ class PlannedLog:
 class DryRun:
     """The logs that would be computed, out of a `total`, and how long that takes [s]; None: nothing to estimate it by.
 
-    `learned` is the number of impact-free runs.
+    `learned` is the number of impact-free runs, `to_inject` that of the contacts of [inject] that would be made before,
+    at least one recording each, and are not among the logs.
     """
 
     logs: tuple[PlannedLog, ...]
     total: int
     learned: int
     seconds: float | None
+    to_inject: int = 0
 
     @property
     def bytes(self) -> int:
@@ -66,6 +69,22 @@ def dry_run(
     """
     workers = workers or Workers()
     work = BenchmarkWork.of(file, detectors, false_alarm_budget)
+    work, to_inject = _with_injected(work)
+    return replace(_dry_run(work, workers, store), to_inject=to_inject)
+
+
+def _with_injected(work: BenchmarkWork) -> tuple[BenchmarkWork, int]:
+    """Return the work with the injected recordings that are there, and how many contacts are not."""
+    section = work.setup.inject
+    if section is None:
+        return work, 0
+    made = made_before(work.setup, section)
+    if made is None:
+        return work, len(section.logs) * len(section.positions) * len(section.obstacles)
+    return replace(work, setup=with_groups(work.setup, section, made)), 0
+
+
+def _dry_run(work: BenchmarkWork, workers: Workers, store: StoreUse | None) -> DryRun:
     if store is None or not store.exists:
         names = work.setup.detectors
         logs = [(group, path, names) for group, item in work.setup.impacts.items() for path in item.logs]

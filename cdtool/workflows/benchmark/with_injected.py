@@ -47,21 +47,30 @@ def injected_logs(
     setup: BenchmarkFile, section: InjectSection, workers: Workers, progress: Progress | None = None
 ) -> InjectedLogs:
     """Return the injected recordings of a section, from its folder if it has them already."""
+    if (found := made_before(setup, section)) is not None:
+        return found
     folder = joined(setup.path.parent, section.folder)
-    digest = digest_of(
-        code_version(), setup.machine_file.digest, section, setup.onset, {log: file_digest(log) for log in section.logs}
-    )
-    mark = folder / _DIGEST
-    if mark.is_file() and mark.read_text(encoding="utf-8").strip() == digest:
-        found = read_injected(folder)
-        if all((folder / case.file).is_file() for case in found.cases):
-            return found
     if folder.exists() and not _may_replace(folder):
         raise OutputError(f"{folder}: exists and holds other files", "set another [inject] folder, or remove it")
     with replaced_folder(folder, _may_replace) as part:
         write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
-        (part / _DIGEST).write_text(digest + "\n", encoding="utf-8")
+        (part / _DIGEST).write_text(_digest(setup, section) + "\n", encoding="utf-8")
     return read_injected(folder)
+
+
+def made_before(setup: BenchmarkFile, section: InjectSection) -> InjectedLogs | None:
+    """Return the injected recordings of a section if its folder has all of them, and nothing has changed since."""
+    folder = joined(setup.path.parent, section.folder)
+    mark = folder / _DIGEST
+    if not (mark.is_file() and mark.read_text(encoding="utf-8").strip() == _digest(setup, section)):
+        return None
+    found = read_injected(folder)
+    return found if all((folder / case.file).is_file() for case in found.cases) else None
+
+
+def _digest(setup: BenchmarkFile, section: InjectSection) -> str:
+    logs = {log: file_digest(log) for log in section.logs}
+    return digest_of(code_version(), setup.machine_file.digest, section, setup.onset, logs)
 
 
 def with_groups(setup: BenchmarkFile, section: InjectSection, injected: InjectedLogs) -> BenchmarkFile:

@@ -291,3 +291,16 @@ def test_a_reason_is_stated_once_per_obstacle_not_per_bracket(gate: Path) -> Non
     reasons = [item.reason for item in cdtool.benchmark(path).results.skipped]
     assert sum("at rest" in reason for reason in reasons) == 1
     assert any(reason.startswith("stiff at 0.1 s: ") for reason in reasons)
+
+
+def test_a_dry_run_counts_the_contacts_that_are_not_made_yet_and_writes_nothing(gate: Path) -> None:
+    path = write(gate, INJECT)
+    words = ("benchmark", path, "--store", gate / "store", "--dry-run")
+    done = command(*words)
+    assert done.status == 0, done.err
+    assert "1 contact of [inject] would be made first" in done.out
+    assert not (gate / "injected").exists()
+    cdtool.benchmark(path)
+    done = command(*words)
+    assert "would be made first" not in done.out
+    assert "injected/injected_stiff/" in done.out and "1 of 1 recording would be computed" in done.out
