@@ -11,8 +11,6 @@ from cdtool.cli.options import ClusterOption, JobsOption, JsonOption, RetriesOpt
 from cdtool.cli.place import Place, location
 from cdtool.plain_text import counted
 
-_FORMATS = ("csv", "mcap")
-
 
 def inject(
     file: Annotated[
@@ -21,7 +19,7 @@ def inject(
     ],
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder, new or empty.")],
     file_format: Annotated[
-        str | None, typer.Option("--format", help="csv, or mcap for channels with clocks of their own.")
+        str | None, typer.Option("--format", help="csv, mcap, parquet, feather, h5, mf4 or tdms; csv has one clock.")
     ] = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
@@ -38,9 +36,10 @@ def inject(
     from cdtool.errors import UsageError, nearest
     from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.injecting import inject as run
+    from cdtool.workflows.injection.inject_section import FORMATS
 
-    if file_format is not None and file_format not in _FORMATS:
-        raise UsageError(f"--format is '{file_format}'", nearest(file_format, _FORMATS))
+    if file_format is not None and file_format not in FORMATS:
+        raise UsageError(f"--format is '{file_format}'", nearest(file_format, FORMATS))
     with progress("injecting") as advance:
         done = run(
             file,

@@ -59,7 +59,7 @@ def inject(
         A new or empty folder: a group of recordings per obstacle, contacts.csv with the exact contacts, injected.json
         with the origin of each, copies of the logs to learn from, and machine.toml and benchmark.toml for all of them.
     file_format : str, optional
-        "csv" or "mcap"; that of the section by default.
+        Suffix of the recordings, such as "csv" or "mcap"; that of the section by default.
     workers : Workers, optional
         How the work is done; in this process by default.
     progress : callable, optional

@@ -22,10 +22,11 @@ from cdtool.remote.remote_path import joined
 from cdtool.tables import Table
 from cdtool.workflows.injection.joint_mark import JointMark
 from cdtool.workflows.named_logs import LogsOf
+from cdtool.workflows.written_files import WRITERS
 
 # The name of every group of injected contacts begins with this word.
 INJECTED = "injected"
-FORMATS = ("csv", "mcap")
+FORMATS = tuple(suffix.removeprefix(".") for suffix in WRITERS)
 # More contacts than this are a mistake in a grid.
 _MOST_POSITIONS = 1000
 
