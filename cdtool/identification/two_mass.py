@@ -46,6 +46,13 @@ _LEAST_SHARE = 0.01
 # The friction's rise is below a speed that a start passes in a few samples: it is given, not fitted [m/s, rad/s].
 _STRIBECK_SHARE = 0.1
 _AT_BOUND = 1.02
+# A drive is as good as rigid if its oscillation lasts so many periods of the log, and its stiffness cannot be told
+# above this share of that.
+_PERIODS_OF_RIGID, _MOST_OF_RIGID = 10.0, 0.3
+# The cost of the rigid drive over that of the elastic one below which the elasticity does not show.
+_CLEARLY_WORSE = 1.5
+# The total that a start shows roughly, in masses of the motor: less is an error of the machine file.
+_LEAST_TOTAL = 0.7
 # A channel of one start counts as so many independent samples: its errors are coloured.
 _INDEPENDENT = 20.0
 
@@ -87,9 +94,9 @@ class TwoMassFit:
 def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> TwoMassFit:
     """Return load, drive stiffness and friction from the starts of impact-free runs.
 
-    Raises IdentificationError where no run starts from rest, the motor's inertia is not given, or the fit ends at a
-    bound. Viscous friction from one speed, and everything else with a standard error above 30 %, is not identifiable;
-    the model still has the fitted value.
+    Raises IdentificationError where no run starts from rest, the motor's inertia is not given or above the total, the
+    fit ends at a bound, or a rigid drive describes the starts as well. Viscous friction from one speed, and everything
+    else with a standard error above 30 %, is not identifiable; the model still has the fitted value.
     """
     if settings.motor_mass <= 0.0:
         raise IdentificationError(
@@ -103,6 +110,7 @@ def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> Two
         )
     problem = _Problem(runs, ensembles, settings)
     vector = problem.solve()
+    problem.refuse_rigid(vector)
     return problem.result(vector)
 
 
@@ -112,7 +120,7 @@ class _Problem:
     def __init__(self, runs: Sequence[AxisRun], ensembles: Sequence[StartEnsemble], settings: TwoMassSettings) -> None:
         self.ensembles = tuple(ensembles)
         self.settings = settings
-        self.stribeck = settings.stribeck_speed or _STRIBECK_SHARE * min(item.nominal_speed for item in ensembles)
+        self.stribeck = settings.stribeck_speed or _STRIBECK_SHARE * max(item.nominal_speed for item in ensembles)
         self.start = _rough_values(self.ensembles[0], settings.motor_mass)
         self.scales = [_scales(item) for item in self.ensembles]
         total = settings.motor_mass + self.start["load_mass"]
@@ -243,6 +251,40 @@ class _Problem:
                 "check machine.motor_inertia, the torque's scale, and that the logs are of this machine",
             )
         return vector
+
+    def refuse_rigid(self, vector: FloatArray) -> None:
+        """Raise IdentificationError unless the starts show the drive's elasticity.
+
+        All other parameters are fitted again with a drive that is as good as rigid at this sampling rate: the elastic
+        one must describe the starts clearly better.
+        """
+        from scipy.optimize import least_squares
+
+        load, stiffness = np.exp(vector[:2])
+        motor, period = self.settings.motor_mass, self.ensembles[0].period
+        reduced = motor * load / (motor + load)
+        stiff = reduced * (2.0 * math.pi / (_PERIODS_OF_RIGID * period)) ** 2
+        first = vector.copy()
+        first[0], first[1] = self.first[0], math.log(max(stiff, 3.0 * stiffness))
+        free = np.arange(len(vector)) != 1
+
+        def errors(values: FloatArray) -> FloatArray:
+            whole = first.copy()
+            whole[free] = values
+            return self.errors(whole)
+
+        def jacobian(values: FloatArray) -> FloatArray:
+            whole = first.copy()
+            whole[free] = values
+            return self.jacobian(whole)[:, free]
+
+        found = least_squares(errors, first[free], jac=jacobian, loss="soft_l1", ftol=1e-3, xtol=1e-3, max_nfev=8)
+        elastic = 2.0 * float(np.sum(np.sqrt(1.0 + self.errors(vector) ** 2) - 1.0))
+        if stiffness > _MOST_OF_RIGID * stiff or 2.0 * found.cost < _CLEARLY_WORSE * elastic:
+            raise IdentificationError(
+                "a rigid drive describes the starts as well as an elastic one: its stiffness does not show",
+                "if the drive is rigid, state [model.drive] rigid = true; else log stronger starts at a higher rate",
+            )
 
     def jacobian(self, vector: FloatArray) -> FloatArray:
         """Return the derivatives of the scaled errors by the parameters' logarithms and the forces at the knots."""
@@ -387,6 +429,11 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
     speeding = (acceleration > 0.5 * float(np.max(acceleration))) & (speed < 0.9 * top)
     ratio = (force[speeding] - friction) / acceleration[speeding]
     total = float(np.median(ratio)) if speeding.any() else 2.0 * motor_mass
+    if total < _LEAST_TOTAL * motor_mass:
+        raise IdentificationError(
+            f"the starts show a total of {total:.3g}, the motor alone is stated to have {motor_mass:.3g}",
+            "check machine.motor_inertia, transmission_ratio, and the scale and sign of the torque",
+        )
     load = max(total - motor_mass, 0.05 * motor_mass)
     # A drive that is wound up further than the start takes would not move the load in time.
     travel = max(top * 0.1, 1e-9)

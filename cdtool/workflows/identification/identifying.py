@@ -9,6 +9,8 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cdtool.axis_model.model_table import ModelTable, finite_values
 from cdtool.axis_model.parameters import Sensors
 from cdtool.bounded_loading import read_text
@@ -56,6 +58,10 @@ from cdtool.workflows.runs import RunReading, Runs, find_logs, load_runs
 
 # Reasons that the message of an error lists.
 _MOST_REASONS = 3
+# Constant force above this share of the Coulomb friction that the model of the starts cannot leave out, and the
+# standard errors by which it must be known.
+_MOST_CONSTANT, _SIGNIFICANT = 0.2, 3.0
+_COULOMB = ("coulomb_friction", "coulomb_forward", "coulomb_backward")
 _CONTROLLER_UNITS = {"period": "s", "speed_filter_hz": "Hz", "force_lag": "s", "delay": "s", "position_gain": "1/s"}
 
 
@@ -111,6 +117,11 @@ class JointIdentification:
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
+        of_rigid = {item.key: item for item in self.rigid.identified.estimates} if self.rigid else {}
+        if self.two_mass is None and "viscous_friction" in of_rigid:
+            # A table [model.friction] comes before [machine]: an old value of it must not stand beside new ones.
+            viscous = of_rigid["viscous_friction"]
+            found.append(replace(viscous, section="model.friction", key="viscous"))
         return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
 
     def _of_starts(self) -> list[Estimate]:
@@ -136,7 +147,7 @@ class JointIdentification:
         fit = self.controller
         if fit is None or fit.controller is None:
             return []
-        found = []
+        found: list[Estimate] = []
         for key, value in finite_values(fit.controller).items():
             if value or key == "speed_filter_order":
                 found.append(_exact("model.controller", key, value, _CONTROLLER_UNITS.get(key, "")))
@@ -451,6 +462,8 @@ def _identify_joint(
     }
     for method, run_method in methods.items():
         try:
+            if method == "two_mass":
+                _refuse_constant_force(found.get("rigid"), force)
             found[method] = run_method()
         except CdtoolError as fault:
             refused[method] = str(fault)
@@ -464,6 +477,20 @@ def _identify_joint(
         **found,
     )
     return _with_contacts(identified, struck, machine_file, joint) if struck.struck else identified
+
+
+def _refuse_constant_force(fit: RigidAxisFit | None, unit: str) -> None:
+    """Raise IdentificationError where a constant force acts: the elastic drive has none, and would bend to fit it."""
+    if fit is None or "constant_force" not in fit.identified:
+        return
+    constant = fit.identified["constant_force"]
+    friction = [item.value for item in fit.identified.estimates if item.key in _COULOMB]
+    known = abs(constant.value) > _SIGNIFICANT * constant.standard_error
+    if known and friction and abs(constant.value) > _MOST_CONSTANT * float(np.mean(friction)):
+        raise IdentificationError(
+            f"a constant force of {constant.value:.3g} {unit} acts, which the elastic drive's model does not have",
+            "a vertical axis or one with a spring or counterweight: state [model.drive] stiffness from its data sheet",
+        )
 
 
 def _by_presses(
