@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdtool.cli import completions
-from cdtool.cli.console import leave, plain, print_json, print_skipped, progress, table
+from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
 from cdtool.cli.options import ClusterOption, ForceOption, JobsOption, JsonOption, RetriesOption, TimeoutOption, listed
 from cdtool.cli.place import Place, location
-from cdtool.errors import UsageError
 from cdtool.plain_text import counted, digits
 
 if TYPE_CHECKING:
+    from cdtool.evaluation.coverage_map import Cell, TellingCell
     from cdtool.workflows.coverage import Coverage
 
 
@@ -25,7 +25,13 @@ def coverage(
         typer.Argument(parser=location, help="Benchmark file with a section [inject]; see docs/injection.md."),
     ],
     output: Annotated[
-        Place | None, typer.Option("--output", "-o", parser=location, help="Figure to draw: .png, .svg or .pdf.")
+        list[Place] | None,
+        typer.Option(
+            "--output",
+            "-o",
+            parser=location,
+            help="Output, repeatable: figure (.png, .svg, .pdf), .html (cells open trigger plots), .json.",
+        ),
     ] = None,
     force: ForceOption = False,
     detectors: Annotated[
@@ -44,59 +50,49 @@ def coverage(
 ) -> None:
     """Map where a machine notices contacts: latency, force and misses over position and stiffness of the obstacle.
 
-    Example: cdtool coverage sample_logs/gate/inject.toml -o coverage.png
+    Example: cdtool coverage sample_logs/gate/inject.toml -o coverage.png -o coverage.html
     """
+    from cdtool.report.coverage_files import PAGE, check_coverage_files, coverage_summary, write_coverage
     from cdtool.workflows.coverage import coverage as run
     from cdtool.workflows.execution.workers import Workers
 
-    if output:
-        from cdtool.foreign_files import refuse_foreign_figure
-        from cdtool.report.plots.figures import SUFFIXES
-
-        if output.suffix.lower() not in SUFFIXES:
-            raise UsageError(f"--output is '{output}'", f"the name must end in {', '.join(SUFFIXES)}")
-        refuse_foreign_figure(output, force=force)
+    targets = output or []
+    check_coverage_files(targets, [file], force=force)
     with progress("coverage") as advance:
         done = run(
             file,
             detectors=listed(detectors or ""),
+            with_traces=any(target.suffix.lower() == PAGE for target in targets),
             workers=Workers(jobs, timeout, retries, cluster),
             progress=advance,
         )
     print_skipped(done.skipped, done.findings)
-    if output:
-        from cdtool.report.plots.coverage_plot import plot_coverage
-
-        plot_coverage(done.map, done.machine, output)
+    write_coverage(done, targets)
     if as_json:
-        print_json(_as_dict(done))
+        print_json(coverage_summary(done))
     else:
         _show(done)
-        if output:
-            typer.echo(f"written: {plain(output)}")
+        for target in targets:
+            typer.echo(f"written: {plain(target)}")
     leave(done.skipped)
 
 
 def _show(done: Coverage) -> None:
+    from cdtool.evaluation.coverage_map import CellKey
+
     made = done.map
+    by_speed = len(made.speeds) > 1
     rows = []
     for name, cells in made.cells.items():
         for stiffness in made.stiffnesses:
-            here = [cell for key, cell in cells.items() if key.stiffness == stiffness]
-            latencies = [value for cell in here for value in cell.range_ms if math.isfinite(value)]
-            forces = [cell.force_n for cell in here if math.isfinite(cell.force_n)]
-            rows.append(
-                (
-                    name,
-                    digits(float(f"{stiffness / 1e3:.3g}")),
-                    str(sum(cell.contacts for cell in here)),
-                    str(sum(cell.missed for cell in here)),
-                    _range(latencies),
-                    _range(forces),
-                )
-            )
-    columns = [("detector", "left"), ("stiffness\nN/mm", "right"), ("contacts", "right"), ("missed", "right")]
-    columns += [("latency\nms", "right"), ("force at alarm\nN", "right")]
+            for speed in made.speeds:
+                keys = [CellKey(position, stiffness, speed.speed) for position in made.positions]
+                here = [cells[key] for key in keys if key in cells]
+                if here:
+                    rows.append((name, _spring(stiffness), *([number(speed.speed)] if by_speed else []), *_row(here)))
+    columns = [("detector", "left"), ("stiffness\nN/mm", "right")]
+    columns += [(f"speed\n{made.speed_unit}", "right")] if by_speed else []
+    columns += [("contacts", "right"), ("missed", "right"), ("latency\nms", "right"), ("force at alarm\nN", "right")]
     table(columns, rows)
     places = (
         f"{counted(len(made.positions), 'position')} from {made.positions[0]:g} to {made.positions[-1]:g} {made.unit}"
@@ -106,10 +102,29 @@ def _show(done: Coverage) -> None:
     telling = made.most_telling()
     if telling:
         typer.echo("a test at the rig would tell most here:")
-    for name, key, cell in telling:
-        missed = f"{cell.missed} of {cell.contacts} missed" if cell.missed else f"+- {cell.uncertainty_ms:.0f} ms"
-        spring = digits(float(f"{key.stiffness / 1e3:.3g}"))
-        typer.echo(f"  {name} at {key.position:g} {made.unit}, {spring} N/mm: {missed}")
+    for item in telling:
+        speed_words = "" if item.key.speed is None else f", {item.key.speed:g} {made.speed_unit}"
+        where = f"{item.key.position:g} {made.unit}, {_spring(item.key.stiffness)} N/mm{speed_words}"
+        typer.echo(f"  {item.detector} at {where}: {_why(item)}")
+
+
+def _row(cells: Sequence[Cell]) -> tuple[str, str, str, str]:
+    latencies = [value for cell in cells for value in cell.range_ms if math.isfinite(value)]
+    forces = [cell.force_n for cell in cells if math.isfinite(cell.force_n)]
+    counts = (sum(cell.contacts for cell in cells), sum(cell.missed for cell in cells))
+    return str(counts[0]), str(counts[1]), _range(latencies), _range(forces)
+
+
+def _why(item: TellingCell) -> str:
+    cell = item.cell
+    if cell.missed:
+        return f"{cell.missed} of {cell.assessable} missed"
+    uncertain = f"+- {cell.uncertainty_ms:.0f} ms"
+    return uncertain if cell.limit_ms is None else f"{uncertain}, limit {cell.limit_ms:g} ms"
+
+
+def _spring(stiffness: float) -> str:
+    return digits(float(f"{stiffness / 1e3:.3g}"))
 
 
 def _range(values: list[float]) -> str:
@@ -117,18 +132,3 @@ def _range(values: list[float]) -> str:
         return "-"
     low, high = (digits(float(f"{value:.3g}")) for value in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
-
-
-def _as_dict(done: Coverage) -> dict[str, Any]:
-    return {
-        "machine": done.machine,
-        "unit": done.map.unit,
-        "positions": list(done.map.positions),
-        "stiffnesses_n_per_m": list(done.map.stiffnesses),
-        "cells": [
-            {"detector": name, **asdict(key), **asdict(cell)}
-            for name, cells in done.map.cells.items()
-            for key, cell in cells.items()
-        ],
-        "skipped": [asdict(item) for item in done.skipped],
-    }

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from cdtool.identification.estimate import NotIdentifiable
     from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.identification.fleet_identification import FleetIdentification
+    from cdtool.workflows.identification.identification_outputs import JointEvidence
     from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification
+    from cdtool.workflows.identification.identifying_contacts import ContactLogs
+    from cdtool.workflows.identification.identifying_robot import LoadedRuns, RobotIdentification
 
 _DIVISIONS = ("machine", "day")
 
@@ -48,14 +51,34 @@ def identify(
         typer.Option("--loaded-logs", help="Of a robot: logs with a known payload, for torque constants; repeatable."),
     ] = None,
     payload: Annotated[
-        float | None, typer.Option("--payload", help="With --loaded-logs: mass of the payload at the last link [kg].")
+        float | None, typer.Option("--payload", help="With --loaded-logs: mass of the payload [kg].")
+    ] = None,
+    payload_link: Annotated[
+        str | None, typer.Option("--payload-link", help="Link that carries the payload. Default: the last one.")
+    ] = None,
+    payload_centre: Annotated[
+        str | None,
+        typer.Option("--payload-centre", help="Its centre of mass in the link's frame [m]. Default: 0,0,0."),
+    ] = None,
+    contacts: Annotated[
+        list[str] | None,
+        typer.Option("--contacts", help="Of an axis: logs of stiff hits on a load cell, for its drive; repeatable."),
+    ] = None,
+    presses: Annotated[
+        list[str] | None,
+        typer.Option("--presses", help="Logs of slow press and release on a load cell, for the torque's scale."),
+    ] = None,
+    lever_arm: Annotated[
+        float | None, typer.Option("--lever-arm", help="Of a rotary axis: distance of the load cell from it [m].")
     ] = None,
     force: ForceOption = False,
     jobs: JobsOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Identify mass, drive, friction and controller of an axis from impact-free logs, with honest standard errors.
+    """Identify the model of an axis or robot from impact-free logs, with honest standard errors.
 
+    Of an axis: mass, drive, friction and controller; with --contacts its drive beyond the starts, with --presses the
+    scale of its torque. Of a robot: friction, inertias, torque constants.
     Every change of the machine file is shown; old values remain in its comments.
 
     Example: cdtool identify 'sample_logs/gate/free/*.csv' -m sample_logs/gate/machine.toml -o machine.toml
@@ -67,15 +90,62 @@ def identify(
     if by is not None and by not in _DIVISIONS:
         raise UsageError(f"--by is '{by}'", nearest(by, _DIVISIONS))
     check_identification_files(targets, machine, force=force, of_fleet=by is not None)
-    if bool(loaded_logs) != (payload is not None):
-        raise UsageError("--loaded-logs and --payload belong together", "give both, or neither")
-    if by is not None and loaded_logs:
-        raise UsageError("--by with --loaded-logs", "identify torque constants of one machine at a time")
+    loaded = _loaded_runs(loaded_logs, payload, payload_link, payload_centre)
+    struck = _contact_logs(contacts or (), presses or (), lever_arm)
+    if loaded is not None and struck is not None:
+        raise UsageError("--loaded-logs with --contacts or --presses", "these are for robots, those for axes")
+    if by is not None and (loaded or struck) is not None:
+        raise UsageError("--by with logs of a payload or of contacts", "identify one machine at a time with them")
     if by is not None:
         _identify_fleet(logs, machine, by, targets, Workers(jobs), as_json=as_json)
     else:
-        loaded = (tuple(loaded_logs), payload) if loaded_logs and payload is not None else None
-        _identify_machine(logs, machine, targets, Workers(jobs), loaded, as_json=as_json)
+        _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json)
+
+
+def _loaded_runs(
+    logs: Sequence[str] | None, mass: float | None, link: str | None, centre: str | None
+) -> LoadedRuns | None:
+    """Return the runs with a payload; None without any. Raises UsageError for options that do not belong together."""
+    from cdtool.workflows.identification.identifying_robot import LoadedRuns
+
+    if bool(logs) != (mass is not None):
+        raise UsageError("--loaded-logs and --payload belong together", "give both, or neither")
+    if not logs or mass is None:
+        for name, value in (("--payload-link", link), ("--payload-centre", centre)):
+            if value is not None:
+                raise UsageError(f"{name} without --payload", "give --payload and --loaded-logs too")
+        return None
+    if not 0.0 < mass < math.inf:
+        raise UsageError(f"--payload is {mass:g}", "give its mass in kg, above 0")
+    if link == "":
+        raise UsageError("--payload-link is empty", "give the name of a link, or leave the option out")
+    return LoadedRuns(tuple(logs), mass, link or "", _centre(centre))
+
+
+def _contact_logs(contacts: Sequence[str], presses: Sequence[str], lever_arm: float | None) -> ContactLogs | None:
+    """Return the logs with a load cell; None without any. Raises UsageError for a lever arm that does not fit."""
+    from cdtool.workflows.identification.identifying_contacts import ContactLogs
+
+    if lever_arm is not None and not 0.0 < lever_arm < math.inf:
+        raise UsageError(f"--lever-arm is {lever_arm:g}", "give it in m, above 0")
+    if not contacts and not presses:
+        if lever_arm is not None:
+            raise UsageError("--lever-arm without --contacts or --presses", "give logs of contacts too")
+        return None
+    return ContactLogs(tuple(contacts), tuple(presses), lever_arm)
+
+
+def _centre(text: str | None) -> tuple[float, float, float]:
+    """Return the numbers of --payload-centre; raises UsageError."""
+    if text is None:
+        return (0.0, 0.0, 0.0)
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        x = y = z = math.nan
+    if not all(math.isfinite(item) for item in (x, y, z)):
+        raise UsageError(f"--payload-centre is '{text}'", "give three numbers in m separated by commas, as 0,0,0.1")
+    return (x, y, z)
 
 
 def _identify_machine(
@@ -83,20 +153,19 @@ def _identify_machine(
     machine: Path,
     targets: Sequence[Path],
     workers: Workers,
-    loaded: tuple[tuple[str, ...], float] | None,
+    other_logs: LoadedRuns | ContactLogs | None,
     *,
     as_json: bool,
 ) -> None:
     from cdtool.report.identification_files import MACHINE, PAGE, write_identification
     from cdtool.workflows.identification.identification_outputs import evidence_of, identification_summary
     from cdtool.workflows.identification.identifying import identify as run
-    from cdtool.workflows.identification.identifying_robot import LoadedRuns
     from cdtool.workflows.runs import find_logs
 
-    runs = None if loaded is None else LoadedRuns(*loaded)
     with progress("identifying") as advance:
-        done = run(logs, machine, workers=workers, progress=advance, other_logs=runs)
-    needs_samples = any(target.suffix.lower() == PAGE for target in targets)
+        done = run(logs, machine, workers=workers, progress=advance, other_logs=other_logs)
+    # The plan of a robot has numbers that only the samples have.
+    needs_samples = done.robot is not None or any(target.suffix.lower() == PAGE for target in targets)
     evidence = evidence_of(done, logs, machine, workers) if needs_samples else ()
     written = write_identification(done, evidence, targets, find_logs(logs, Path(), "LOGS"))
     done = replace(done, written=", ".join(str(path) for path in written if path.suffix.lower() == MACHINE))
@@ -104,7 +173,7 @@ def _identify_machine(
     if as_json:
         print_json(identification_summary(done, evidence, written))
     else:
-        _show(done, written, targets)
+        _show(done, evidence, written, targets)
     leave(done.skipped)
 
 
@@ -152,30 +221,97 @@ def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path]) -> None:
         typer.echo(f"written: {plain(target)}")
 
 
-def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
+def _show(
+    done: IdentifiedMachine, evidence: Sequence[JointEvidence], written: Sequence[Path], targets: Sequence[Path]
+) -> None:
+    runs = counted(len(done.runs), "impact-free run")
+    typer.echo(f"{plain(done.machine)}: identified from {runs}")
+    if done.changes:
+        _show_changes(done)
+    if done.robot is not None:
+        _show_robot(done, done.robot, evidence)
+    else:
+        for joint in done.joints:
+            _show_axis(joint, is_named=len(done.joints) > 1)
+    _show_files(done, written, targets)
+
+
+def _show_axis(joint: JointIdentification, *, is_named: bool) -> None:
     from cdtool.report.identification_words import words_of_plan
     from cdtool.workflows.identification.identification_outputs import plan_of
 
-    runs = counted(len(done.runs), "impact-free run")
-    typer.echo(f"{plain(done.machine)}: identified from {runs}")
-    _show_changes(done)
-    for joint in done.joints:
-        if len(done.joints) > 1:
-            typer.echo(f"joint {plain(joint.joint)}")
-        _show_quality(joint)
-        for item in joint.not_identifiable:
-            typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
-        for plan in plan_of(joint):
-            typer.echo(f"plan: {words_of_plan(plan, joint.units[2])}: for {', '.join(plan.keys)}")
-        for method, reason in joint.refused.items():
-            typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
+    if is_named:
+        typer.echo(f"joint {plain(joint.joint)}")
+    _show_quality(joint)
+    for item in joint.not_identifiable:
+        typer.echo(f"not identifiable: {item.section}.{item.key}{_needed(item)}")
+    for plan in plan_of(joint):
+        typer.echo(f"plan: {words_of_plan(plan, joint.units[2])}: for {', '.join(plan.keys)}")
+    for method, reason in joint.refused.items():
+        typer.echo(f"not used: {method.replace('_', '-')}: {plain(reason)}")
+
+
+def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
+    kinds = {
+        ".toml": "machine file",
+        ".urdf": "URDF with the identified inertias",
+        ".html": "report",
+        ".json": "values",
+    }
     for path in written:
-        typer.echo(f"written: {plain(path)}")
+        typer.echo(f"written: {plain(path)} ({kinds[path.suffix.lower()]})")
     for target in targets:
         if target not in written:
             typer.echo(f"not written: {plain(target)}: nothing new predicts unseen runs better")
-    if not targets:
+    if not targets and done.changes:
         typer.echo("nothing is written: give -o machine.toml")
+
+
+def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence]) -> None:
+    """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
+    from cdtool.report.identification_words import words_of_decision
+    from cdtool.workflows.identification.robot_evidence import decision_of
+
+    rows = []
+    for place, (joint, shown) in enumerate(zip(done.joints, evidence, strict=True)):
+        decision = decision_of(done, place)
+        if decision is None or shown.robot is None:
+            continue
+        unit = shown.robot.units[0]
+        errors = [number(item) for item in (decision.torque, decision.before, decision.after, decision.floor)]
+        rows.append([joint.joint, unit, *errors, words_of_decision(decision)])
+    headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
+    columns = [("joint", "left"), ("unit", "left"), *((heading, "right") for heading in headings), ("used", "left")]
+    typer.echo("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
+    table(columns, rows)
+    for place, shown in enumerate(evidence):
+        _show_robot_joint(done.joints[place], shown)
+    _show_whole_robot(done, robot, evidence)
+
+
+def _show_robot_joint(joint: JointIdentification, shown: JointEvidence) -> None:
+    from cdtool.report.identification_words import words_of_joint_plan, words_of_load_friction
+
+    name, robot = plain(joint.joint), shown.robot
+    for item in joint.not_identifiable:
+        typer.echo(f"{name}: not identifiable: {item.section}.{item.key}{_needed(item)}")
+    for plan in shown.plan if robot else ():
+        words = words_of_joint_plan(plan, robot.motion, robot.units[1]) if robot else ""
+        typer.echo(f"{name}: plan: {words}: for {', '.join(plan.keys)}")
+    for reason in joint.refused.values():
+        typer.echo(f"{name}: {plain(reason)}")
+    if joint.robot is not None and joint.robot.load_friction is not None and robot is not None:
+        words = words_of_load_friction(joint.robot.load_friction, joint.robot.load_error, robot.units[0])
+        typer.echo(f"{name}: {words}")
+
+
+def _show_whole_robot(done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence]) -> None:
+    from cdtool.report.identification_words import words_of_robot
+    from cdtool.workflows.identification.identification_outputs import robot_plan_of
+
+    travel = [item.robot.units[1] if item.robot else "rad" for item in evidence]
+    for line in words_of_robot(robot, robot_plan_of(done, evidence), [joint.joint for joint in done.joints], travel):
+        typer.echo(plain(line))
 
 
 def _show_changes(done: IdentifiedMachine) -> None:
@@ -195,12 +331,6 @@ def _numbers(values: Any) -> str:
 
 
 def _show_quality(joint: JointIdentification) -> None:
-    if joint.robot is not None:
-        error = joint.robot.errors.get(joint.robot.form, math.nan)
-        typer.echo(
-            f"torque on unseen runs: {number(error)} of {number(joint.robot.torque)} N m or N RMS "
-            f"({joint.robot.form.value})"
-        )
     validation = joint.rigid.cross_validation if joint.rigid else None
     if validation is not None:
         best = validation.errors[validation.best]

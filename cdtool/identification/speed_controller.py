@@ -1074,7 +1074,11 @@ class _Report:
         """Add the force lag: the lag between command and measured torque without the torque's own low-pass."""
         known = self.settings.torque_filter_time
         if known is None or not math.isfinite(lag.error):
-            missing = () if math.isfinite(lag.value) else (Missing.REFERENCE_TORQUE,)
+            missing: tuple[Missing, ...] = ()
+            if not math.isfinite(lag.value):
+                missing = (Missing.REFERENCE_TORQUE,)
+            elif known is None:  # the lag contains that of the low-pass
+                missing = (Missing.TORQUE_FILTER,)
             self._not_identifiable.append(NotIdentifiable(SECTION, "force_lag", missing, {"lag_s": lag.value}))
             return
         self.add("force_lag", _Measured(max(lag.value - known, 0.0), lag.error), (), {})

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
-from cdtool.identification.estimate import Missing, NotIdentifiable
+from cdtool.identification.estimate import Estimate, Missing, NotIdentifiable
 from cdtool.identification.excitation import Excitation, PlannedMotion
+from cdtool.identification.robot_excitation import JointMotion, PlannedRobotMotion
 from cdtool.plain_text import counted, digits
 from cdtool.report.number_text import number, percent
+from cdtool.workflows.identification.identifying_robot import RobotIdentification
+from cdtool.workflows.identification.robot_evidence import FrictionAnswer, FrictionDecision
 
 _BOTH = 2
 
@@ -47,6 +50,97 @@ def words_of_plan(plan: PlannedMotion, travel_unit: str) -> str:
     if plan.missing in (Missing.SECOND_SPEED, Missing.REVERSALS) and math.isfinite(plan.travel):
         words += f", over {short_number(plan.travel, 2)} {travel_unit}"
     return words
+
+
+def words_of_joint_plan(plan: PlannedMotion, motion: JointMotion, travel_unit: str) -> str:
+    """Return a planned motion of a robot's joint in one line, with the logged one unless it is a series of runs."""
+    words = words_of_plan(plan, travel_unit)
+    if plan.runs or not motion.is_moving:
+        return words
+    speed = short_number(motion.excitation.highest_speed)
+    return f"{words} (logged: {short_number(motion.range)} {travel_unit}, up to {speed} {travel_unit}/s)"
+
+
+def words_of_decision(decision: FrictionDecision) -> str:
+    """Return whether the friction of a joint is new, which, and why the old one stays."""
+    if decision.answer is FrictionAnswer.NEW:
+        assert decision.form is not None
+        return f"new: {decision.form.value}"
+    return f"old: {decision.answer.value}"
+
+
+def words_of_base_set(item: NotIdentifiable) -> str:
+    """Return why the full set of a robot's base parameters is not identifiable, with the numbers that show it."""
+    condition = item.numbers.get("condition_number", math.nan)
+    numbers = [_conditioned(condition)]
+    count, missing = (int(item.numbers.get(key, 0.0)) for key in ("base_parameters", "not_determined"))
+    if count:
+        numbers.append(f"{missing} of {count} not determined")
+    uncertain = item.numbers.get("uncertain_torque_share", math.nan)
+    if 0.0 < uncertain < 1.0:
+        numbers.append(f"together uncertain by {percent(uncertain)} of a joint's torque in other motion")
+    others = words_of_needs([kind for kind in item.missing if kind is not Missing.OTHER_MOTION])
+    needs = f"a motion of all joints at once{f', {others}' if others else ''}"
+    return (
+        f"the full set of base parameters is not identifiable from this motion: {', '.join(numbers)}; add {needs}; "
+        "the inertias of the machine file are taken as known"
+    )
+
+
+def words_of_load_friction(load: Estimate, error: float, unit: str) -> str:
+    """Return the friction that grows with the load of a joint; `error`: RMS on unseen parts with it."""
+    value = f"{short_number(load.value, 2)} ± {short_number(load.standard_error, 1)} {unit} per {unit} of gravity"
+    reached = f"with it {number(error)} {unit} on unseen parts"
+    return f"friction grows with the load: {value}; {reached}; the machine file has no key for it"
+
+
+def words_of_robot_plan(plan: PlannedRobotMotion, names: Sequence[str], units: Sequence[str]) -> str:
+    """Return the motion that would show the inertias of all links: duration, and range and speed of each joint."""
+    parts = []
+    for demand in plan.joints:
+        unit = units[demand.joint]
+        logged = f"{short_number(demand.logged_range, 2)} {unit}, {short_number(demand.logged_speed, 2)} {unit}/s"
+        wanted = f"{short_number(demand.range, 2)} {unit} at up to {short_number(demand.speed, 2)} {unit}/s"
+        parts.append(f"{names[demand.joint]} over {wanted} ({f'logged: {logged}' if demand.is_more else 'as logged'})")
+    return (
+        f"{short_number(plan.duration)} s of all joints at once, each at its own frequencies "
+        f"(logged: {short_number(plan.logged_duration, 2)} s): {'; '.join(parts)}"
+    )
+
+
+def words_of_robot(
+    robot: RobotIdentification, plan: PlannedRobotMotion | None, names: Sequence[str], units: Sequence[str]
+) -> list[str]:
+    """Return what is known of a whole robot, a line each: inertias, torque constants, unexplained torque."""
+    lines = [words_of_base_set(item) for item in (robot.inertias.not_identifiable if robot.inertias else ())]
+    if plan is not None:
+        lines.append(f"plan: {words_of_robot_plan(plan, names, units)}")
+    if robot.inertias is not None and robot.inertias.refused:
+        lines.append(f"inertias kept: {robot.inertias.refused}")
+    if robot.inertias is not None and robot.inertias.is_new:
+        count = len(robot.inertias.base)
+        lines.append(
+            f"new inertias: {counted(count, 'base parameter')}, {_conditioned(robot.inertias.condition_number)}"
+        )
+    for item in robot.gains.not_identifiable if robot.gains else ():
+        lines.append(f"{names[item.joint]}: not identifiable: torque constant: add {words_of_needs(item.missing)}")
+    if robot.unexplained_share > 0.0:
+        lines.append(
+            f"left out: {percent(robot.unexplained_share)} of the motion, of which no friction explains the torque "
+            "(contact, stop?)"
+        )
+    if not robot.repeated.pairs:
+        lines.append("no motion is repeated: the deviation between equal runs is not known")
+    return lines
+
+
+def _conditioned(condition: float) -> str:
+    return f"condition number {'infinite' if math.isinf(condition) else number(condition)}"
+
+
+def words_of_needs(missing: Sequence[Missing]) -> str:
+    """Return what is missing in words, separated by commas; empty if nothing is."""
+    return ", ".join(kind.value for kind in missing)
 
 
 def words_of_reason(item: NotIdentifiable, excitation: Excitation | None, travel_unit: str) -> str:
@@ -90,6 +184,16 @@ def _no_limit(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
     return "the command never reached a limit" + ("" if largest is None else f" (largest: {number(largest)})")
 
 
+def _unknown_filter(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
+    lag = item.numbers.get("lag_s", math.nan)
+    size = f" of {number(1e3 * lag)} ms" if math.isfinite(lag) else ""
+    return f"the lag{size} between command and measured torque contains the unknown one of the torque's low-pass"
+
+
+def _no_position(_: NotIdentifiable, __: Excitation | None, ___: str) -> str:
+    return "no position channel: a delay of the speed channel looks like damping"
+
+
 _Reason = Callable[[NotIdentifiable, Excitation | None, str], str]
 _REASONS: Mapping[Missing, _Reason] = {
     Missing.SECOND_SPEED: _few_speeds,
@@ -97,4 +201,6 @@ _REASONS: Mapping[Missing, _Reason] = {
     Missing.ACCELERATION: _weak_acceleration,
     Missing.MORE_RECORDINGS: _too_uncertain,
     Missing.SATURATION: _no_limit,
+    Missing.TORQUE_FILTER: _unknown_filter,
+    Missing.POSITION: _no_position,
 }

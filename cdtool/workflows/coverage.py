@@ -2,35 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from cdtool.dynamics import has_links
 from cdtool.errors import ConfigurationError
-from cdtool.evaluation.coverage_map import CellKey, CoverageMap, MappedContact, coverage_map
+from cdtool.evaluation.coverage_map import CellKey, CoverageMap, MappedContact, coverage_map, speed_classes
 from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.evaluation.traces.choice import MOST_SAMPLED, MOST_SLOW
+from cdtool.evaluation.traces.trace import Trace
 from cdtool.workflows.benchmark.benchmark import benchmark
-from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file, with_detectors
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.with_injected import injected_logs, with_groups
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, require_section
+from cdtool.workflows.injection.injected_logs import InjectedCase
 from cdtool.workflows.runs import shown_path
+
+# The most trigger plots; more make no page that a browser opens quickly.
+_MOST_TRACES = 200
+# A benchmark of so few logs keeps the trace of each: half of them are sampled, the others are among the slowest.
+_ALL_TRACES_KEPT = min(2 * MOST_SAMPLED, MOST_SAMPLED + MOST_SLOW)
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """The map of a machine with its name, and what was left out."""
+    """The map of a machine with its name, what was left out, and the files read.
+
+    `traces`: if asked for, the trigger plots by recording, those of the cells that matter most first.
+    """
 
     machine: str
     map: CoverageMap
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
+    traces: Mapping[str, Trace] = field(default_factory=dict)
+    inputs: tuple[Path, ...] = ()
 
 
 def coverage(
     file: str | Path,
     *,
     detectors: Sequence[str] = (),
+    with_traces: bool = False,
     workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Coverage:
@@ -42,6 +57,8 @@ def coverage(
         A benchmark file with a section [inject].
     detectors : sequence of str, optional
         Detectors in place of the file's.
+    with_traces : bool, optional
+        Also return the trigger plot of the worst contact of each cell: missed, otherwise the slowest. At most 200.
     workers : Workers, optional
         How the work is done; in this process by default.
     progress : callable, optional
@@ -50,7 +67,8 @@ def coverage(
     Returns
     -------
     Coverage
-        A cell per detector, position and stiffness, and what was left out.
+        A cell per detector, position and stiffness, and per class of speed if the logs have clearly different speeds;
+        and what was left out.
 
     Raises
     ------
@@ -81,16 +99,71 @@ def coverage(
     injected = injected_logs(setup, section, workers, progress)
     scored = with_groups(setup, section, injected)
     impacts = {name: group for name, group in scored.impacts.items() if name.startswith(f"{INJECTED}_")}
-    done = benchmark(replace(scored, impacts=impacts, limits=()), workers=workers, progress=progress)
-    contacts = {
-        shown_path(injected.folder / case.file, setup.path.parent): MappedContact(
-            CellKey(round(case.position_value, 9), float(f"{case.stiffness:.3g}")), case.assumption, case.reliable_until
+    scored = replace(scored, impacts=impacts, limits=())
+    done = benchmark(scored, workers=workers, progress=progress)
+    names = {shown_path(injected.folder / case.file, setup.path.parent): case for case in injected.cases}
+    machine = setup.machine_file.machine
+    speed_unit = "m/s" if has_links(machine) else machine.speed_unit
+    made = coverage_map(
+        done.results.contacts, _mapped(names), scored.detectors, (units.pop(), speed_unit), setup.limits
+    )
+    traces: Mapping[str, Trace] = {}
+    if with_traces:
+        paths = {name: injected.folder / case.file for name, case in names.items()}
+        traces = _traces_of_worst(made, _by_recording(done.traces, names), scored, paths, workers)
+    skipped, findings = tuple(done.results.skipped), tuple(done.results.findings)
+    return Coverage(machine.name, made, skipped, findings, traces, (*setup.inputs, *section.logs))
+
+
+def _mapped(cases: Mapping[str, InjectedCase]) -> dict[str, MappedContact]:
+    """Return the cell of each injected recording by its name."""
+    speeds: dict[str, list[float]] = {}
+    for case in cases.values():
+        speeds.setdefault(case.log, []).append(case.speed)
+    classes = speed_classes(speeds)
+    return {
+        name: MappedContact(
+            CellKey(round(case.position_value, 9), float(f"{case.stiffness:.3g}"), classes[case.log]),
+            case.assumption,
+            case.reliable_until,
+            case.speed,
         )
-        for case in injected.cases
+        for name, case in cases.items()
     }
-    made = coverage_map(done.results.contacts, contacts, scored.detectors, units.pop())
-    skipped = tuple(done.results.skipped)
-    return Coverage(setup.machine_file.machine.name, made, skipped, tuple(done.results.findings))
+
+
+def _by_recording(traces: Iterable[Trace], names: Mapping[str, object]) -> dict[str, Trace]:
+    """Return the traces with a contact by the recording; one of several operations of it is named RECORDING#NUMBER."""
+    found = {}
+    for trace in traces:
+        name = trace.recording if trace.recording in names else trace.recording.rpartition("#")[0]
+        if trace.contact >= 0:
+            found[name] = replace(trace, chosen="")
+    return found
+
+
+def _traces_of_worst(
+    made: CoverageMap, known: dict[str, Trace], scored: BenchmarkFile, paths: Mapping[str, Path], workers: Workers
+) -> dict[str, Trace]:
+    """Return the trace of the worst contact of each cell, missed ones and the most telling cells first.
+
+    A benchmark keeps a choice of traces: those that are absent from `known` are made by scoring their logs again.
+    """
+    cells = [cell for _, _, cell in made.missed()]
+    cells += [item.cell for item in made.most_telling(_MOST_TRACES)]
+    cells += [cell for of_detector in made.cells.values() for cell in of_detector.values()]
+    wanted = list(dict.fromkeys(cell.recordings[0].recording for cell in cells if cell.assessable))[:_MOST_TRACES]
+    absent = [name for name in wanted if name not in known]
+    for start in range(0, len(absent), _ALL_TRACES_KEPT):
+        logs = {paths[name] for name in absent[start : start + _ALL_TRACES_KEPT]}
+        groups = {
+            name: replace(group, logs=tuple(path for path in group.logs if path in logs))
+            for name, group in scored.impacts.items()
+        }
+        impacts = {name: group for name, group in groups.items() if group.logs}
+        again = benchmark(replace(scored, impacts=impacts), workers=workers)
+        known = known | _by_recording(again.traces, paths)
+    return {name: known[name] for name in wanted if name in known}
 
 
 def _require_different_stiffness(path: Path, section: InjectSection) -> None:

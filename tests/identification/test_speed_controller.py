@@ -217,6 +217,7 @@ def test_rounded_units_of_a_written_log_are_no_obstacle(tmp_path: Path) -> None:
 def test_the_torque_filter_separates_the_force_lag(runs: list[AxisRun]) -> None:
     unknown = identify_controller(runs[:3])
     assert missing(unknown, "force_lag").numbers["lag_s"] == pytest.approx(unknown.lag)
+    assert missing(unknown, "force_lag").missing == (Missing.TORQUE_FILTER,)
     assert unknown.controller is not None and unknown.controller.force_lag == 0.0
     known = identify_controller(runs[:3], ControllerSettings(torque_filter_time=GATE.torque_filter_time))
     assert deviation(known.identified["force_lag"], GATE.current_lag) < 3.0

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdtool.axis_model.parameters import Sensors
+from cdtool.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
+from cdtool.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import Estimate, IdentificationError, Missing
 from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
@@ -118,3 +119,25 @@ def test_missing_samples_do_not_matter() -> None:
         torque[rng.random(len(torque)) < 0.01] = np.nan
         runs.append(replace(run, torque=torque))
     assert identify_two_mass(runs, SETTINGS).identified["stiffness"].value == pytest.approx(8e4, rel=0.05)
+
+
+def test_a_rigid_drive_is_not_given_a_stiffness() -> None:
+    """The starts of one mass with the motor's part of it stated: an elastic drive would fit noise and friction."""
+    model = AxisModel(
+        drive=Drive(load_mass=160.0),
+        friction=Friction(coulomb_forward=40.0, coulomb_backward=40.0, static=50.0),
+        controller=Controller(period=1e-3, speed_gain=4000.0, integral_gain=20_000.0),
+    )
+    runs = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        time = np.arange(3000) * 1e-3
+        reference = 0.2 * np.clip((time - 0.5) / 0.5, 0.0, 1.0)
+        motion = simulate_axis(model, AxisInputs(reference))
+        torque = motion["drive_force"] + rng.normal(0.0, 2.0, len(time))
+        speed = motion["motor_speed"] + rng.normal(0.0, 2e-4, len(time))
+        runs.append(AxisRun(f"{seed}", 0.0, 1e-3, torque, speed=speed, position=motion["motor_position"]))
+    with pytest.raises(IdentificationError, match="a rigid drive describes the starts as well"):
+        identify_two_mass(runs, TwoMassSettings(motor_mass=60.0))
+    with pytest.raises(IdentificationError, match="the motor alone is stated"):
+        identify_two_mass(runs, TwoMassSettings(motor_mass=600.0))

@@ -7,9 +7,21 @@ from dataclasses import replace
 
 import pytest
 
-from cdtool.identification.estimate import Missing, NotIdentifiable
+from cdtool.identification.estimate import Estimate, Method, Missing, NotIdentifiable
 from cdtool.identification.excitation import Excitation, PlannedMotion
-from cdtool.report.identification_words import listed_numbers, words_of_plan, words_of_reason
+from cdtool.identification.friction_choice import FrictionForm
+from cdtool.identification.robot_excitation import JointDemand, JointMotion, PlannedRobotMotion
+from cdtool.report.identification_words import (
+    listed_numbers,
+    words_of_base_set,
+    words_of_decision,
+    words_of_joint_plan,
+    words_of_load_friction,
+    words_of_plan,
+    words_of_reason,
+    words_of_robot_plan,
+)
+from cdtool.workflows.identification.robot_evidence import FrictionAnswer, FrictionDecision
 
 EXCITATION = Excitation((0.25,), 1.0, 0.0, 0.26, 0.08, 0.003, 14.0, 70.0, 10, 0, 0.3)
 RUNS = PlannedMotion(Missing.SECOND_SPEED, ("machine.viscous_friction",), 4, (0.06, 0.1), (0.25,), (1, -1), travel=1.4)
@@ -69,6 +81,13 @@ def test_a_plan_states_its_numbers(plan: PlannedMotion, words: str) -> None:
         ),
         ((Missing.MORE_RECORDINGS,), {}, None, "too few runs"),
         ((Missing.SATURATION,), {"largest_n": 552.0}, None, "the command never reached a limit (largest: 552)"),
+        (
+            (Missing.TORQUE_FILTER,),
+            {"lag_s": 0.0162},
+            None,
+            "the lag of 16.2 ms between command and measured torque contains the unknown one of the torque's low-pass",
+        ),
+        ((Missing.POSITION,), {}, None, "no position channel: a delay of the speed channel looks like damping"),
         ((Missing.PAYLOAD,), {}, None, "not in these logs: runs with a known payload"),
         ((), {}, None, "these logs show only its sum with another parameter"),
     ],
@@ -80,3 +99,41 @@ def test_a_reason_states_the_numbers_that_show_it(missing, numbers, excitation, 
 def test_numbers_are_listed_as_in_a_sentence() -> None:
     assert listed_numbers((0.0612, 0.2, math.nan)) == "0.0612, 0.2 and -"
     assert listed_numbers((0.2,)) == "0.2"
+
+
+def test_the_answer_about_the_base_parameters_has_its_numbers() -> None:
+    numbers = {"condition_number": 122.3, "base_parameters": 36.0, "not_determined": 13.0}
+    item = NotIdentifiable("machine", "base_parameters", (Missing.OTHER_MOTION, Missing.MORE_RECORDINGS), numbers)
+    assert words_of_base_set(item).startswith(
+        "the full set of base parameters is not identifiable from this motion: condition number 122, "
+        "13 of 36 not determined; add a motion of all joints at once, more recordings"
+    )
+    singular = NotIdentifiable("machine", "base_parameters", (Missing.OTHER_MOTION,), {"condition_number": math.inf})
+    assert "condition number infinite; add a motion of all joints at once;" in words_of_base_set(singular)
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (FrictionAnswer.NEW, "new: viscous and Coulomb friction"),
+        (FrictionAnswer.NOT_BETTER, "old: not better by more than one standard error"),
+        (FrictionAnswer.NOT_MOVED, "old: the joint does not move"),
+    ],
+)
+def test_a_decision_states_why_the_old_friction_stays(answer: FrictionAnswer, words: str) -> None:
+    decision = FrictionDecision(answer, FrictionForm.FRICTION_ALONE, 4.0, 3.0, 30.0, math.nan)
+    assert words_of_decision(decision) == words
+
+
+def test_friction_that_grows_with_the_load_and_a_robots_plan_have_their_numbers() -> None:
+    load = Estimate("machine", "load_friction", 0.0769, 0.0103, "1", Method.LEAST_SQUARES)
+    words = words_of_load_friction(load, 2.286, "N m")
+    assert words.startswith("friction grows with the load: 0.077 ± 0.01 N m per N m of gravity; with it 2.29 N m")
+    plan = PlannedRobotMotion((JointDemand(0, 2.0, 0.56, 0.32, 0.56), JointDemand(1, 3.0, 1.0, 3.0, 1.0)), 23.0, 4.9)
+    assert words_of_robot_plan(plan, ["elbow", "lift"], ["rad", "m"]) == (
+        "23 s of all joints at once, each at its own frequencies (logged: 4.9 s): "
+        "elbow over 2 rad at up to 0.56 rad/s (logged: 0.32 rad, 0.56 rad/s); lift over 3 m at up to 1 m/s (as logged)"
+    )
+    motion = JointMotion(0, EXCITATION, 0.5, 1.25)
+    other = PlannedMotion(Missing.OTHER_MOTION, ("machine.constant_force",))
+    assert words_of_joint_plan(other, motion, "rad").endswith("(logged: 0.75 rad, up to 0.26 rad/s)")

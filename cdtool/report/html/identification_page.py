@@ -14,12 +14,20 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cdtool.errors import CdtoolError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.identification.rigid_axis import CrossValidation
 from cdtool.plain_text import counted
+from cdtool.report.html.identification_section import PageSection, images_of
 from cdtool.report.html.page_tables import classes, visible
-from cdtool.report.identification_words import listed_numbers, short_number, words_of_plan, words_of_reason
+from cdtool.report.html.robot_identification_sections import robot_sections
+from cdtool.report.identification_words import (
+    listed_numbers,
+    short_number,
+    words_of_joint_plan,
+    words_of_needs,
+    words_of_plan,
+    words_of_reason,
+)
 from cdtool.report.number_text import NOTHING, number, percent
 from cdtool.report.plots.identification_plots import (
     draw_controller,
@@ -27,13 +35,11 @@ from cdtool.report.plots.identification_plots import (
     draw_friction,
     draw_starts,
     draw_unseen_run,
-    png,
 )
 from cdtool.report.table import Cell, Column, Table, name_cell, number_cell, tabulate
 from cdtool.workflows.identification.fleet_identification import FleetIdentification, ParameterSeries
 from cdtool.workflows.identification.identification_outputs import JointEvidence
 from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification
-from cdtool.workflows.identification.identifying_robot import InertiaIdentification
 from cdtool.workflows.identification.machine_update import MachineChange
 
 if TYPE_CHECKING:
@@ -41,29 +47,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FOLDER = Path(__file__).with_name("page_files")
-# A figure of 120 dots per inch is shown with so many CSS pixels per inch.
-_PIXELS = 96.0
 # The most machines with a figure, those that changed first: each takes 150 KB.
 _MOST_FIGURES = 40
-
-
-@dataclass(frozen=True)
-class PageImage:
-    """A figure as a data URI, with its caption and width [px]."""
-
-    source: str
-    caption: str
-    width: int
-
-
-@dataclass(frozen=True)
-class PageSection:
-    """A section of the page."""
-
-    title: str
-    tables: tuple[Table, ...] = ()
-    images: tuple[PageImage, ...] = ()
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -86,7 +71,7 @@ def identification_html(done: IdentifiedMachine, evidence: Sequence[JointEvidenc
     for joint, shown in zip(done.joints, evidence, strict=True):
         name = f"{joint.joint}: " if len(done.joints) > 1 else ""
         sections += _joint_sections(joint, shown, name)
-    sections += _robot_sections(done)
+    sections[1:1] = robot_sections(done, evidence)
     sections += _left_out(done.skipped, done.findings)
     return _rendered(
         IdentificationPage(
@@ -107,9 +92,9 @@ _ORIGIN = (
 
 
 def _joint_sections(joint: JointIdentification, shown: JointEvidence, name: str) -> list[PageSection]:
-    travel = joint.units[2]
+    travel = shown.robot.units[1] if shown.robot else joint.units[2]
     return [
-        PageSection(f"{name}Not identifiable", (_missing_table(joint),) if joint.not_identifiable else ()),
+        PageSection(f"{name}Not identifiable", (_missing_table(joint, shown),) if joint.not_identifiable else ()),
         PageSection(
             f"{name}Excitation plan",
             (_plan_table(shown, travel),) if shown.plan else (),
@@ -148,19 +133,27 @@ def _values(values: Sequence[float], significant: int) -> str:
     return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 
-def _missing_table(joint: JointIdentification) -> Table:
-    excitation = joint.rigid.excitation if joint.rigid else None
+def _missing_table(joint: JointIdentification, shown: JointEvidence) -> Table:
+    excitation, travel = joint.rigid.excitation if joint.rigid else None, joint.units[2]
+    if shown.robot is not None:
+        excitation, travel = shown.robot.motion.excitation, shown.robot.units[1]
     fields = (
         (Column("parameter"), lambda item: Cell(f"{item.section}.{item.key}")),
-        (Column("because"), lambda item: Cell(words_of_reason(item, excitation, joint.units[2]))),
-        (Column("add"), lambda item: Cell(", ".join(kind.value for kind in item.missing) or NOTHING)),
+        (Column("because"), lambda item: Cell(words_of_reason(item, excitation, travel))),
+        (Column("add"), lambda item: Cell(words_of_needs(item.missing) or NOTHING)),
     )
     return tabulate("missing", "Not identifiable from these logs", fields, joint.not_identifiable)
 
 
 def _plan_table(shown: JointEvidence, travel: str) -> Table:
+    motion = shown.robot.motion if shown.robot else None
     fields = (
-        (Column("add"), lambda item: Cell(words_of_plan(item, travel))),
+        (
+            Column("add"),
+            lambda item: Cell(
+                words_of_joint_plan(item, motion, travel) if motion is not None else words_of_plan(item, travel)
+            ),
+        ),
         (Column("makes identifiable"), lambda item: Cell(", ".join(item.keys))),
     )
     return tabulate("plan", "Motion that would make the other parameters identifiable", fields, shown.plan)
@@ -204,7 +197,7 @@ def _prediction_section(joint: JointIdentification, shown: JointEvidence, name: 
             )
         )
     tables = () if validation is None else (_prediction_table(validation, force),)
-    return PageSection(f"{name}Prediction of unseen runs", tables, _images(figures))
+    return PageSection(f"{name}Prediction of unseen runs", tables, images_of(figures))
 
 
 def _prediction_table(validation: CrossValidation, force: str) -> Table:
@@ -233,7 +226,7 @@ def _friction_section(joint: JointIdentification, name: str) -> PageSection:
         "over along the travel. Bars are two standard errors between strokes."
     )
     return PageSection(
-        f"{name}Friction", images=_images([(lambda: draw_friction(fit, (force, f"{travel}/s", travel)), caption)])
+        f"{name}Friction", images=images_of([(lambda: draw_friction(fit, (force, f"{travel}/s", travel)), caption)])
     )
 
 
@@ -245,7 +238,7 @@ def _starts_section(joint: JointIdentification, shown: JointEvidence, name: str)
     )
     figures: list[tuple[Callable[[], Figure], str]] = []
     figures += [(partial(draw_starts, start, (force, f"{travel}/s", travel)), caption) for start in shown.starts]
-    return PageSection(f"{name}Starts, elastic drive", images=_images(figures))
+    return PageSection(f"{name}Starts, elastic drive", images=images_of(figures))
 
 
 def _controller_section(joint: JointIdentification, shown: JointEvidence, name: str) -> PageSection:
@@ -254,52 +247,8 @@ def _controller_section(joint: JointIdentification, shown: JointEvidence, name: 
         return PageSection(f"{name}Controller")
     caption = "The identified controller driven by the logged references and speed."
     return PageSection(
-        f"{name}Controller", images=_images([(lambda: draw_controller(compared, joint.units[1]), caption)])
+        f"{name}Controller", images=images_of([(lambda: draw_controller(compared, joint.units[1]), caption)])
     )
-
-
-def _robot_sections(done: IdentifiedMachine) -> list[PageSection]:
-    """Return the prediction errors of a robot's joints by form of the friction, and what is known of its inertias."""
-    robot = done.robot
-    if robot is None:
-        return []
-    rows = []
-    for number_of, joint in enumerate(robot.joints):
-        floor = number_cell(float(robot.repeated.floor[number_of]))
-        for form, error in joint.errors.items():
-            chosen = "good" if form is joint.form else ""
-            name = name_cell(visible(done.joints[number_of].joint))
-            rows.append([name, Cell(form.value, tone=chosen), number_cell(error), number_cell(joint.torque), floor])
-    headings = ("RMS error [N m, N]", "torque, RMS", "between equal runs")
-    columns = (Column("joint"), Column("new"), *(Column(heading, numeric=True) for heading in headings))
-    table = Table("torque", "Torque that is not explained in what was left out of the fit", columns, rows)
-    sections = [PageSection("Prediction of unseen runs, joints", (table,))]
-    if robot.inertias is not None:
-        sections.append(_inertia_section(robot.inertias))
-    return sections
-
-
-def _inertia_section(found: InertiaIdentification) -> PageSection:
-    base = found.base
-    fields = zip(base.names, base.values, base.standard_errors, base.identifiable, strict=True)
-    rows = [
-        [Cell(name), number_cell(float(value)), number_cell(float(error)), Cell("yes" if known else "no")]
-        for name, value, error, known in fields
-    ]
-    columns = (
-        Column("base parameter"),
-        Column("value", numeric=True),
-        Column("standard error", numeric=True),
-        Column("identifiable"),
-    )
-    words = [f"Condition number {number(found.condition_number)}."]
-    if found.not_identifiable:
-        kinds = dict.fromkeys(kind.value for item in found.not_identifiable for kind in item.missing)
-        words.append(f"Not a complete set from this motion: add {', '.join(kinds)}.")
-    if found.refused:
-        words.append(f"The present inertias stay: {visible(found.refused)}.")
-    table = Table("inertias", "Inertial parameters that act on the torques", columns, rows)
-    return PageSection("Inertias", (table,), note=" ".join(words))
 
 
 def _refused_table(joint: JointIdentification) -> Table:
@@ -330,7 +279,7 @@ def drift_html(fleet: FleetIdentification) -> str:
         several.sort(key=lambda series: not series.drift.is_changed)
         if several:
             caption = visible(f"Periods: {', '.join(several[0].periods)}.")
-            image = _images([(partial(draw_drift, several, item.machine), caption)])
+            image = images_of([(partial(draw_drift, several, item.machine), caption)])
             sections.append(PageSection(visible(item.machine), images=image))
     sections += _left_out(fleet.skipped, fleet.findings)
     headline = f"{len(names)} of {counted(assessable, 'machine')} changed" if assessable else "No machine is assessable"
@@ -387,18 +336,6 @@ def _machines_table(fleet: FleetIdentification) -> Table:
     headings = [f"{visible(name)} [{unit}]" if unit else visible(name) for name, unit in names]
     columns = [Column("machine"), Column("logs", numeric=True), *(Column(item, numeric=True) for item in headings)]
     return Table("machines", "Parameters from all logs of a machine, ± standard error", columns, rows)
-
-
-def _images(figures: Sequence[tuple[Callable[[], Figure], str]]) -> tuple[PageImage, ...]:
-    images = []
-    for draw, caption in figures:
-        try:
-            figure = draw()
-        except CdtoolError:  # a figure that cannot be drawn does not cost the page
-            continue
-        source = f"data:image/png;base64,{base64.b64encode(png(figure)).decode()}"
-        images.append(PageImage(source, caption, round(figure.get_figwidth() * _PIXELS)))
-    return tuple(images)
 
 
 def _rendered(page: IdentificationPage) -> str:

@@ -28,14 +28,26 @@ from cdtool.identification.rigid_axis import (
     low_passed_force,
     predict_force,
 )
+from cdtool.identification.robot_excitation import JointMotion, PlannedRobotMotion
+from cdtool.identification.robot_run import RobotRun, robot_run
 from cdtool.identification.speed_controller import ControllerFit
 from cdtool.identification.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.identification.start_ensemble import StartEnsemble
 from cdtool.identification.two_mass import TwoMassFit
 from cdtool.machine_file import MachineFile, read_machine_file
-from cdtool.recording import BoolArray, FloatArray
+from cdtool.machines.coupled import CoupledMachine
+from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification
+from cdtool.workflows.identification.identifying_contacts import scaled
+from cdtool.workflows.identification.robot_evidence import (
+    FrictionDecision,
+    RobotJointEvidence,
+    decision_of,
+    excitation_needs,
+    inertia_plan,
+    robot_evidence,
+)
 from cdtool.workflows.runs import RunReading, find_logs, load_runs
 
 # Of a single run this share of its moving time, the last one, is left out of the fit and predicted [-].
@@ -115,10 +127,16 @@ class JointEvidence:
     starts: tuple[StartComparison, ...] = ()
     controller: ControllerComparison | None = None
     plan: tuple[PlannedMotion, ...] = field(default=())
+    robot: RobotJointEvidence | None = None
 
 
-def plan_of(joint: JointIdentification) -> tuple[PlannedMotion, ...]:
-    """Return the motions that would make the other parameters of a joint identifiable; empty if nothing is missing."""
+def plan_of(joint: JointIdentification, motion: JointMotion | None = None) -> tuple[PlannedMotion, ...]:
+    """Return the motions that would make the other parameters of a joint identifiable; empty if nothing is missing.
+
+    `motion`: of a robot's joint; an axis has the excitation of its fit.
+    """
+    if motion is not None:
+        return plan_motions(joint.not_identifiable, motion.excitation)
     rate = math.nan
     if joint.two_mass is not None:
         rate = 1.0 / joint.two_mass.ensembles[0].period
@@ -129,9 +147,10 @@ def plan_of(joint: JointIdentification) -> tuple[PlannedMotion, ...]:
 
 
 def _needs_of_the_drive(joint: JointIdentification) -> tuple[NotIdentifiable, ...]:
-    """Return what is missing for the stiffness of a drive of which nothing could be identified: two masses, or starts.
+    """Return the motor's inertia if the stiffness of a drive was not identified because it is not given.
 
-    The motor's inertia is what the rigid axis has more than its load.
+    It is what the rigid axis has more than its load. Another refusal, as of a fit that ends at a bound, needs no other
+    motion: its own text says what to do.
     """
     if joint.rigid is None or joint.two_mass is not None or "two_mass" not in joint.refused:
         return ()
@@ -139,8 +158,9 @@ def _needs_of_the_drive(joint: JointIdentification) -> tuple[NotIdentifiable, ..
     if "load_mass" not in identified:
         return ()
     motor = joint.rigid.total_mass - identified["load_mass"].value
-    missing = Missing.START_UP if motor > _NO_MASS * joint.rigid.total_mass else Missing.MOTOR_INERTIA
-    return (NotIdentifiable("model.drive", "stiffness", (missing,)),)
+    if motor > _NO_MASS * joint.rigid.total_mass:
+        return ()
+    return (NotIdentifiable("model.drive", "stiffness", (Missing.MOTOR_INERTIA,)),)
 
 
 def evidence_of(
@@ -151,22 +171,47 @@ def evidence_of(
     Raises CdtoolError if the logs or the machine file cannot be read again.
     """
     modelled = any(joint.rigid or joint.two_mass or joint.controller for joint in done.joints)
-    if not modelled:
+    if not modelled and done.robot is None:
         return tuple(JointEvidence(joint.joint, plan=plan_of(joint)) for joint in done.joints)
     machine_file = read_machine_file(machine)
-    reading = RunReading("whole", onset=OnsetRule(), base=None, workers=workers or Workers())
-    operations = load_runs(find_logs(map(str, logs), Path(), "LOGS"), machine_file, reading).operations
-    used = [operation.recording for operation in operations if operation.recording.name in done.runs]
+    used = _used_recordings(done, logs, machine_file, workers)
+    if isinstance(machine_file.machine, CoupledMachine):
+        return _robot_joints(done, used, machine_file.machine)
     evidence = []
     for number, joint in enumerate(done.joints):
         runs = []
         for recording in used:
+            as_identified = scaled(recording, joint.torque_scale.factor, number) if joint.torque_scale else recording
             try:
-                runs.append(axis_run(recording, number))
+                runs.append(axis_run(as_identified, number))
             except RecordingError:  # it was left out of the identification too
                 continue
         evidence.append(_joint_evidence(joint, number, runs, machine_file))
     return tuple(evidence)
+
+
+def _used_recordings(
+    done: IdentifiedMachine, logs: Sequence[str | Path], machine_file: MachineFile, workers: Workers | None
+) -> list[Recording]:
+    reading = RunReading("whole", onset=OnsetRule(), base=None, workers=workers or Workers())
+    operations = load_runs(find_logs(map(str, logs), Path(), "LOGS"), machine_file, reading).operations
+    return [operation.recording for operation in operations if operation.recording.name in done.runs]
+
+
+def _robot_joints(
+    done: IdentifiedMachine, recordings: Sequence[Recording], machine: CoupledMachine
+) -> tuple[JointEvidence, ...]:
+    runs: list[RobotRun] = []
+    for recording in recordings:
+        try:
+            runs.append(robot_run(recording))
+        except RecordingError:  # it was left out of the identification too
+            continue
+    shown = robot_evidence(done, runs, machine)
+    return tuple(
+        JointEvidence(joint.joint, plan=plan_of(joint, item.motion), robot=item)
+        for joint, item in zip(done.joints, shown, strict=True)
+    )
 
 
 def _joint_evidence(
@@ -382,6 +427,31 @@ def identification_summary(
         unseen = evidence[number].unseen if evidence else None
         if unseen is not None:
             values["unseen_run"] = {"run": unseen.run, "moving_error": unseen.moving_error, "of_runs": unseen.of_runs}
+        decision = decision_of(done, number)
+        if decision is not None:
+            values["friction_decision"] = _decision_summary(decision)
+        robot = evidence[number].robot if evidence else None
+        if robot is not None:
+            values["unseen_run"] = robot.unseen and robot.unseen.summary
+            values["motion"] = {
+                **asdict(robot.motion),
+                "missing": [m.name.lower() for m in excitation_needs(robot.motion)],
+            }
         summary["joints"][number] |= values
+    demanded = robot_plan_of(done, evidence)
+    summary["inertia_plan"] = demanded and asdict(demanded)
     summary["outputs"] = [str(path) for path in written]
     return {"tool": "cdtool identify", **summary}
+
+
+def _decision_summary(decision: FrictionDecision) -> dict[str, Any]:
+    return {
+        **asdict(decision),
+        "answer": decision.answer.name.lower(),
+        "form": decision.form.name.lower() if decision.form else None,
+    }
+
+
+def robot_plan_of(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -> PlannedRobotMotion | None:
+    """Return the motion that would show the inertias of a robot's links; None if nothing is missing, or for an axis."""
+    return inertia_plan(done, [item.robot.motion for item in evidence if item.robot is not None])

@@ -119,7 +119,7 @@ class JointIdentification:
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
         of_rigid = {item.key: item for item in self.rigid.identified.estimates} if self.rigid else {}
         if self.two_mass is None and "viscous_friction" in of_rigid:
-            # A table [model.friction] comes before [machine]: an old value of it must not stand beside new ones.
+            # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
             viscous = of_rigid["viscous_friction"]
             found.append(replace(viscous, section="model.friction", key="viscous"))
         return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
@@ -467,6 +467,9 @@ def _identify_joint(
             found[method] = run_method()
         except CdtoolError as fault:
             refused[method] = str(fault)
+        if method == "rigid" and _has_opposite_sign(found.get("rigid")):
+            reason = "the torque falls where the acceleration rises: check the signs (scale) of torque and speed"
+            return JointIdentification(name, refused={"sign": reason})
     units = (mass, force, travel, f"{force} s/{travel}")
     identified = JointIdentification(
         name,
@@ -477,6 +480,16 @@ def _identify_joint(
         **found,
     )
     return _with_contacts(identified, struck, machine_file, joint) if struck.struck else identified
+
+
+def _has_opposite_sign(fit: RigidAxisFit | None) -> bool:
+    """Whether a negative total mass and negative friction are certain: torque or speed has the opposite sign."""
+    numbers = {item.key: item.numbers for item in fit.identified.not_identifiable} if fit else {}
+    signs = (("load_mass", "total_mass"), ("coulomb_friction", "value"))
+    return all(
+        numbers.get(key, {}).get(name, 0.0) < -_SIGNIFICANT * numbers.get(key, {}).get("standard_error", math.inf)
+        for key, name in signs
+    )
 
 
 def _refuse_constant_force(fit: RigidAxisFit | None, unit: str) -> None:

@@ -114,16 +114,16 @@ def test_the_plan_of_the_gate_names_speeds_and_the_other_direction(
     assert plans[Missing.REVERSALS].travel == pytest.approx(1.43, rel=0.1)
 
 
-def test_a_drive_without_the_motors_inertia_or_without_starts_has_its_need_in_the_plan(
+def test_a_drive_without_the_motors_inertia_has_it_in_the_plan_and_another_refusal_has_no_motion(
     identified: tuple[IdentifiedMachine, tuple[JointEvidence, ...]], runs: Sequence[AxisRun]
 ) -> None:
     (joint,) = identified[0].joints
-    for motor_mass, missing in ((0.0, Missing.MOTOR_INERTIA), (PARAMETERS.motor_mass, Missing.START_UP)):
+    for motor_mass, wanted in ((0.0, [Missing.MOTOR_INERTIA]), (PARAMETERS.motor_mass, [])):
         refused = replace(
-            joint, rigid=identify_rigid_axis(runs, motor_mass), two_mass=None, refused={"two_mass": "not possible"}
+            joint, rigid=identify_rigid_axis(runs, motor_mass), two_mass=None, refused={"two_mass": "ends at a bound"}
         )
-        (plan,) = [plan for plan in plan_of(refused) if "model.drive.stiffness" in plan.keys]
-        assert plan.missing is missing
+        plans = [plan for plan in plan_of(refused) if "model.drive.stiffness" in plan.keys]
+        assert [plan.missing for plan in plans] == wanted
 
 
 def test_all_outputs_are_written_together(
@@ -206,9 +206,14 @@ def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_writ
     outputs = ["-o", tmp_path / "arm.html", "-o", tmp_path / "arm.toml"]
     done = command("identify", arm / "free" / "0[1-4].*", "-m", arm / "machine.toml", *outputs)
     assert done.status == 0
-    assert "torque on unseen runs" in done.out
+    assert "new: viscous and Coulomb friction" in done.out
+    assert "old: the joint does not move" in done.out
+    assert "plan: 4 runs backward at " in done.out
+    assert f"written: {tmp_path / 'arm.toml'} (machine file)" in done.out
     page = (tmp_path / "arm.html").read_text(encoding="utf-8")
     assert "Torque that is not explained" in page
+    assert "Logged motion of each joint" in page
+    assert page.count("data:image/png;base64,") == 2
     assert "forearm" in page
     assert (tmp_path / "arm.toml").exists()
 
@@ -219,6 +224,12 @@ def test_a_robots_page_has_the_errors_of_its_joints_and_the_machine_file_is_writ
         (["--payload", 2.0], "belong together"),
         (["--loaded-logs", "x.csv"], "belong together"),
         (["--loaded-logs", "x.csv", "--payload", 2.0, "--by", "day"], "--by with --loaded-logs"),
+        (["--loaded-logs", "x.csv", "--payload", -2.0], "--payload is -2"),
+        (["--payload-link", "hand"], "--payload-link without --payload"),
+        (["--payload-centre", "0,0,1"], "--payload-centre without --payload"),
+        (["--loaded-logs", "x.csv", "--payload", 2.0, "--payload-centre", "0,1"], "--payload-centre is '0,1'"),
+        (["--loaded-logs", "x.csv", "--payload", 2.0, "--payload-centre", "0,inf,1"], "--payload-centre is '0,inf,1'"),
+        (["--loaded-logs", "x.csv", "--payload", 2.0, "--payload-link", ""], "--payload-link is empty"),
     ],
 )
 def test_a_payload_without_its_logs_is_one_line(options: list[object], message: str) -> None:

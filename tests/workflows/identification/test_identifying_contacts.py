@@ -12,9 +12,11 @@ from cdtool.axis_model.model_table import axis_model
 from cdtool.axis_model.parameters import AxisModel, Controller, Drive, Friction
 from cdtool.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.errors import UsageError
+from cdtool.identification.estimate import IdentificationError
 from cdtool.injection.assumption import Assumption, assumptions_of
 from cdtool.machine_file import read_machine_file
 from cdtool.workflows.identification.identifying_contacts import ContactLogs
+from tests.command import cdtool as command
 from tests.identification.test_torque_constant import SCALE, pressed
 
 GATE = Path(__file__).parents[3] / "sample_logs" / "gate"
@@ -61,7 +63,7 @@ def write_press(path: Path, seed: int) -> None:
 
 
 def write_free(path: Path, seed: int) -> None:
-    """Strokes to and fro at three speeds; the logged torque is too large by 1 / SCALE."""
+    """Strokes in both directions at three speeds; the logged torque is too large by 1 / SCALE."""
     time = np.arange(12_000) * 1e-3
     speed = (0.2 + 0.1 * np.floor(time / 4.0)) * np.sin(2.0 * np.pi * time / 2.0)
     controller = Controller(period=1e-3, speed_gain=8000.0, integral_gain=40_000.0)
@@ -108,6 +110,23 @@ def test_presses_correct_the_scale_of_the_torque_and_everything_that_depends_on_
     assert "# from a data sheet" in target.read_text(encoding="utf-8")
 
 
+def test_a_torque_of_the_opposite_sign_is_named_and_nothing_is_written(axis: Path) -> None:
+    machine = axis / "wrong.toml"
+    machine.write_text(AXIS.replace('unit = "N" } # from', 'unit = "N", scale = -1 } # from'), encoding="utf-8")
+    with pytest.raises(IdentificationError, match="check the signs"):
+        cdtool.identify([axis / "free*.csv"], machine, axis / "never.toml")
+    assert not (axis / "never.toml").exists()
+
+
+def test_an_old_friction_of_the_model_does_not_apply_with_new_values(axis: Path) -> None:
+    machine, target = axis / "old.toml", axis / "new.toml"
+    machine.write_text(f"{AXIS}[model.friction]\nviscous = 3.0\n", encoding="utf-8")
+    cdtool.identify([axis / "free*.csv"], machine, target)
+    file = read_machine_file(target)
+    friction = axis_model(file.machine, file.model).friction  # type: ignore[arg-type]
+    assert friction.viscous == pytest.approx(40.0 / SCALE, rel=0.1)
+
+
 def test_hits_do_not_show_the_torque_constant_and_the_reason_is_stated() -> None:
     logs = ContactLogs(pressed=(str(GATE / "stiff" / "*.csv"),))
     done = cdtool.identify([GATE / "free" / "0[34].csv"], GATE / "machine.toml", other_logs=logs)
@@ -121,3 +140,28 @@ def test_a_rotary_axis_needs_the_lever_arm_of_its_load_cell(tmp_path: Path) -> N
     write_free(tmp_path / "free.csv", 1)
     with pytest.raises(UsageError, match="lever arm"):
         cdtool.identify([tmp_path / "free.csv"], tmp_path / "machine.toml", other_logs=ContactLogs(("x.csv",)))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--lever-arm", "0.5"), "--lever-arm without --contacts or --presses"),
+        (("--contacts", "x.csv", "--lever-arm", "-1"), "--lever-arm is -1"),
+        (("--contacts", "x.csv", "--by", "day"), "--by with logs of a payload or of contacts"),
+        (("--contacts", "x.csv", "--loaded-logs", "y.csv", "--payload", "1"), "these are for robots, those for axes"),
+    ],
+)
+def test_options_that_do_not_belong_together_are_one_line(axis: Path, options: tuple[str, ...], message: str) -> None:
+    done = command("identify", axis / "free0.csv", "-m", axis / "machine.toml", *options)
+    assert done.status == 2
+    assert message in done.err and done.err.count("\n") == 1
+
+
+def test_the_command_writes_what_presses_show(axis: Path) -> None:
+    target, page = axis / "pressed.toml", axis / "pressed.html"
+    words = ("-m", axis / "machine.toml", "--presses", axis / "press*.csv", "-o", target, "-o", page)
+    done = command("identify", axis / "free*.csv", *words)
+    assert done.status == 0, done.err
+    assert "channels.torque.scale" in done.out
+    assert read_machine_file(target).machine.name == "axis"
+    assert "channels.torque.scale" in page.read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -48,8 +49,16 @@ def test_the_stiffer_the_obstacle_the_sooner_and_inertia_misses_soft_ones(gate: 
 
 
 def test_the_command_draws_the_map_and_prints_a_table(gate: Path) -> None:
-    done = command("coverage", gate / "coverage.toml", "-o", gate / "map.png")
+    targets = [item for name in ("map.png", "map.html", "map.json") for item in ("-o", gate / name)]
+    done = command("coverage", gate / "coverage.toml", *targets)
     assert done.status == 0
+    page = (gate / "map.html").read_text(encoding="utf-8")
+    assert page.count('<script type="application/json" class="trace">') > 6
+    assert "pure_inertia: 4 of 12 missed" in page
+    written = json.loads((gate / "map.json").read_text(encoding="utf-8"))
+    assert {cell["telling"] for cell in written["cells"]} == {None, "scatter"}
+    recordings = [item for cell in written["cells"] for item in cell["recordings"]]
+    assert len(recordings) == 24 and all(item["recording"].endswith(".csv") for item in recordings)
     assert (gate / "map.png").read_bytes().startswith(b"\x89PNG")
     assert "2 positions from 0.3 to 1.2 m" in done.out
     again = command("coverage", gate / "coverage.toml", "--json", "--detectors", "gm")
@@ -70,6 +79,51 @@ def test_another_suffix_is_refused_before_anything_is_computed(gate: Path) -> No
     done = command("coverage", gate / "coverage.toml", "-o", gate / "map.docx")
     assert done.status == 2
     assert not (gate / "injected_coverage").exists()
+
+
+@pytest.mark.parametrize("name", ["map.html", "map.json", "map.png"])
+def test_a_file_of_another_program_is_kept(gate: Path, name: str) -> None:
+    (gate / name).write_text("mine", encoding="utf-8")
+    done = command("coverage", gate / "coverage.toml", "-o", gate / name)
+    assert done.status == 2
+    assert "--force" in done.err
+    assert (gate / name).read_text(encoding="utf-8") == "mine"
+    assert not (gate / "injected_coverage").exists()
+
+
+def test_the_file_that_is_read_is_never_overwritten(gate: Path) -> None:
+    path = gate / "coverage.json"
+    path.write_text((gate / "coverage.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    done = command("coverage", path, "-o", path, "--force")
+    assert done.status == 2
+    assert "is read by this command" in done.err
+
+
+def test_the_worst_contact_of_each_cell_has_a_trigger_plot(gate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Few traces are kept of the whole: the others are made.
+    for name in ("MOST_STRIKING", "MOST_SLOW", "MOST_SAMPLED"):
+        monkeypatch.setattr(f"cdtool.evaluation.traces.choice.{name}", 2)
+    monkeypatch.setattr("cdtool.workflows.coverage._ALL_TRACES_KEPT", 4)
+    done = cdtool.coverage(gate / "coverage.toml", detectors=["pi"], with_traces=True)
+    worst = {cell.recordings[0].recording for cells in done.map.cells.values() for cell in cells.values()}
+    assert set(done.traces) == worst
+    for cells in done.map.cells.values():
+        for cell in cells.values():
+            item = cell.recordings[0]
+            trace = done.traces[item.recording]
+            late = [panel.seen[0].late for panel in trace.panels if panel.seen[0].outcome == item.outcome]
+            assert item.is_missed or any(value == pytest.approx(1e-3 * item.latency_ms, abs=1e-6) for value in late)
+
+
+def test_logs_of_clearly_different_speed_split_the_map(gate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def by_log(speeds: Mapping[str, Sequence[float]]) -> dict[str, float | None]:
+        return {log: 0.1 * (place + 1) for place, log in enumerate(speeds)}
+
+    monkeypatch.setattr("cdtool.workflows.coverage.speed_classes", by_log)
+    done = command("coverage", gate / "coverage.toml", "--detectors", "gm")
+    assert done.status == 0
+    lines = [line.split()[1:5] for line in done.out.splitlines() if line.startswith("momentum ")]
+    assert lines[:2] == [["5", "0.1", "2", "0"], ["5", "0.2", "2", "0"]]
 
 
 def test_two_obstacles_that_begin_alike_make_no_map(gate: Path) -> None:

@@ -391,7 +391,7 @@ function makeTraceLegend(host) {
   }
   for (const words of [
     "coloured line: signal",
-    "coloured upright line: alarm, dashed where it is false",
+    "coloured vertical line: alarm, dashed where it is false",
     "shaded from an alarm until it is armed again: trigger on",
   ])
     make(host, "span", {}, words);
