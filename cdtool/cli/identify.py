@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from cdtool.workflows.identification.identifying_robot import LoadedRuns, RobotIdentification
 
 _DIVISIONS = ("machine", "day")
+# Error on unseen runs over the difference of equal strokes above which something is not in the model.
+_MUCH_MORE = 5.0
 
 
 def identify(
@@ -339,6 +341,11 @@ def _show_quality(joint: JointIdentification) -> None:
             f"force on unseen runs: {digits(float(f'{best.all:.3g}'))} {joint.units[1]} RMS, while moving "
             f"{digits(float(f'{best.moving:.3g}'))}{floor} ({validation.best.value})"
         )
+        if validation.repeats and best.moving > _MUCH_MORE * validation.floor > 0.0:
+            typer.echo(
+                f"the model leaves over {best.moving / validation.floor:.0f} times what equal strokes differ by: a "
+                "spring, a lag of the torque or friction along the travel is not in it, and its errors are too small"
+            )
     if joint.two_mass is not None:
         force, error = joint.two_mass.nominal_friction
         typer.echo(

@@ -42,6 +42,8 @@ _FEWEST_SAMPLES = 100
 _SETTLING_SAMPLES = 20
 # Structures are compared on so many samples, parameters fitted to at most this many.
 _COMPARED_SAMPLES, _MOST_SAMPLES = 25_000, 400_000
+# A command above its limit by more than the log's rounding has another limit, or none.
+_BEYOND_LIMIT = 1.005
 # The periods of runs that are fitted together differ by less than this share.
 _SAME_PERIOD = 0.02
 # A value reached by so many samples, all within the log's quantum, is a limit.
@@ -677,13 +679,20 @@ def _with_structure(fit: _Fit, source: _Source, settings: ControllerSettings) ->
     if not suggested and not _explains_all(fit):
         fit = _with_limit(fit, "slew_limit", _slew_candidates(fit, source))
     if "force_limit" not in fit.model.free and not _explains_all(fit):
-        fit = _with_limit(fit, "force_limit", _force_candidates(fit))
+        limited = _with_limit(fit, "force_limit", _force_candidates(fit))
+        fit = fit if source.is_command and _exceeds_its_limit(limited) else limited
         if "slew_limit" not in fit.model.free and "force_limit" in fit.model.free:
             fit = _with_limit(fit, "slew_limit", _slew_candidates(fit, source))
     fit = _with_delay(fit, source, settings.largest_delay)
     if 0.0 < fit.model.values["lag"] < 1.01 * _LEAST_LAG * fit.sections.period:
         fit = _OutputError(fit.sections, fit.model.without("lag")).fit(15)
     return _with_offset(fit)
+
+
+def _exceeds_its_limit(fit: _Fit) -> bool:
+    """Whether the logged command is larger than the force limit of the fit: then it has no such limit."""
+    limit = fit.model.values["force_limit"] if "force_limit" in fit.model.free else math.inf
+    return _largest(fit.sections.output) > _BEYOND_LIMIT * limit
 
 
 def _with_offset(fit: _Fit) -> _Fit:
