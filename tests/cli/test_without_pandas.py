@@ -46,7 +46,7 @@ commands = [
     ("simulate", "arm", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", folder / "arm"),
     ("study", "sensors", "-m", machine),
     ("identify", *sorted(folder.glob("free/*.csv")), "-m", machine, "-o", folder / "identified.toml"),
-    ("inject", folder / "inject.toml", "-o", folder / "injected"),
+    ("inject", folder / "inject.toml", "-o", folder / "crash_tests"),
     ("coverage", folder / "inject.toml", "-o", folder / "coverage.png"),
 ]
 print(json.dumps([(" ".join(map(str, item[:2])), cdtool(*item).status, "pandas" in sys.modules) for item in commands]))

@@ -20,6 +20,7 @@ import dataclasses
 import doctest
 import inspect
 import re
+import shutil
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -237,7 +238,7 @@ def run(tests: list[doctest.DocTest]) -> str:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A fresh folder that looks like a checkout to an example."""
     (tmp_path / "docs").mkdir()
-    (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")
+    shutil.copytree(ROOT / "sample_logs", tmp_path / "sample_logs")  # commands may write beside a benchmark file
     (tmp_path / "docs" / "examples").symlink_to(ROOT / "docs" / "examples")
     monkeypatch.chdir(tmp_path)
     return tmp_path
