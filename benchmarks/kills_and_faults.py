@@ -11,7 +11,7 @@ belongs to it (results and traces, a converted log and its machine file), nothin
 documented one: 2 with one line "error: ...", 143, 130.
 
 python benchmarks/kills_and_faults.py                                        # 500 and 500
-python benchmarks/kills_and_faults.py --kills 8 --faults 7 --share 1/2     # as in CI, with 2/2
+python benchmarks/kills_and_faults.py --kills 5 --faults 5 --share 1/3     # as in CI, with 2/3 and 3/3
 """
 
 from __future__ import annotations

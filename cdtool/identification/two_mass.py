@@ -46,8 +46,8 @@ _LEAST_SHARE = 0.01
 # The friction's rise is below a speed that a start passes in a few samples: it is given, not fitted [m/s, rad/s].
 _STRIBECK_SHARE = 0.1
 _AT_BOUND = 1.02
-# A drive is as good as rigid if its oscillation lasts so many periods of the log, and its stiffness cannot be distinguished
-# above this share of that.
+# A drive is as good as rigid if its oscillation lasts so many periods of the log, and its stiffness does not show above
+# this share of that.
 _PERIODS_OF_RIGID, _MOST_OF_RIGID = 10.0, 0.3
 # The cost of the rigid drive over that of the elastic one below which the elasticity does not show.
 _CLEARLY_WORSE = 1.5
