@@ -277,7 +277,7 @@ def _difference(
         raise RecordingError(
             f"the contact at {start:.3f} s changes nothing in the model", "its obstacle or its drive never acts"
         )
-    separation = _separation(time, force)
+    separation = separation_time(time, force)
     free_wind_up, wind_up = (float(np.max(np.abs(item["wind_up"]))) for item in (free, hit))
     until = min(start + RELIABLE_FOR, separation)
     doubts = {
@@ -364,7 +364,7 @@ def _measured_speed(model: AxisModel, rows: Mapping[str, FloatArray], period: fl
     return first_order_low_pass(first_order_low_pass(steps, constant, period), constant, period)
 
 
-def _separation(time: FloatArray, force: FloatArray) -> float:
+def separation_time(time: FloatArray, force: FloatArray) -> float:
     """Return when the force first falls to nothing after the contact [s]; infinite if it does not."""
     peak = np.maximum.accumulate(force)
     lost = (peak > 0.0) & (force <= _SEPARATED * peak)

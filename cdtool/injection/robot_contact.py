@@ -18,7 +18,7 @@ from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import AxisRun
 from cdtool.injection.assumption import Assumption, ControllerReaction, assumptions_of
-from cdtool.injection.axis_contact import RELIABLE_FOR, Doubt, InjectedContact
+from cdtool.injection.axis_contact import RELIABLE_FOR, Doubt, InjectedContact, separation_time
 from cdtool.injection.channel_change import ChannelChange
 from cdtool.recording import BoolArray, FloatArray
 from cdtool.robot_model.parameters import RobotModel, Vector, point_in_joint
@@ -41,8 +41,6 @@ _STIFF_SHARE, _STIFF_PERIOD = 0.2, 1e-3
 _ALONG_PLANE, _STANDS = 0.02, 1e-3
 # Further, or faster, than known: by more than the error of a simulation.
 _BEYOND = 1.05
-# The point has lost the contact when the force is below this share of the peak so far.
-_SEPARATED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -306,7 +304,7 @@ def _difference(
         raise RecordingError(
             f"the contact at {start:.3f} s changes nothing in the model", "its obstacle or its drives never act"
         )
-    separation = _separation(time, force)
+    separation = separation_time(time, force)
     until = min(start + RELIABLE_FOR, separation)
     reliable = time <= until
     doubts = {
@@ -387,10 +385,3 @@ def _rises_beyond(model: RobotModel, hit: RobotMotion, reliable: BoolArray) -> b
         math.isinf(controller.slew_limit) and 0.0 < _BEYOND * controller.observed_slope < own
         for controller, own in zip(_controllers(model), highest, strict=True)
     )
-
-
-def _separation(time: FloatArray, force: FloatArray) -> float:
-    """Return when the force first falls to nothing after the contact [s]; infinite if it does not."""
-    peak = np.maximum.accumulate(force)
-    lost = (peak > 0.0) & (force <= _SEPARATED * peak)
-    return float(time[np.argmax(lost)]) if lost.any() else math.inf

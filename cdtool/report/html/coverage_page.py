@@ -7,16 +7,12 @@ this script and this style, by their hashes.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +24,7 @@ from cdtool.plain_text import counted, digits
 from cdtool.report.csv_text import csv_lines
 from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.plots import css_colour
+from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json
 from cdtool.report.html.traces import HEIGHTS, trace_data
 from cdtool.report.model import AXES, NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number, spoken
@@ -35,14 +32,7 @@ from cdtool.report.plots.style import look_of
 from cdtool.report.table import Cell, Column, Table, count_cell, name_cell, number_cell, tabulate
 from cdtool.workflows.coverage import Coverage
 
-if TYPE_CHECKING:
-    from jinja2 import Template
-    from markupsafe import Markup
-
-_FOLDER = Path(__file__).with_name("page_files")
 _SCRIPTS = ("scales.js", "chart.js", "trace.js", "tables.js", "coverage.js")
-# JSON inside a page must not end its script element, nor its line where a script is read.
-_ESCAPES = str.maketrans({character: f"\\u{ord(character):04x}" for character in "<>&\u2028\u2029"})
 # Colours of the style sheet, pale for fast to dark for slow, on a logarithmic scale that all maps share.
 _LEVELS = 10
 # All trigger plots together [characters of JSON]; the page stays below 5 MB.
@@ -112,15 +102,14 @@ def coverage_html(done: Coverage) -> str:
     made = done.map
     scale, numbers = _Scale.of(made), _numbers(made)
     traces = _traces(done)
-    style, script = _read("report.css") + _read("coverage.css"), "\n".join(_read(name) for name in _SCRIPTS)
+    style, script = page_part("report.css") + page_part("coverage.css"), "\n".join(page_part(name) for name in _SCRIPTS)
     missed, telling = made.missed(), made.most_telling(_MOST_TELLING)
-    return _template().render(
-        policy=f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; img-src data:; "
-        "base-uri 'none'; form-action 'none'",
+    return page_template("coverage.html.j2").render(
+        policy=content_policy(style, script),
         style=Markup(style),
         script=Markup(script),
-        data=_json(_data(made, list(traces))),
-        traces=[_json(item) for item in traces.values()],
+        data=script_json(_data(made, list(traces))),
+        traces=[script_json(item) for item in traces.values()],
         scope=_scope(done),
         headline=_headline(made),
         tone=_tone(made),
@@ -411,34 +400,3 @@ def _words(contact: CellContact, speed_unit: str) -> list[str]:
     force = f"{number(contact.force_n)} N" if math.isfinite(contact.force_n) else NOTHING
     speed = f"{number(contact.speed)} {speed_unit}" if math.isfinite(contact.speed) else NOTHING
     return [outcome, force, speed, visible(spoken(contact.assumption)) or NOTHING]
-
-
-def _hash(text: str) -> str:
-    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
-
-
-def _json(values: Any) -> Markup:
-    """Return strict JSON that may be part of a script element; its texts are plain already."""
-    from markupsafe import Markup
-
-    text = json.dumps(values, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-    return Markup(text.translate(_ESCAPES))
-
-
-@cache
-def _read(name: str) -> str:
-    return (_FOLDER / name).read_text(encoding="utf-8")
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
-
-    def harmless(value: object) -> object:
-        return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
-
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, finalize=harmless, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.from_string(_read("coverage.html.j2"))

@@ -5,13 +5,10 @@ Text from logs and files is escaped by the template. A content security policy a
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING
 
 from cdtool.evaluation.results import RecordingFinding, Skipped
@@ -20,6 +17,7 @@ from cdtool.plain_text import counted
 from cdtool.report.html.identification_section import PageSection, images_of
 from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.robot_identification_sections import robot_sections
+from cdtool.report.html.self_contained import content_policy, page_part, page_template
 from cdtool.report.identification_words import (
     listed_numbers,
     short_number,
@@ -43,10 +41,8 @@ from cdtool.workflows.identification.identifying import IdentifiedMachine, Joint
 from cdtool.workflows.identification.machine_update import MachineChange
 
 if TYPE_CHECKING:
-    from jinja2 import Template
     from matplotlib.figure import Figure
 
-_FOLDER = Path(__file__).with_name("page_files")
 # The most machines with a figure, those that changed first: each takes 150 KB.
 _MOST_FIGURES = 40
 
@@ -341,26 +337,6 @@ def _machines_table(fleet: FleetIdentification) -> Table:
 def _rendered(page: IdentificationPage) -> str:
     from markupsafe import Markup
 
-    style = _read("report.css") + "img {\n  max-width: 100%;\n  height: auto;\n  background: #ffffff;\n}\n"
-    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-    policy = f"default-src 'none'; style-src 'sha256-{digest}'; img-src data:; base-uri 'none'; form-action 'none'"
-    return _template().render(page=page, style=Markup(style), policy=policy, classes=classes)
-
-
-@cache
-def _read(name: str) -> str:
-    return (_FOLDER / name).read_text(encoding="utf-8")
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
-
-    def harmless(value: object) -> object:
-        return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
-
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, finalize=harmless, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.from_string(_read("identification.html.j2"))
+    style = page_part("report.css") + "img {\n  max-width: 100%;\n  height: auto;\n  background: #ffffff;\n}\n"
+    template = page_template("identification.html.j2")
+    return template.render(page=page, style=Markup(style), policy=content_policy(style), classes=classes)
