@@ -86,7 +86,8 @@ def test_objects_that_the_caller_has_left_out_of_garbage_collection_stay_left_ou
     try:
         before = gc.get_freeze_count()
         assert list(in_order(doubled, range(3), 3)) == [0, 2, 4]
-        assert gc.get_freeze_count() == before
+        # A few of them may have ended meanwhile: those that earlier tests still held.
+        assert 0.99 * before < gc.get_freeze_count() <= before
     finally:
         gc.unfreeze()
 
