@@ -44,6 +44,8 @@ class Missing(Enum):
     SLOWER_MOTION = "slow motion, below the speed at which the friction falls"
     HIGHER_RATE = "a higher sampling rate"
     POSITION = "the position channel"
+    FINER_MOTION = "a speed or position channel with less noise or finer steps"
+    OTHER_CONTROLLER = "references of a P or PI speed controller, alone or under a P position controller"
     TORQUE_FILTER = "the time constant of the torque's low-pass in [model.sensors]"
 
 

@@ -37,6 +37,10 @@ _ROUNDING = 1e-12
 # The sign of a speed is unknown below this share of the usual highest speed and this many standard deviations of its
 # noise.
 _UNKNOWN_SHARE, _UNKNOWN_DEVIATIONS = 0.005, 4.0
+# Noise hides the motion where the sign is unknown up to this share of the usual highest speed.
+_HIDDEN_SHARE = 0.5
+# A travel is motion if it is this many times what the noise alone can look like.
+_TRAVEL_SEEN = 3.0
 # An equation is used if at most this share of its weight falls on samples whose sign of speed is unknown.
 _UNKNOWN_WEIGHT = 0.1
 # A stroke whose highest speed is below this share of the usual highest speed is an oscillation at rest.
@@ -60,6 +64,24 @@ class Loss(Enum):
     SQUARES = "squares"
     HUBER = "Huber"
     SOFT_L1 = "soft L1"
+
+
+class LagForm(Enum):
+    """How a channel lags: through a first-order low-pass, or by a pure delay."""
+
+    LOW_PASS = "low-pass"
+    DELAY = "delay"
+
+
+@dataclass(frozen=True)
+class TorqueLag:
+    """The lag of the logged torque behind the true one [s]; 0 for none."""
+
+    time: float = 0.0
+    form: LagForm = LagForm.LOW_PASS
+
+
+NO_LAG = TorqueLag()
 
 
 class LowPass:
@@ -129,6 +151,19 @@ def _convolved(signal: FloatArray, weights: FloatArray) -> FloatArray:
     return result
 
 
+def shifted(signal: FloatArray, samples: float) -> FloatArray:
+    """Return the signal (n,) that many samples, or parts of one, earlier; NaN where it is not known."""
+    before = math.floor(samples)
+    share = samples - before
+    index = np.arange(len(signal)) + before
+    first = np.where((index >= 0) & (index < len(signal)), signal[np.clip(index, 0, len(signal) - 1)], np.nan)
+    if share == 0.0:
+        return np.asarray(first, dtype=np.float64)
+    index += 1
+    after = np.where((index >= 0) & (index < len(signal)), signal[np.clip(index, 0, len(signal) - 1)], np.nan)
+    return np.asarray((1.0 - share) * first + share * after, dtype=np.float64)
+
+
 def white_noise(signal: FloatArray) -> float:
     """Return the standard deviation of the white noise of a smooth signal, from its fourth differences.
 
@@ -156,12 +191,13 @@ class FilteredRun:
     `inner_speed` is the speed from a low-pass of half the length: friction is a function of it, before the low-pass.
     `reference_speed` and `reference_acceleration` are filtered like the measured ones; None without a reference.
     `inner_reference_speed` likewise. `unknown_speed` [m/s, rad/s]: below it the sign of the speed is unknown.
-    `position` is the measured one, or the integral of the speed.
+    `position` is the measured one, or the integral of the speed. `force_slope`: the derivative of `force` [N/s, N m/s].
     """
 
     run: AxisRun
     low_pass: LowPass
     force: FloatArray
+    force_slope: FloatArray
     acceleration: FloatArray
     speed: FloatArray
     position: FloatArray
@@ -178,6 +214,15 @@ class FilteredRun:
         if self.unknown_speed <= 0.0:
             return np.sign(self.inner_speed)
         return np.clip(self.inner_speed / self.unknown_speed, -1.0, 1.0)
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether the axis moves, but the noise of its speed hides in which direction."""
+        known = self.position[np.isfinite(self.position)]
+        travel = float(np.ptp(known)) if len(known) else 0.0
+        seen_as_rest = self.unknown_speed * self.low_pass.reach * self.run.period
+        is_moving = travel > _TRAVEL_SEEN * seen_as_rest
+        return is_moving and self.unknown_speed >= _HIDDEN_SHARE * _usual_highest(self.inner_speed)
 
     @cached_property
     def reference_sign(self) -> FloatArray | None:
@@ -266,12 +311,15 @@ def _usual_highest(speed: FloatArray) -> float:
     return float(np.quantile(known, 0.95)) if len(known) else 0.0
 
 
-def filter_run(run: AxisRun, corner: float, unknown_speed: float | None = None) -> FilteredRun:
+def filter_run(
+    run: AxisRun, corner: float, unknown_speed: float | None = None, torque_lag: TorqueLag = NO_LAG
+) -> FilteredRun:
     """Return a run's channels through a low-pass of `corner` [Hz].
 
     Speed and acceleration come from the measured position, or from the speed if the position is missing or is
     its integral. `unknown_speed` [m/s, rad/s]: below it the sign is unknown; by default 0.5 % of the usual highest
-    speed, or 4 standard deviations of the speed's noise. Raises RecordingError without position and speed.
+    speed, or 4 standard deviations of the speed's noise. `torque_lag` is undone: F + lag F' for a low-pass, a shift
+    for a delay. Raises RecordingError without position and speed.
     """
     low_pass, inner = LowPass(corner, run.period), LowPass(2.0 * corner, run.period)
     by_position = run.position is not None and ("position" not in run.derived or run.speed is None)
@@ -295,10 +343,16 @@ def filter_run(run: AxisRun, corner: float, unknown_speed: float | None = None) 
     position = run.position
     if position is None:
         position = np.cumsum(np.nan_to_num(source)) * run.period
+    force, slope, curvature = low_pass.value(run.torque), low_pass.slope(run.torque), low_pass.curvature(run.torque)
+    if torque_lag.form is LagForm.LOW_PASS:
+        force, slope = force + torque_lag.time * slope, slope + torque_lag.time * curvature
+    else:
+        force, slope = (shifted(item, torque_lag.time / run.period) for item in (force, slope))
     return FilteredRun(
         run,
         low_pass,
-        low_pass.value(run.torque),
+        force,
+        slope,
         acceleration,
         speed,
         low_pass.value(position),

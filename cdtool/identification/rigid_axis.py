@@ -15,10 +15,12 @@ from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import Estimate, IdentificationError, Identified, Method, Missing, NotIdentifiable
 from cdtool.identification.excitation import SPEEDS_NEEDED, Excitation, measure_excitation
 from cdtool.identification.filtered_regression import (
+    NO_LAG,
     FilteredRun,
     IntArray,
     LinearFit,
     Loss,
+    TorqueLag,
     block_covariance,
     filter_run,
     fit_linear,
@@ -31,6 +33,7 @@ from cdtool.identification.friction_curve import (
     profile_covariance,
     speed_edges,
 )
+from cdtool.identification.torque_lag import MotionColumns, apparent_lag, best_lag
 from cdtool.recording import BoolArray, FloatArray
 
 # Fewer equations than this identify nothing.
@@ -47,6 +50,9 @@ _STRIBECK_SHARES = (0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 _RESOLVED = 1.1
 # The weight of the difference of two neighbouring knots per equation: it only matters where no equation is.
 _KNOT_WEIGHT = 1e-4
+# The form of an identified lag of the torque is a guess: this share of what it changes in the mass [-] is an error, and
+# this share of what a lag that is not certain would change.
+_LAG_FORM, _LAG_LEFT = 0.25, 0.5
 # The most folds of a cross-validation.
 _MOST_FOLDS = 8
 # A sample moves for the cross-validation above this share of the usual highest speed.
@@ -67,7 +73,8 @@ class RigidAxisSettings:
     noisy. Without references the instruments are the measured signals, delayed. `stribeck`: fit static friction and
     Stribeck speed too; the other parameters then belong to them. `prediction`: the friction of `predict_force`; None is
     the one with the smallest error in cross-validation, or COULOMB_VISCOUS without it. `rotary`: the units of the
-    estimates. `seed`: of the random friction profiles of the standard errors.
+    estimates. `seed`: of the random friction profiles of the standard errors. `torque_filter_time` [s]: of the low-pass
+    through which the torque was logged, 0 for none; None if it is not known: a lag that the runs show is then undone.
     """
 
     low_pass_hz: float = 20.0
@@ -80,6 +87,7 @@ class RigidAxisSettings:
     rotary: bool = False
     joint: int = 0
     seed: int = 0
+    torque_filter_time: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +175,8 @@ class RigidAxisFit:
     `identified`: per parameter an estimate or what is missing. `total_mass` [kg, kg m2] with its standard error: motor
     and load. `levels`: per direction. `friction_curve`: the whole friction over signed speed; `position_curves`: the
     residual over position, per direction (1, -1). `cross_validation` is None with a single stroke, or if not wanted.
+    `torque_lag`: behind the motion, stated or found; the force of residuals and predictions is
+    without it.
     """
 
     identified: Identified
@@ -181,6 +191,7 @@ class RigidAxisFit:
     cross_validation: CrossValidation | None
     prediction: PredictionModel = field(repr=False)
     settings: RigidAxisSettings
+    torque_lag: TorqueLag = NO_LAG
 
 
 def identify_rigid_axis(
@@ -202,7 +213,8 @@ def identify_rigid_axis(
         `identified` has in section "machine" `load_mass` (total minus motor), `viscous_friction`, `coulomb_friction`
         (mean of the directions) and `constant_force`, which includes half the difference of the directions; in section
         "model.friction" `coulomb_forward` and `coulomb_backward` with the whole difference, for an offset of 0, and
-        with `stribeck` set also `static` and `stribeck_speed`.
+        with `stribeck` set also `static` and `stribeck_speed`; in section "model.sensors" `torque_filter_time`, if it
+        is not stated and the torque lags the motion.
 
     Raises
     ------
@@ -222,25 +234,38 @@ def identify_rigid_axis(
     * The viscous friction needs three speeds. With fewer, neither it nor the Coulomb friction is identifiable; the
       mass is then the middle between no viscous friction and the best one, and half the difference is in its error.
     * Standard errors: jackknife over strokes plus random friction profiles of the residuals' spectrum.
-    * Fails: a drive that winds up while it accelerates (its mass is some percent wrong); a torque channel that lags
-      the motion by a noticeable part of the low-pass.
+    * A torque that lags the motion is found by `torque_lag.apparent_lag` and undone, unless the acceleration is too
+      noisy to show it; a quarter of what this changes in the mass is in its error.
+    * Fails: a drive that winds up while it accelerates (its mass is some percent wrong).
     """
     if not runs:
         raise IdentificationError("no runs", "give at least one impact-free recording")
-    filtered = [filter_run(run, settings.low_pass_hz, settings.unknown_speed) for run in runs]
+    filtered = _filtered(runs, settings, TorqueLag(settings.torque_filter_time or 0.0))
     excitation = measure_excitation(filtered)
     equations = _equations(filtered, excitation, settings)
     if len(equations.force) < _FEWEST_EQUATIONS:
+        hidden = [run for run in filtered if run.is_hidden]
+        if len(hidden) == len(filtered):
+            raise IdentificationError(
+                f"{runs[0].name}: noise or steps of speed or position hide speeds below {hidden[0].unknown_speed:.3g} "
+                f"{_units(settings).speed}, and the axis is never faster",
+                "map a finer channel, or log faster motion",
+            )
         raise IdentificationError(
             f"{runs[0].name}: hardly any motion ({len(equations.force)} usable equations, "
             f"{excitation.moving_time:.3g} s in {len(runs)} recordings)",
             f"identification needs at least {_FEWEST_EQUATIONS}: recordings in which the axis moves",
         )
+    lag = _torque_lag(equations, excitation, settings)
+    if lag.is_found:
+        filtered = _filtered(runs, settings, lag.lag)
+        equations = _equations(filtered, excitation, settings)
     solution = _with_noise_error(_solve(equations, excitation, settings), excitation)
+    solution = replace(solution, mass_error=math.hypot(solution.mass_error, lag.mass_error))
     validation, prediction = _predict(filtered, excitation, settings)
     residuals = _residuals(equations, solution)
     return RigidAxisFit(
-        Identified(*_answers(solution, excitation, motor_mass, settings)),
+        Identified(*_answers(solution, excitation, motor_mass, settings, lag)),
         solution.mass,
         solution.mass_error,
         solution.levels,
@@ -252,6 +277,7 @@ def identify_rigid_axis(
         validation,
         prediction,
         settings,
+        lag.lag,
     )
 
 
@@ -270,7 +296,12 @@ def low_passed_force(fit: RigidAxisFit, run: AxisRun) -> FloatArray:
 
 
 def _as_fitted(fit: RigidAxisFit, run: AxisRun) -> FilteredRun:
-    return filter_run(run, fit.settings.low_pass_hz, fit.settings.unknown_speed)
+    (filtered,) = _filtered([run], fit.settings, fit.torque_lag)
+    return filtered
+
+
+def _filtered(runs: Sequence[AxisRun], settings: RigidAxisSettings, torque_lag: TorqueLag) -> list[FilteredRun]:
+    return [filter_run(run, settings.low_pass_hz, settings.unknown_speed, torque_lag) for run in runs]
 
 
 def _is_fast(run: FilteredRun) -> BoolArray:
@@ -372,11 +403,16 @@ def _instruments(run: FilteredRun, columns: FloatArray, method: Method | None) -
     return None
 
 
+def _is_noisy(excitation: Excitation) -> bool:
+    return excitation.acceleration_noise > _NOISY * excitation.acceleration
+
+
 def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings: RigidAxisSettings) -> _Equations:
     columns = [_columns(run.acceleration, run.speed, run.low_pass.value(run.sign)) for run in filtered]
     have_reference = all(run.reference_speed is not None for run in filtered)
-    is_noisy = excitation.acceleration_noise > _NOISY * excitation.acceleration
-    preferred = Method.INSTRUMENTAL_VARIABLES if have_reference or is_noisy else Method.LEAST_SQUARES
+    preferred = Method.LEAST_SQUARES
+    if have_reference or _is_noisy(excitation):
+        preferred = Method.INSTRUMENTAL_VARIABLES
     method = settings.method or preferred
     if method is Method.INSTRUMENTAL_VARIABLES and not have_reference:
         filtered = [replace(run, reference_speed=None, inner_reference_speed=None) for run in filtered]
@@ -412,6 +448,36 @@ def _equations(filtered: Sequence[FilteredRun], excitation: Excitation, settings
     )
 
 
+@dataclass(frozen=True)
+class _LagAnswer:
+    """The lag of the torque, stated or found, and the standard error of the mass that comes from it."""
+
+    lag: TorqueLag
+    mass_error: float = 0.0
+    is_found: bool = False
+
+
+def _torque_lag(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _LagAnswer:
+    stated = _LagAnswer(TorqueLag(settings.torque_filter_time or 0.0))
+    if _is_noisy(excitation) or Missing.ACCELERATION in excitation.missing:
+        return stated
+    chosen = _chosen_columns(excitation)
+    motions = [
+        MotionColumns(run, _columns(run.acceleration, run.speed, run.low_pass.value(run.sign))[:, chosen], rows)
+        for run, rows in zip(equations.filtered, equations.rows, strict=True)
+    ]
+    try:
+        apparent = apparent_lag(motions, equations.block)
+        if settings.torque_filter_time is not None or not apparent.is_certain:
+            return replace(stated, mass_error=_LAG_LEFT * abs(apparent.mass_change))
+        lag = best_lag(motions)
+    except IdentificationError:
+        return stated
+    # The mass is changed by the lag that was found, in proportion to the part of it that the least squares see.
+    change = apparent.mass_change * max(lag.time / apparent.time, 1.0)
+    return _LagAnswer(lag, _LAG_FORM * abs(change), is_found=True)
+
+
 @dataclass(frozen=True, eq=False)
 class _Solution:
     """The fit whose coefficients are reported: mass, viscous if `has_viscous`, Coulomb, and constant if two-way."""
@@ -436,12 +502,18 @@ class _Solution:
 _NAMES = ("mass", "viscous", "coulomb", "constant")
 
 
+def _chosen_columns(excitation: Excitation) -> list[int]:
+    """Return which of the columns `_NAMES` describe the motion and do not depend on each other."""
+    chosen = [0, 1, 2] if len(excitation.speeds) >= SPEEDS_NEEDED else [0, 2]
+    return chosen if excitation.is_one_way else [*chosen, 3]
+
+
 def _solve(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _Solution:
     base = (0, 1, 2) if excitation.is_one_way else (0, 1, 2, 3)
     if len(excitation.speeds) >= SPEEDS_NEEDED:
         with_stribeck = _with_stribeck(equations, base, excitation, settings) if settings.stribeck else None
         return with_stribeck or _solution(equations, base, settings)
-    without = _solution(equations, tuple(item for item in base if item != 1), settings)
+    without = _solution(equations, _chosen_columns(excitation), settings)
     try:
         whole = _solution(equations, base, settings)
     except IdentificationError:
@@ -572,19 +644,28 @@ _LINEAR = _Units("kg", "N s/m", "N", "m/s")
 _ROTARY = _Units("kg m2", "N m s/rad", "N m", "rad/s")
 
 
+def _units(settings: RigidAxisSettings) -> _Units:
+    return _ROTARY if settings.rotary else _LINEAR
+
+
 def _answers(
-    solution: _Solution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings
+    solution: _Solution, excitation: Excitation, motor_mass: float, settings: RigidAxisSettings, lag: _LagAnswer
 ) -> tuple[tuple[Estimate, ...], tuple[NotIdentifiable, ...]]:
-    units = _ROTARY if settings.rotary else _LINEAR
+    units = _units(settings)
     answers = [
         _load_mass(solution, excitation, motor_mass, units),
         _viscous(solution, excitation, units),
         *_coulomb(solution, excitation, units),
         *(_stribeck(solution, excitation, units) if settings.stribeck else ()),
+        *((_torque_filter(lag, solution.method),) if lag.is_found else ()),
     ]
     estimates = tuple(replace(item, joint=settings.joint) for item in answers if isinstance(item, Estimate))
     others = tuple(replace(item, joint=settings.joint) for item in answers if isinstance(item, NotIdentifiable))
     return estimates, others
+
+
+def _torque_filter(lag: _LagAnswer, method: Method) -> Estimate:
+    return Estimate("model.sensors", "torque_filter_time", lag.lag.time, _LAG_FORM * lag.lag.time, "s", method)
 
 
 def _load_mass(
@@ -602,6 +683,8 @@ def _load_mass(
         "acceleration_noise": excitation.acceleration_noise,
     }
     missing = [Missing.ACCELERATION]
+    if _is_noisy(excitation):
+        missing.append(Missing.FINER_MOTION)
     if is_accelerated and load < error and _is_certain(solution.mass, error, 0.5 * _MASS_ERROR):
         # The total is known; that the motor alone has as much is a question of the motor's inertia.
         missing = [Missing.MOTOR_INERTIA]

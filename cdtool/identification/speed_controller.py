@@ -1015,11 +1015,13 @@ def _reported(
             f"{runs[0].name}: the controller's output falls where the speed error rises",
             "check the signs (scale) of torque, speed and references in [channels]",
         )
+    needed = Missing.ACCELERATION
     if not _is_explained(fit):
-        fitted = {}
+        # At a constant reference no structure can be told from another one.
+        fitted, needed = {}, Missing.OTHER_CONTROLLER if np.ptp(fit.sections.demand) > 0.0 else Missing.ACCELERATION
     for key in ("speed_gain", "integral_gain", "position_gain"):
         if key == "speed_gain" or key in model.free:
-            report.add(key, fitted.get(key), (Missing.ACCELERATION,), {"unexplained_share": _unexplained(fit)})
+            report.add(key, fitted.get(key), (needed,), {"unexplained_share": _unexplained(fit)})
     limits = (Missing.SATURATION,) if source.is_command else (Missing.SATURATION, Missing.REFERENCE_TORQUE)
     report.add("anti_windup_rate", fitted.get("anti_windup_rate"), limits, {})
     slope = observed_slope(runs, source.is_command, model.values["lag"])

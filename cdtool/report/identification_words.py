@@ -190,6 +190,14 @@ def _unknown_filter(item: NotIdentifiable, _: Excitation | None, __: str) -> str
     return f"the lag{size} between command and measured torque contains the unknown one of the torque's low-pass"
 
 
+def _other_controller(item: NotIdentifiable, _: Excitation | None, __: str) -> str:
+    left = percent(item.numbers.get("unexplained_share", math.nan))
+    return (
+        f"P and PI control, alone or under a position controller, leave {left} of the controller's output unexplained "
+        "(feed-forward, or references of another log?)"
+    )
+
+
 def _no_position(_: NotIdentifiable, __: Excitation | None, ___: str) -> str:
     return "no position channel: a delay of the speed channel looks like damping"
 
@@ -202,5 +210,6 @@ _REASONS: Mapping[Missing, _Reason] = {
     Missing.MORE_RECORDINGS: _too_uncertain,
     Missing.SATURATION: _no_limit,
     Missing.TORQUE_FILTER: _unknown_filter,
+    Missing.OTHER_CONTROLLER: _other_controller,
     Missing.POSITION: _no_position,
 }

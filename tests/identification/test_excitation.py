@@ -214,8 +214,9 @@ def test_weak_acceleration_is_answered_with_one_that_shows_the_mass():
     gentle = [replace(run, speed=None, reference_speed=None, position=noisy(run)) for run in slow]
     fit = identify_rigid_axis(gentle, 0.0, QUICK)
     missing = [item for item in fit.identified.not_identifiable if item.key == "load_mass"]
-    assert missing[0].missing == (Missing.ACCELERATION,)
-    (plan,) = plan_motions(missing, fit.excitation)
+    assert missing[0].missing == (Missing.ACCELERATION, Missing.FINER_MOTION)
+    plan, finer = plan_motions(missing, fit.excitation)
+    assert finer.missing is Missing.FINER_MOTION and not finer.speeds
     assert plan.acceleration >= 2.0 * fit.excitation.acceleration_noise
     added = suggested([replace(plan, speeds=(0.06,), travel=0.05)])
     more = [replace(run, position=noisy(run), speed=None, reference_speed=None) for run in added]

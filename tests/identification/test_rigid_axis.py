@@ -323,6 +323,14 @@ def test_constant_speed_does_not_show_the_mass():
     assert Missing.ACCELERATION in reason(identify_rigid_axis(runs, 0.0), "load_mass").missing
 
 
+def test_steps_of_the_position_that_hide_the_acceleration_are_named():
+    coarse = [replace(run, position=np.round(run.position, 3)) for run in clean()]
+    assert Missing.FINER_MOTION in reason(identify_rigid_axis(coarse, 0.0), "load_mass").missing
+    coarser = [replace(run, position=np.round(run.position, 2)) for run in clean()]
+    with pytest.raises(IdentificationError, match=r"hide speeds below .* m/s, and the axis is never faster"):
+        identify_rigid_axis(coarser, 0.0)
+
+
 def test_a_motor_heavier_than_everything_is_reported():
     assert reason(identify_rigid_axis(clean(), 120.0), "load_mass").missing == (Missing.MOTOR_INERTIA,)
 

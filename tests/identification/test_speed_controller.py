@@ -417,6 +417,15 @@ def test_a_standstill_with_a_noisy_torque_shows_no_gains(runs: list[AxisRun]) ->
     assert missing(fit, "speed_gain").missing == (Missing.ACCELERATION,)
 
 
+def test_references_of_another_motion_explain_nothing() -> None:
+    runs = [Loop().run(seed) for seed in range(3)]
+    turned = runs[1:] + runs[:1]
+    swapped = [replace(run, reference_speed=other.reference_speed) for run, other in zip(runs, turned, strict=True)]
+    fit = identify_controller(swapped)
+    assert fit.controller is None
+    assert missing(fit, "speed_gain").missing == (Missing.OTHER_CONTROLLER,)
+
+
 def test_unsteady_motion_without_references_shows_no_gains() -> None:
     fit = identify_controller([replace(Loop().run(seed), reference_speed=None) for seed in range(2)])
     assert fit.controller is None and "speed_gain" not in fit.identified

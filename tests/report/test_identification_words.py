@@ -87,6 +87,12 @@ def test_a_plan_states_its_numbers(plan: PlannedMotion, words: str) -> None:
             None,
             "the lag of 16.2 ms between command and measured torque contains the unknown one of the torque's low-pass",
         ),
+        (
+            (Missing.OTHER_CONTROLLER,),
+            {"unexplained_share": 0.81},
+            None,
+            "P and PI control, alone or under a position controller, leave 81 % of the controller's output unexplained",
+        ),
         ((Missing.POSITION,), {}, None, "no position channel: a delay of the speed channel looks like damping"),
         ((Missing.PAYLOAD,), {}, None, "not in these logs: runs with a known payload"),
         ((), {}, None, "these logs show only its sum with another parameter"),
