@@ -7,13 +7,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import UsageError
 from cdtool.evaluation.coverage_map import Cell, CellKey, CoverageMap
-from cdtool.files import replaced, resolved, write_text
+from cdtool.files import replaced, write_text
 from cdtool.foreign_files import FIGURES, Kind, refuse_inputs, refuse_other_kind
-from cdtool.plain_text import plain
-from cdtool.remote.remote_path import is_remote
 from cdtool.report.number_text import number
+from cdtool.report.output_names import check_output_names
 from cdtool.strict_json import strict_json
 from cdtool.workflows.coverage import Coverage
 
@@ -32,17 +30,8 @@ def check_coverage_files(targets: Sequence[Path], inputs: Sequence[Path], *, for
     A file that this command wrote may be rewritten; any other existing file is replaced only with `force`, and a file
     of `inputs`, which are read, never.
     """
+    check_output_names(targets, tuple(_KINDS))
     for target in targets:
-        if target.suffix.lower() not in _KINDS:
-            *others, last = _KINDS
-            raise UsageError(f"--output is '{plain(target)}'", f"the name must end in {', '.join(others)} or {last}")
-        if targets.count(target) > 1:
-            raise UsageError(f"--output is '{plain(target)}' twice", "give each name once")
-        resolved(target)
-        if not is_remote(target) and not target.parent.is_dir():
-            raise UsageError(
-                f"--output is '{plain(target)}': no folder {plain(target.parent)}", "create the folder first"
-            )
         refuse_other_kind(target, _KINDS[target.suffix.lower()], force=force)
     refuse_inputs(targets, inputs)
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cdtool.errors import UsageError
-from cdtool.files import replaced, resolved, write_text
+from cdtool.files import replaced, write_text
 from cdtool.foreign_files import Kind, refuse_inputs, refuse_other_kind
 from cdtool.plain_text import plain
-from cdtool.remote.remote_path import is_remote
+from cdtool.report.output_names import check_output_names
 from cdtool.strict_json import strict_json
 from cdtool.workflows.identification.fleet_identification import FleetIdentification
 from cdtool.workflows.identification.identification_outputs import JointEvidence, identification_summary
@@ -30,19 +30,9 @@ def check_identification_files(
     The machine file itself may be updated. A report or JSON of this command may be rewritten; any other existing file
     is replaced only with `force`. The results of a fleet are no machine file.
     """
-    suffixes = (PAGE, JSON) if of_fleet else (MACHINE, PAGE, JSON)
+    check_output_names(targets, (PAGE, JSON) if of_fleet else (MACHINE, PAGE, JSON))
     for target in targets:
         suffix = target.suffix.lower()
-        if suffix not in suffixes:
-            known = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
-            raise UsageError(f"--output is '{plain(target)}'", f"the name must end in {known}")
-        if targets.count(target) > 1:
-            raise UsageError(f"--output is '{plain(target)}' twice", "give each name once")
-        resolved(target)
-        if not is_remote(target) and not target.parent.is_dir():
-            raise UsageError(
-                f"--output is '{plain(target)}': no folder {plain(target.parent)}", "create the folder first"
-            )
         if suffix in _KINDS:
             refuse_inputs([target], [machine])
             refuse_other_kind(target, _KINDS[suffix], force=force)

@@ -63,6 +63,7 @@ def identification_html(done: IdentifiedMachine, evidence: Sequence[JointEvidenc
     """Return the page of one machine: changes, what is not identifiable, plan, errors and misfit."""
     missing = sum(len(joint.not_identifiable) for joint in done.joints)
     known = sum(len(joint.estimates) for joint in done.joints)
+    together = sum(len(joint.together) for joint in done.joints)
     sections = [PageSection("Changes", (_changes_table(done.changes),), note=_ORIGIN)]
     for joint, shown in zip(done.joints, evidence, strict=True):
         name = f"{joint.joint}: " if len(done.joints) > 1 else ""
@@ -72,7 +73,7 @@ def identification_html(done: IdentifiedMachine, evidence: Sequence[JointEvidenc
     return _rendered(
         IdentificationPage(
             f"Model parameters of {visible(done.machine)}",
-            f"{counted(known, 'value')} identified, {missing} not identifiable",
+            f"{counted(known, 'value')} identified, {together} known only together, {missing} not identifiable",
             f"From {counted(len(done.runs), 'impact-free run')}.",
             "unknown" if missing else "good",
             (done.machine, counted(len(done.runs), "run")),
