@@ -30,6 +30,8 @@ _CORNER = 0.2256
 _FOURTH_DIFFERENCE = math.sqrt(70.0)
 # The largest share of the largest differences that is motion rather than noise.
 _MOTION_SHARE = 0.05
+# Samples in which the noise is about the same.
+_NOISE_BLOCK = 400
 # A reference with fewer samples than this share of the run's is not used.
 _KNOWN_SHARE = 0.5
 # Rounding of a channel relative to its largest value [-].
@@ -167,21 +169,34 @@ def shifted(signal: FloatArray, samples: float) -> FloatArray:
 def white_noise(signal: FloatArray) -> float:
     """Return the standard deviation of the white noise of a smooth signal, from its fourth differences.
 
-    The largest differences are left out: they may be motion. Samples at rest, which repeat each other, do not count: an
-    encoder is only noisy while it moves. 0 with fewer than 10 samples. Noise that was filtered before it was logged is
-    underestimated.
+    It is the root mean square over blocks of the signal: noise may grow with the speed, as that of a jittered clock
+    does. In each block the largest differences are left out: they may be motion. Samples at rest, which repeat each
+    other, do not count: an encoder is only noisy while it moves. Every second sample counts too, since samples that are
+    interpolated between those of a jittered clock share their noise with the next one. 0 with fewer than 10 samples.
+    Noise that was filtered before it was logged is underestimated.
     """
+    return max(_noise_of(signal), _noise_of(signal[::2]))
+
+
+def _noise_of(signal: FloatArray) -> float:
     if len(signal) < 10:
         return 0.0
     steps = np.diff(signal)
     repeats = (steps[3:] == 0.0) & (steps[2:-1] == 0.0) & (steps[1:-2] == 0.0) & (steps[:-3] == 0.0)
     differences = np.abs(np.diff(signal, 4))
-    differences = np.sort(differences[np.isfinite(differences) & ~repeats])
+    differences = differences[np.isfinite(differences) & ~repeats]
     if len(differences) < 6:
         return 0.0
-    kept = differences[: max(int((1.0 - _MOTION_SHARE) * len(differences)), 1)]
+    blocks = np.array_split(differences, max(len(differences) // _NOISE_BLOCK, 1))
+    variances = [_trimmed_mean_square(block) for block in blocks]
+    lengths = [len(block) for block in blocks]
+    return math.sqrt(float(np.average(variances, weights=lengths))) / _FOURTH_DIFFERENCE
+
+
+def _trimmed_mean_square(differences: FloatArray) -> float:
+    kept = np.sort(differences)[: max(int((1.0 - _MOTION_SHARE) * len(differences)), 1)]
     # Without its largest 5 % the square of a normal variable has 0.759 of its mean.
-    return float(np.sqrt(np.mean(kept**2) / 0.759)) / _FOURTH_DIFFERENCE
+    return float(np.mean(kept**2)) / 0.759
 
 
 @dataclass(frozen=True, eq=False)

@@ -225,3 +225,19 @@ def test_block_standard_errors_cover_a_level_per_block():
         inside.append(abs(fit.coefficients[0] - 4.0) / error)
     assert np.mean(np.array(inside) < 1.0) >= 0.55
     assert np.mean(np.array(inside) < 2.0) >= 0.85
+
+
+def test_noise_that_grows_with_the_speed_counts_as_its_mean_power():
+    rng = np.random.default_rng(5)
+    level = np.repeat([1e-4, 1e-4, 1e-4, 8e-4], 1500)
+    signal = np.cumsum(np.full(len(level), 1e-3)) + level * rng.standard_normal(len(level))
+    assert white_noise(signal) == pytest.approx(math.sqrt(np.mean(level**2)), rel=0.1)
+
+
+def test_samples_between_those_of_a_jittered_clock_do_not_hide_the_noise():
+    rng = np.random.default_rng(6)
+    clock = np.arange(8000) * 2e-3
+    stamps = clock + rng.uniform(-1e-4, 1e-4, len(clock))
+    signal = np.interp(clock[1:-1] + 1e-3, stamps, 1.0 * clock)
+    # The mean of two neighbours, each with the error of its stamp times the speed of 1 m/s.
+    assert white_noise(signal) == pytest.approx(1e-4 / math.sqrt(3.0) / math.sqrt(2.0), rel=0.2)
