@@ -153,10 +153,14 @@ def entry_points(*, group: str) -> Iterable[EntryPoint]:
 
 def plugin_packages() -> dict[str, str]:
     """Return the installed packages that provide plug-ins, with their versions, for reports."""
+    from importlib import metadata
+
+    # Each call reads all installed packages: one for all kinds.
+    points = metadata.entry_points()
     found = {
         point.dist.name: point.dist.version
         for kind in ("detectors", "thresholds", "machines", "formats", "writers")
-        for point in entry_points(group=f"cdtool.{kind}")
+        for point in points.select(group=f"cdtool.{kind}")
         if point.dist is not None
     }
     return dict(sorted(found.items()))

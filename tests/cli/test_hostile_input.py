@@ -475,13 +475,10 @@ def test_a_full_standard_output_is_one_line_and_status_2():
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii", "latin-1", "utf-8:strict"])
 def test_characters_that_the_terminal_does_not_have_are_replaced(tmp_path, encoding):
     log = written(tmp_path / "Ω ☃ é.csv", LOG.read_bytes())
-    with command_server(environment={"PYTHONIOENCODING": encoding}) as server:
-        for arguments in (
-            ("info", log),
-            ("--help",),
-            ("list", "detectors"),
-            ("detect", log, "-m", GATE / "machine.toml", "-d", "gm", "--limit", 1000),
-        ):
+    detect = ("detect", log, "-m", GATE / "machine.toml", "-d", "gm", "--limit", 1000)
+    with command_server(*IMPORTS, environment={"PYTHONIOENCODING": encoding}) as server:
+        server.warm_up(*detect)
+        for arguments in (("info", log), ("--help",), ("list", "detectors"), detect):
             done = server.run(*arguments)
             assert done.err == "", done.err
             assert done.status == 0 and done.out

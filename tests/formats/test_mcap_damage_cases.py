@@ -31,22 +31,28 @@ SECONDS = 5.0  # processor time per bomb; checked by benchmarks/time_bounds.py
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the file of a case is written; all kernels are compiled."""
+    file = tmp_path_factory.mktemp("damage") / "case.mcap"
+    warm_up(file)
+    return file
+
+
 @pytest.mark.parametrize("first", range(0, COUNT, STEP))
-def test_a_damaged_file_yields_all_readable_messages_and_nothing_else_and_reports_every_loss(tmp_path, first):
-    warm_up(tmp_path / "case.mcap")
+def test_a_damaged_file_yields_all_readable_messages_and_nothing_else_and_reports_every_loss(path, first):
     failures = {
         f"{number} {case.name}": problems
         for number, case in enumerate(cases(SEED, STEP, first), start=first)
-        if (problems := faults(case, tmp_path / "case.mcap"))
+        if (problems := faults(case, path))
     }
     assert not failures
 
 
 @pytest.mark.parametrize("number", [1126, 1133], ids=["a data end before the data's end", "an index beyond any file"])
-def test_cases_of_another_seed_that_have_failed_before(tmp_path, number):
-    warm_up(tmp_path / "case.mcap")
+def test_cases_of_another_seed_that_have_failed_before(path, number):
     (case,) = cases(22, 1, number)
-    assert not faults(case, tmp_path / "case.mcap")
+    assert not faults(case, path)
 
 
 def test_every_kind_of_damage_is_among_the_cases():

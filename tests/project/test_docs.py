@@ -73,6 +73,9 @@ EXAMPLES = {
 }
 # Lines of shell blocks that set something up or take long: run by CI or by hand, not here.
 NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/")
+# Of the recordings that an example writes the later commands of its page get so many: each is learned from for every
+# other one. What the page says of all of them is checked by tests/whole_runs and benchmarks/robot_collisions.py.
+FEWER = {"docs/examples/robot_collisions.py": ("hits/hit_*.csv", 10)}
 
 _LINK = re.compile(r"\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 _FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
@@ -111,15 +114,24 @@ def run_command(line: str) -> Outcome:
     if words[0] == "cdtool":
         return cdtool(*words[1:])
     assert words[0] == "python" and words[1].startswith("docs/examples/"), f"this test cannot run: {line}"
-    kept = sys.argv
+    kept, status = sys.argv, 0
     sys.argv = words[1:]
     try:
         runpy.run_path(words[1], run_name="__main__")
     except SystemExit as end:
-        return Outcome(int(end.code or 0), "", "")
+        status = int(end.code or 0)
     finally:
         sys.argv = kept
-    return Outcome(0, "", "")
+    if words[1] in FEWER:
+        leave_fewer(*FEWER[words[1]])
+    return Outcome(status, "", "")
+
+
+def leave_fewer(pattern: str, count: int) -> None:
+    written = sorted(Path().glob(pattern))
+    assert len(written) > count, f"{pattern}: {len(written)} recordings"
+    for path in written[count:]:
+        path.unlink()
 
 
 def run_example(text: str, names: dict[str, object], page: str) -> None:

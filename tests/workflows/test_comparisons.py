@@ -23,12 +23,12 @@ KEYS = [(name, group) for name in ("momentum", "pure_torque") for group in ("sti
 
 @pytest.fixture(scope="module")
 def builds(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Results]:
-    """FEEKF and GM on the same 30 stiff and 30 soft impacts with a debounce of 9 and of 14 samples."""
+    """FEEKF and GM on the same 12 stiff and 12 soft impacts with a debounce of 9 and of 14 samples."""
     folder: Path = tmp_path_factory.mktemp("builds") / "gate"
-    simulate_gate(folder, {"free": 10, "stiff": 30, "soft": 30}, seed=77)
+    simulate_gate(folder, {"free": 10, "stiff": 12, "soft": 12}, seed=77)
     setup = read_benchmark_file(folder / "benchmark.toml")
     made = {count: replace(setup, activation=Activation(count)) for count in (9, 14)}
-    return {count: benchmark(item, detectors=["feekf", "gm"], jobs=2).results for count, item in made.items()}
+    return {count: benchmark(item, detectors=["feekf", "gm"]).results for count, item in made.items()}
 
 
 def test_five_more_samples_of_debounce_are_found_as_five_milliseconds(builds):
@@ -36,7 +36,7 @@ def test_five_more_samples_of_debounce_are_found_as_five_milliseconds(builds):
     assert found.verdict == "worse" and len(found.rows) == 4
     for row in found.rows:
         latency = row.question("latency_ms")
-        assert latency is not None and row.pairs == 30
+        assert latency is not None and row.pairs == 12
         assert (latency.outcome, latency.change.value) == ("worse", pytest.approx(5.0, abs=0.2))
         assert row.words.startswith("slower by 5.0 ms (5.0 to 5.0)")
     assert {(item.key, item.old, item.new) for item in found.changed} == {("debounce_samples", "9", "14")}

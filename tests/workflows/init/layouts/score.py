@@ -68,11 +68,12 @@ def score(layout: Layout, folder: Path, *, audited: bool = False) -> Score:
     try:
         with nullcontext() if audited else patch("cdtool.evaluation.synchronisation.audit.audit", return_value=()):
             text = init(log, folder / "machine.toml", force=True).text
-        known = _by_file_names(known, choose_format(log).columns(log).names)
+        values = tomllib.loads(text)
+        channels = values["channels"].get("mcap", values["channels"])
+        if not _drafted_columns(channels) <= known.keys():  # else the file need not be read once more
+            known = _by_file_names(known, choose_format(log).columns(log).names)
     except CdtoolError as fault:
         return Score(layout.name, tuple(expected), (), tuple(expected), (), (), (), str(fault))
-    values = tomllib.loads(text)
-    channels = values["channels"].get("mcap", values["channels"])
     order = _joint_order(channels, known)
     parts = {name: part for name, part in channels.items() if isinstance(part, dict)}
     faults = {name: _fault(name, part, known, order) for name, part in parts.items()}
@@ -112,6 +113,11 @@ def _columns_of(part: dict) -> list[str]:
         return [f"{part['topic']} {part['field']}"]
     listed = part.get("columns", [part.get("column")])
     return [str(column) for column in listed if column is not None]
+
+
+def _drafted_columns(channels: dict) -> set[str]:
+    parts = [part for part in channels.values() if isinstance(part, dict)]
+    return {column for part in parts for column in _columns_of(part)}
 
 
 def _joint_order(channels: dict, known: Mapping[str, Known]) -> list[str]:

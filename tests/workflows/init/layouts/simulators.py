@@ -118,16 +118,17 @@ def axis(
     touch [s]). `yields`: the drive stops its reference while it meets an obstacle, and goes on 0.3 s later.
     """
     n = len(xr)
-    plan_v, plan_a = speed_of(xr, dt), speed_of(speed_of(xr, dt), dt)
+    # Loops over samples are over Python's numbers: NumPy's single numbers are several times slower, and the same.
+    plan_x, plan_v, plan_a = (item.tolist() for item in (xr, speed_of(xr, dt), speed_of(speed_of(xr, dt), dt)))
     x, v = float(xr[0]), 0.0
     kp, kd = inertia * bandwidth**2, 2.0 * inertia * bandwidth
-    out = np.empty((n, 7))
+    out = []
     touched = [np.inf] * len(obstacles)
     integral, at, pace, blocked_until = 0.0, 0.0, 1.0, -1.0
     for i in range(n):
         now = i * dt
         k = min(int(at), n - 1)
-        ref, ref_v, ref_a = xr[k] + plan_v[k] * (at - k) * dt, plan_v[k] * pace, plan_a[k] * pace
+        ref, ref_v, ref_a = plan_x[k] + plan_v[k] * (at - k) * dt, plan_v[k] * pace, plan_a[k] * pace
         contact = 0.0
         for o, (where, direction, stiffness, damping, begin, hold) in enumerate(obstacles):
             deep = direction * (x - where)
@@ -142,16 +143,16 @@ def axis(
         drive = min(max(wanted, -limit), limit)
         if drive == wanted and contact == 0.0:
             integral += 0.25 * kp * bandwidth * (error - (1.0 - lead) * 2.0 / bandwidth * ref_v) * dt
-        a = (drive - gravity - coulomb * np.tanh(v / stiction) - viscous * v - contact) / inertia
+        a = (drive - gravity - coulomb * float(np.tanh(v / stiction)) - viscous * v - contact) / inertia
         v_next = v + a * dt
         # friction is stiff near rest: hold instead of chattering
         if abs(v) < stiction and abs(drive - gravity - contact) < coulomb and abs(ref_v) < 1e-9:
             v_next, a = v * 0.6, (v * 0.6 - v) / dt
-        out[i] = ref, ref_v, x, v, a, drive, contact
+        out.append((ref, ref_v, x, v, a, drive, contact))
         v = v_next
         x += v * dt
         at += pace
-    return Axis(np.arange(n) * dt, *out.T)
+    return Axis(np.arange(n) * dt, *np.array(out).T)
 
 
 def crossing(xr: Array, dt: float, where: float, direction: int, skip: int = 0) -> float:
@@ -163,12 +164,14 @@ def crossing(xr: Array, dt: float, where: float, direction: int, skip: int = 0) 
 
 def low_pass(x: Array, dt: float, corner: float) -> Array:
     """Return x through a first-order low-pass of `corner` Hz."""
-    k = 1.0 - np.exp(-2.0 * np.pi * corner * dt)
-    y = np.empty_like(x, dtype=float)
-    s = np.array(x[0], dtype=float)
-    for i in range(len(x)):
-        s = s + k * (x[i] - s)
-        y[i] = s
+    k = float(1.0 - np.exp(-2.0 * np.pi * corner * dt))
+    y = np.empty(x.shape)
+    for column, passed in zip(x.reshape(len(x), -1).T.tolist(), y.reshape(len(x), -1).T, strict=True):
+        s, kept = float(column[0]), []
+        for value in column:
+            s = s + k * (value - s)
+            kept.append(s)
+        passed[:] = kept
     return y
 
 
@@ -179,14 +182,15 @@ def quantised(x: Array, step: float) -> Array:
 
 def follow(ref: Array, dt: float, bandwidth: float) -> tuple[Array, Array, Array]:
     """Return position, speed and acceleration of joints that follow (n, J) references with a second-order lag."""
-    q, v = ref[0].astype(float), np.zeros(ref.shape[1])
-    vr = speed_of(ref, dt)
     out = np.empty((3, *ref.shape))
-    for i in range(len(ref)):
-        a = bandwidth**2 * (ref[i] - q) + 2.0 * bandwidth * (0.6 * vr[i] - v)
-        out[0, i], out[1, i], out[2, i] = q, v, a
-        v = v + a * dt
-        q = q + v * dt
+    for joint, (wanted, wanted_speed) in enumerate(zip(ref.T.tolist(), speed_of(ref, dt).T.tolist(), strict=True)):
+        q, v, passed = float(wanted[0]), 0.0, []
+        for x, xv in zip(wanted, wanted_speed, strict=True):
+            a = bandwidth**2 * (x - q) + 2.0 * bandwidth * (0.6 * xv - v)
+            passed.append((q, v, a))
+            v = v + a * dt
+            q = q + v * dt
+        out[:, :, joint] = np.array(passed).T
     return out[0], out[1], out[2]
 
 
