@@ -104,10 +104,13 @@ def read_bytes(
 
 
 def read_text(path: Path, error: type[CdtoolError], *, most: int = MOST_TEXT) -> str:
-    """Return the UTF-8 text of a regular file; raises `error` with the path."""
+    """Return the UTF-8 text of a regular file, without the mark that Windows editors begin it with.
+
+    Raises `error` with the path.
+    """
     hint = "give a UTF-8 text file"
     try:
-        text = read_bytes(path, error, most=most, hint=hint, missing="check the path").decode("utf-8")
+        text = read_bytes(path, error, most=most, hint=hint, missing="check the path").decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         raise error(f"{path}: is not UTF-8 text", hint) from fault
     return text.replace("\r\n", "\n").replace("\r", "\n")

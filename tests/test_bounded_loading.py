@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.bounded_loading import ContentError, parse_toml
+from cdtool.bounded_loading import ContentError, parse_toml, read_text
+from cdtool.errors import ConfigurationError
 
 PIECES = st.lists(st.sampled_from(['"', "'", '\\"', "\\\\", "\n", "a", " ", "#", "[", "]", '""', "''"]), max_size=12)
 
@@ -42,3 +43,9 @@ def test_a_text_that_tomllib_reads_is_never_refused(pieces):
 def test_a_text_that_does_not_end_is_refused_with_its_line():
     with pytest.raises(ContentError, match="line 2 is not terminated"):
         parse_toml('a = 1\nb = """' + '\\"' * 1000)
+
+
+def test_the_mark_at_the_start_of_a_windows_text_is_no_part_of_it(tmp_path):
+    file = tmp_path / "machine.toml"
+    file.write_bytes(b"\xef\xbb\xbf[machine]\r\n")
+    assert read_text(file, ConfigurationError) == "[machine]\n"

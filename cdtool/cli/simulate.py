@@ -38,6 +38,16 @@ FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed
 ReferenceOption = Annotated[
     bool, typer.Option("--reference/--no-reference", help="Also log the references: speed, and torque or position.")
 ]
+FrictionOption = Annotated[float, typer.Option("--friction", help="Factor of the load's friction: 1.2 is 20 % more.")]
+SpeedOption = Annotated[float, typer.Option("--speed", help="Factor of the nominal speed.")]
+MassOption = Annotated[float, typer.Option("--mass", help="Factor of the load's mass.")]
+CurrentOffsetOption = Annotated[float, typer.Option("--current-offset", help="Offset of the motor current [A].")]
+AccelerationOffsetOption = Annotated[
+    float, typer.Option("--acceleration-offset", help="Further offset of the accelerometers [m/s2].")
+]
+WarmingOption = Annotated[
+    float, typer.Option("--warming", help="Warming of the motor [K]: more current for the same torque.")
+]
 OutputOption = Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder.")]
 
 
@@ -51,6 +61,12 @@ def gate(
     seed: SeedOption = 1,
     file_format: FormatOption = "csv",
     reference: ReferenceOption = True,
+    friction: FrictionOption = 1.0,
+    speed: SpeedOption = 1.0,
+    mass: MassOption = 1.0,
+    current_offset: CurrentOffsetOption = 0.0,
+    acceleration_offset: AccelerationOffsetOption = 0.0,
+    warming: WarmingOption = 0.0,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the heavy sliding gate of chapter 5 of the thesis: recordings, machine.toml and benchmark.toml.
@@ -58,11 +74,15 @@ def gate(
     Example: cdtool simulate gate --free 14 --holdout 40 --stiff 30 --soft 30 --seed 1 -o gate
     """
     _check_format(file_format)
+    from cdtool.simulation.changed_machine import ChangedMachine
     from cdtool.simulation.gate_recordings import write_gate_recordings
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
+    changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
     with progress("simulating") as advance:
-        written = write_gate_recordings(output, counts, seed, file_format, advance, references=reference)
+        written = write_gate_recordings(
+            output, counts, seed, file_format, advance, references=reference, changed=changed
+        )
     _report(output, written, counts, seed, as_json)
 
 
@@ -77,6 +97,12 @@ def arm(
     seed: SeedOption = 1,
     file_format: FormatOption = "csv",
     reference: ReferenceOption = True,
+    friction: FrictionOption = 1.0,
+    speed: SpeedOption = 1.0,
+    mass: MassOption = 1.0,
+    current_offset: CurrentOffsetOption = 0.0,
+    acceleration_offset: AccelerationOffsetOption = 0.0,
+    warming: WarmingOption = 0.0,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the light robot arm of chapter 6 of the thesis: recordings, machine.toml and benchmark.toml.
@@ -85,11 +111,13 @@ def arm(
     """
     _check_format(file_format)
     from cdtool.simulation.arm_recordings import write_arm_recordings
+    from cdtool.simulation.changed_machine import ChangedMachine
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
+    changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
     with progress("simulating") as advance:
         written = write_arm_recordings(
-            output, counts, seed, 1 if trial == 1 else 2, file_format, advance, references=reference
+            *(output, counts, seed, 1 if trial == 1 else 2, file_format, advance), references=reference, changed=changed
         )
     _report(output, written, counts, seed, as_json)
 

@@ -49,6 +49,7 @@ class ArmParameters:
     # Drives
     motor_inertia: Pair = (1.5e-5, 1.5e-5)  # at the motor [kg m2]
     transmission_ratio: Pair = (1.0 / 60.0, 1.0 / 60.0)  # n, link angle per motor angle [rad/rad]
+    torque_constant: float = 0.05  # of the motors, whose torque is computed from their current [N m/A]
     soft_stiffness: float = 440.0  # up to `soft_travel` of wind-up [N m/rad]
     soft_travel: float = 0.003  # [rad]
     drive_stiffness: float = 800.0  # beyond it [N m/rad]

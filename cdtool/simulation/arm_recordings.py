@@ -14,6 +14,7 @@ from cdtool.errors import UsageError
 from cdtool.recording import Recording, Series
 from cdtool.simulation.arm_model import ArmRun, Array, simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters, Trial, require_trial
+from cdtool.simulation.changed_machine import ChangedMachine
 from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, without_references, write_folder
 from cdtool.units import UNITS
 from cdtool.workflows.keyword_options import by_keywords
@@ -98,6 +99,8 @@ class ArmRecordings:
         Parameters of the arm.
     references : bool, optional
         Log reference channels.
+    changed : ChangedMachine, optional
+        What has changed since the machine file was written; it is that of the unchanged arm.
     """
 
     counts: Mapping[str, int]
@@ -107,6 +110,7 @@ class ArmRecordings:
     progress: Callable[[int, int], None] | None = None
     parameters: ArmParameters | None = None
     references: bool = True
+    changed: ChangedMachine | None = None
 
 
 def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
@@ -140,13 +144,14 @@ def write_recordings_of(folder: Path, wanted: ArmRecordings) -> int:
     """
     seed, trial, references = wanted.seed, wanted.trial, wanted.references
     require_trial(trial)
-    arm = wanted.parameters or ArmParameters()
+    arm, changed = wanted.parameters or ArmParameters(), wanted.changed or ChangedMachine()
     if arm.encoder_counts < 1:
         raise UsageError(f"encoder_counts is {arm.encoder_counts}", "The logs hold counts: 1 or more per revolution.")
 
     def simulate(group: str, number: int) -> ArmRun:
         rng = np.random.default_rng([seed, trial, GROUPS.index(group), number])
-        return simulate_arm_run(arm, rng, trial, IMPACT_OF[group])
+        run = simulate_arm_run(changed.arm(arm), rng, trial, IMPACT_OF[group])
+        return changed.logged_arm(run, arm.torque_constant)
 
     settings = (
         f"# Made by cdtool simulate arm --trial {trial}. Paths are relative to this file.",

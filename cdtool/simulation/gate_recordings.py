@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cdtool.recording import Recording, Series
+from cdtool.simulation.changed_machine import ChangedMachine
 from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_run
 from cdtool.simulation.recording_folder import EPOCH_NS, GROUPS, IMPACT_OF, Bench, without_references, write_folder
 from cdtool.units import UNITS
+from cdtool.workflows.keyword_options import by_keywords
 
 __all__ = ["GROUPS", "as_recording", "gate_bench", "write_gate_recordings"]
 
@@ -51,21 +54,12 @@ def as_recording(run: GateRun, name: str, parameters: GateParameters) -> Recordi
     return Recording(name, name, ("gate",), channels)
 
 
-def write_gate_recordings(
-    folder: Path,
-    counts: Mapping[str, int],
-    seed: int,
-    file_format: str = "csv",
-    progress: Callable[[int, int], None] | None = None,
-    parameters: GateParameters | None = None,
-    references: bool = True,
-) -> int:
-    """Write recordings of a simulated sliding gate to a folder, with a machine file and a benchmark file.
+@dataclass(frozen=True)
+class GateRecordings:
+    """Which recordings of the gate to write.
 
     Parameters
     ----------
-    folder : Path
-        An empty or new folder.
     counts : mapping of str to int
         Number of recordings of each group: free, holdout (both impact-free), stiff, soft.
     seed : int
@@ -79,6 +73,28 @@ def write_gate_recordings(
         Parameters of the gate.
     references : bool, optional
         Log reference channels.
+    changed : ChangedMachine, optional
+        What has changed since the machine file was written; it is that of the unchanged gate.
+    """
+
+    counts: Mapping[str, int]
+    seed: int
+    file_format: str = "csv"
+    progress: Callable[[int, int], None] | None = None
+    parameters: GateParameters | None = None
+    references: bool = True
+    changed: ChangedMachine | None = None
+
+
+def write_recordings_of(folder: Path, wanted: GateRecordings) -> int:
+    """Write recordings of a simulated sliding gate to a folder, with a machine file and a benchmark file.
+
+    Parameters
+    ----------
+    folder : Path
+        An empty or new folder.
+    wanted : GateRecordings
+        Which recordings to write.
 
     Returns
     -------
@@ -99,13 +115,18 @@ def write_gate_recordings(
     >>> sorted(path.name for path in Path("mygate").iterdir())
     ['contacts.csv', 'machine.toml', 'stiff']
     """
-    gate = parameters or GateParameters()
+    new, changed = wanted.parameters or GateParameters(), wanted.changed or ChangedMachine()
+    gate = changed.gate(new)
 
     def simulate(group: str, number: int) -> GateRun:
-        rng = np.random.default_rng([seed, GROUPS.index(group), number])
-        return simulate_gate_run(gate, rng, IMPACT_OF[group])
+        rng = np.random.default_rng([wanted.seed, GROUPS.index(group), number])
+        return changed.logged_gate(simulate_gate_run(gate, rng, IMPACT_OF[group]), _TORQUE_CONSTANT)
 
-    return write_folder(folder, counts, file_format, gate_bench(gate, simulate, references), progress)
+    bench = gate_bench(new, simulate, wanted.references)
+    return write_folder(folder, wanted.counts, wanted.file_format, bench, wanted.progress)
+
+
+write_gate_recordings = by_keywords(GateRecordings, write_recordings_of)
 
 
 def gate_bench(

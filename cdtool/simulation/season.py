@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import UsageError
+from cdtool.simulation.changed_machine import ChangedMachine
 from cdtool.simulation.gate_model import GateParameters, GateRun, simulate_gate_run
 from cdtool.simulation.gate_recordings import gate_bench
 from cdtool.simulation.recording_folder import GROUPS, write_folder
@@ -44,12 +45,8 @@ class Season:
     def gate(self, number: int, new: GateParameters) -> GateParameters:
         """The gate in the run `number` (from 1), of one that is `new` in the first."""
         share = (number - 1) / max(self.runs - 1, 1)
-        friction = 1.0 + share * self.friction_change
         return replace(
-            new,
-            coulomb_friction=friction * new.coulomb_friction,
-            static_friction=friction * new.static_friction,
-            viscous_friction=friction * new.viscous_friction,
+            ChangedMachine(friction=1.0 + share * self.friction_change).gate(new),
             obstruction_force=new.obstruction_force + (number - 1) * self.obstruction_growth,
             obstruction_position=self.obstruction_at,
         )
