@@ -19,6 +19,7 @@ from cdtool.motion import MotionClass
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.thresholds.running_level_kernel import follow_level
 from cdtool.thresholds.signature_curve import Curve, resample
 from cdtool.value_words import value_in_words
 
@@ -63,11 +64,13 @@ class FittedSignature(SendsFields):
     joints: tuple[str, ...]
     by_time: Curve
     by_position: Curve
+    adaptive_level: float = 0.0
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
         """Return the signal and its band on the signal's clock; raises RecordingError without speed and position.
 
-        Raises SignatureError if the signal is of other joints than those learned.
+        With `adaptive_level` the band follows the run, by at most so many spreads, see `follow_level`. Raises
+        SignatureError if the signal is of other joints than those learned.
         """
         if signal.joints != self.joints:
             learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
@@ -80,6 +83,11 @@ class FittedSignature(SendsFields):
         status = np.empty(signal.values.shape, dtype=np.uint8)
         flat = np.ascontiguousarray(signal.status).reshape(-1)
         limits_at(*places, *self._lower, *self._upper, flat, lower, upper, status.reshape(-1))
+        if self.adaptive_level > 0.0:
+            mean, spread = np.empty(signal.values.shape), np.empty(signal.values.shape)
+            limits_at(*places, *self._mean, *self._spread, flat, mean, spread, np.empty_like(flat))
+            values = np.ascontiguousarray(signal.values)
+            follow_level(signal.time, values, mean, spread, status, self.adaptive_level, lower, upper)
         return signal.changed(status=status), Band(lower, upper)
 
     def _places(self, recording: Recording, clock: FloatArray) -> tuple[PlaceArray, PlaceArray, FloatArray]:
@@ -117,18 +125,25 @@ class FittedSignature(SendsFields):
 
     @cached_property
     def _lower(self) -> tuple[FloatArray, FloatArray, bool]:
-        return self._table(0)
+        return self._table([self.limits(curve)[0] for curve in self._used])
 
     @cached_property
     def _upper(self) -> tuple[FloatArray, FloatArray, bool]:
-        return self._table(1)
+        return self._table([self.limits(curve)[1] for curve in self._used])
 
-    def _table(self, side: int) -> tuple[FloatArray, FloatArray, bool]:
-        """Return a limit at the grid points of the curves, its slopes to the next one, and if it is infinite there.
+    @cached_property
+    def _mean(self) -> tuple[FloatArray, FloatArray, bool]:
+        return self._table([curve.band(self.pooled)[0] for curve in self._used])
+
+    @cached_property
+    def _spread(self) -> tuple[FloatArray, FloatArray, bool]:
+        return self._table([curve.band(self.pooled)[1] for curve in self._used])
+
+    def _table(self, limits: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, bool]:
+        """Return values at the grid points of the curves, their slopes to the next one, and if one is infinite there.
 
         A last row is NaN, for samples outside the grids.
         """
-        limits = [self.limits(curve)[side] for curve in self._used]
         slopes = []
         for curve, limit in zip(self._used, limits, strict=True):
             with np.errstate(invalid="ignore"):
@@ -228,6 +243,7 @@ class FittedSignature(SendsFields):
             "joints": list(self.joints),
             "by_time": self.by_time.to_dict(),
             "by_position": self.by_position.to_dict(),
+            "adaptive_level": self.adaptive_level,
         }
 
     @classmethod
@@ -249,6 +265,7 @@ class FittedSignature(SendsFields):
             joints=tuple(map(str, values["joints"])),
             by_time=Curve.from_dict(values["by_time"]),
             by_position=Curve.from_dict(values["by_position"]),
+            adaptive_level=float(values.get("adaptive_level", 0.0)),
         )
 
     def progress(self, recording: Recording, clock: FloatArray) -> Progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -50,6 +51,9 @@ class Signature:
         Grid step in load units [m, rad].
     position_window : float
         Neighbours within this distance are pooled, in load units [m, rad].
+    adaptive_level : float
+        The band follows the slow change of a run by at most this many spreads: other friction, temperature, an offset.
+        0: it stays where it was learned.
     force : bool
         Learn from fewer than 10 runs, but at least 2.
 
@@ -87,6 +91,7 @@ class Signature:
     position_step: float = 2e-3
     position_window: float = 20e-3
     force: bool = False
+    adaptive_level: float = 0.0
 
     name: ClassVar[str] = "signature"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
@@ -102,6 +107,8 @@ class Signature:
             raise UsageError(f"safety factor is {self.safety_factor}", "a number above 0 is needed")
         if not (0.0 < self.position_step <= self.position_window):
             raise UsageError("the grid step must be above 0 and at most the window", "see docs/signature.md")
+        if not 0.0 <= self.adaptive_level < math.inf:
+            raise UsageError(f"adaptive_level is {self.adaptive_level}", "give a number of spreads; 0: the band stays")
 
     @property
     def factor(self) -> float:
@@ -146,6 +153,7 @@ class Signature:
             joints=pairs[0][1].joints,
             by_time=by_time.learned(np.array(samples[0])),
             by_position=by_position.learned(np.array(samples[1])),
+            adaptive_level=self.adaptive_level,
         )
         if not any(np.isfinite(curve.band(True)[0]).any() for curve in (fitted.by_time, fitted.by_position)):
             reasons = pairs[0][1].why_not() if not pairs[0][1].valid.any() else "valid in too few runs at a time"

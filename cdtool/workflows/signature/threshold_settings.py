@@ -32,6 +32,7 @@ def read_signature(table: Table, default_sides: str) -> Signature:
         "position_step": table.number("position_step", Signature.position_step, above=0.0),
         "position_window": table.number("position_window", Signature.position_window, above=0.0),
         "force": table.flag("force", False),
+        "adaptive_level": table.number("adaptive_level", Signature.adaptive_level, minimum=0.0),
     }
     if "safety_factor" in table:
         settings["safety_factor"] = table.number("safety_factor", above=0.0)

@@ -1,0 +1,204 @@
+"""A signature whose band follows the slow change of a run: how far, how soon, and never into a contact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdtool.detection import Band, Signal, Status
+from cdtool.detectors.friction_ekf import FrictionEkf
+from cdtool.detectors.momentum import Momentum
+from cdtool.errors import UsageError
+from cdtool.recording import FloatArray
+from cdtool.simulation.changed_machine import ChangedMachine
+from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
+from cdtool.simulation.gate_recordings import as_recording
+from cdtool.thresholds.base import exceedance
+from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.running_level_kernel import CLIP, FREEZE, GUARD, MEMORY, START, WIDER
+from cdtool.thresholds.signature import Signature
+from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
+
+REACH = 6.0
+MOVING = 0.3 + 0.02  # the strokes begin to move at 0.3 s
+GATE = GateParameters()
+
+
+@pytest.fixture(scope="module")
+def still() -> FittedSignature:
+    return Signature(sides="two").fit(noise_runs(14))
+
+
+@pytest.fixture(scope="module")
+def following(still: FittedSignature) -> FittedSignature:
+    return replace(still, adaptive_level=REACH)
+
+
+def band_of(signature: FittedSignature, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    _, band = signature.evaluate(stroke(), signal(values))
+    return band.lower[:, 0], band.upper[:, 0]
+
+
+def spread_of(signature: FittedSignature) -> FloatArray:
+    lower, upper = band_of(signature, np.full(N, 100.0))
+    return (upper - lower) / (2.0 * signature.safety_factor)
+
+
+def by_the_book(
+    values: FloatArray, band: Band, status: FloatArray, factor: float, reach: float
+) -> tuple[FloatArray, FloatArray]:
+    """The rule of the docstring, sample by sample."""
+    lower, upper = band.lower[:, 0].copy(), band.upper[:, 0].copy()
+    mean, spread = 0.5 * (upper + lower), (upper - lower) / (2.0 * factor)
+    level = learned = 0.0
+    queue, frozen = list(range(len(values))), -np.inf
+    for k, now in enumerate(TIME):
+        wider = 1.0 + (WIDER - 1.0) * max(0.0, 1.0 - learned / START)
+        valid = status[k] == Status.VALID
+        if valid and learned >= GUARD and abs(values[k] - mean[k] - level) > FREEZE * wider * spread[k]:
+            frozen = now + GUARD
+        while queue and queue[0] < k and TIME[queue[0]] <= now - GUARD:
+            old = queue.pop(0)
+            deviation = values[old] - mean[old] - level
+            if status[old] == Status.VALID and now > frozen and np.isfinite(deviation):
+                step = TIME[old + 1] - TIME[old]
+                learned += step
+                if learned > GUARD:
+                    deviation = np.clip(deviation, -CLIP * spread[old], CLIP * spread[old])
+                level += step / min(learned, MEMORY) * deviation
+        shift = np.clip(level, -reach * spread[k], reach * spread[k])
+        lower[k] = mean[k] + shift - wider * factor * spread[k]
+        upper[k] = mean[k] + shift + wider * factor * spread[k]
+    return lower, upper
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(-12.0, 12.0), st.floats(0.0, 40.0), st.floats(0.5, 3.5))
+def test_limits_are_those_of_the_rule(still, following, seed, offset, contact, at):
+    values = 100.0 + offset + np.random.default_rng(seed).normal(size=N) + contact * (at < TIME)
+    given_signal = signal(values)
+    statistic, band = still.evaluate(stroke(), given_signal)
+    lower, upper = by_the_book(values, band, statistic.status[:, 0], still.safety_factor, REACH)
+    found = band_of(following, values)
+    np.testing.assert_allclose(found[0], lower, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found[1], upper, rtol=1e-9, atol=1e-9)
+
+
+def test_without_it_every_bit_stays(still, following):
+    values = 103.0 + np.random.default_rng(1).normal(size=N)
+    off = replace(following, adaptive_level=0.0)
+    assert np.array_equal(band_of(off, values)[1], band_of(still, values)[1], equal_nan=True)
+    assert FittedSignature.from_dict(following.to_dict()).adaptive_level == REACH
+    older = {key: value for key, value in following.to_dict().items() if key != "adaptive_level"}
+    assert FittedSignature.from_dict(older).adaptive_level == 0.0
+
+
+@pytest.mark.parametrize("offset", [-4.0, 4.0])
+def test_the_band_is_where_the_run_is_after_the_start(still, following, offset):
+    values = np.full(N, 100.0 + offset)
+    moved = [item - plain for item, plain in zip(band_of(following, values), band_of(still, values), strict=True)]
+    settled = (TIME > MOVING + GUARD + START + 0.1) & np.isfinite(moved[0])
+    for limit in moved:
+        assert limit[settled] == pytest.approx(offset, abs=0.3)
+
+
+def test_the_band_is_twice_as_wide_at_first_and_as_learned_after_a_second_of_motion(still, following):
+    values = np.full(N, 100.0)
+    widths = [upper - lower for lower, upper in (band_of(following, values), band_of(still, values))]
+    known = np.isfinite(widths[1])
+    ratio = widths[0][known] / widths[1][known]
+    assert ratio[0] == pytest.approx(WIDER) and np.all(np.diff(ratio) <= 1e-12)
+    first = TIME[known][0]
+    assert ratio[np.searchsorted(TIME[known], first + GUARD + START + 0.01)] == pytest.approx(1.0)
+
+
+def test_the_level_is_never_further_than_the_reach(still, following):
+    values = np.full(N, 160.0)
+    moved = band_of(following, values)[1] - band_of(still, values)[1]
+    settled = (TIME > 2.5) & np.isfinite(moved)
+    assert moved[settled] == pytest.approx(REACH * spread_of(still)[settled], rel=1e-6)
+
+
+def test_a_contact_is_not_followed_while_it_lasts(still, following):
+    values = 100.0 + np.random.default_rng(2).normal(size=N)
+    values[2500:] += 20.0
+    free, struck = band_of(following, values - 20.0 * (TIME >= 2.5))[1], band_of(following, values)[1]
+    assert np.array_equal(struck[:2500], free[:2500], equal_nan=True)
+    moved = (struck - band_of(still, values)[1])[2500:]
+    assert moved[np.isfinite(moved)] == pytest.approx(moved[0], abs=1e-9)
+    known = np.isfinite(struck) & (TIME > 2.6)
+    assert known.sum() > 1000 and np.all(values[known] > struck[known])
+
+
+def test_a_weak_contact_is_not_followed_before_it_is_as_old_as_the_guard(still, following):
+    values = np.full(N, 100.0)
+    values[2500:] += 2.0
+    limit = band_of(following, values)[1]
+    assert np.array_equal(limit[2500 : 2500 + int(1e3 * GUARD)], band_of(following, np.full(N, 100.0))[1][2500:2800])
+    assert limit[3900] > limit[2790] + 0.5
+
+
+def test_limits_do_not_depend_on_later_samples(following):
+    rng = np.random.default_rng(3)
+    values = 103.0 + rng.normal(size=N)
+    whole = band_of(following, values)
+    for end in (700, 1500, 3100):
+        changed = values.copy()
+        changed[end:] = 1e3 * rng.normal(size=N - end)
+        for limit, other in zip(whole, band_of(following, changed), strict=True):
+            np.testing.assert_array_equal(limit[:end], other[:end])
+
+
+def test_samples_that_are_not_valid_teach_nothing(following):
+    values = np.full(N, 103.0)
+    status = np.zeros((N, 1), dtype=np.uint8)
+    values[1800:2300], status[1800:2300] = 200.0, Status.GAP
+    _, band = following.evaluate(stroke(), Signal(TIME, values[:, np.newaxis], status, "N", True, ("axis",)))
+    assert band.upper[2700, 0] == pytest.approx(band_of(following, np.full(N, 103.0))[1][2700], abs=0.05)
+
+
+def test_the_factor_that_a_sample_meets_does_not_depend_on_the_factor_that_is_set(following):
+    values = 102.0 + np.random.default_rng(4).normal(size=N)
+    _, met = exceedance(following, stroke(), signal(values))
+    _, other = exceedance(following.with_safety_factor(2.0), stroke(), signal(values))
+    np.testing.assert_allclose(other[np.isfinite(other)], met[np.isfinite(met)], rtol=1e-9)
+
+
+@pytest.mark.parametrize("reach", [-1.0, np.inf, np.nan])
+def test_a_reach_below_zero_or_without_end_is_refused(reach):
+    with pytest.raises(UsageError, match="adaptive_level is"):
+        Signature(adaptive_level=reach)
+
+
+@pytest.mark.parametrize("detector", [Momentum(), FrictionEkf()])
+def test_friction_that_rose_by_a_fifth_raises_no_alarm_and_a_contact_does(detector, gate):
+    def pair(seed, impact, changed):
+        run = simulate_gate_run(changed.gate(GATE), np.random.default_rng(seed), impact)
+        recording = as_recording(run, str(seed), GATE).without_ground_truth()
+        return run.contact_start, recording, detector.signal(recording, gate)
+
+    learned = [pair([5, n], "none", ChangedMachine())[1:] for n in range(12)]
+    older = ChangedMachine(friction=1.2)
+    alarming = {0.0: 0, REACH: 0}
+    for reach in alarming:
+        fitted = Signature(sides="one", adaptive_level=reach).fit(learned)
+        for n in range(6):
+            _, recording, found = pair([6, n], "none", older)
+            alarming[reach] += first_alarm(fitted, recording, found) is not None
+        if reach:
+            start, recording, found = pair([7, 1], "soft", older)
+            alarm = first_alarm(fitted, recording, found)
+            assert start is not None and alarm is not None and 0.0 < alarm - start < 0.2
+    assert alarming[REACH] == 0
+    assert alarming[0.0] == 6 or isinstance(detector, FrictionEkf)
+
+
+def first_alarm(fitted, recording, found):
+    statistic, band = fitted.evaluate(recording, found)
+    outside = (statistic.values > band.upper)[:, 0] & statistic.valid[:, 0]
+    held = np.convolve(outside, np.ones(9))[: len(outside)] >= 9
+    return float(statistic.time[np.argmax(held)]) if held.any() else None
