@@ -456,12 +456,7 @@ def _identify_joint(
             RigidAxisSettings(rotary=is_rotary, torque_filter_time=stated.get("torque_filter_time")),
         ),
         "two_mass": lambda: identify_two_mass(
-            runs,
-            TwoMassSettings(
-                motor_mass=motor_mass,
-                sensors=_with_lag(sensors, found.get("rigid")),
-                units=(mass, force, travel),
-            ),
+            runs, TwoMassSettings(motor_mass=motor_mass, sensors=sensors, units=(mass, force, travel))
         ),
         "controller": lambda: identify_controller(
             runs,
@@ -489,11 +484,6 @@ def _identify_joint(
         **found,
     )
     return _with_contacts(identified, struck, machine_file, joint) if struck.struck else identified
-
-
-def _with_lag(sensors: Sensors, fit: RigidAxisFit | None) -> Sensors:
-    """Return the sensors with the lag of the torque that a rigid axis shows, where it is not stated."""
-    return replace(sensors, torque_filter_time=fit.torque_lag.time) if fit else sensors
 
 
 def _has_opposite_sign(fit: RigidAxisFit | None) -> bool:
