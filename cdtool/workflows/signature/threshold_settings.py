@@ -59,6 +59,12 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
             if key != "name":
                 raise table.fault(key, "is not a key of this table", "the signature's settings are in [signature]")
         return name, signature
+    if signature.adaptive_level > 0.0:
+        raise root.fault(
+            "threshold",
+            f"'{name}' does not follow a run: adaptive_level of [signature] is for the threshold 'signature'",
+            "remove adaptive_level, or choose that threshold",
+        )
     rule = THRESHOLDS.load(name)
     own = [item for item in fields(rule) if item.name != "signature"]
     settings = {item.name: _value(table, item) for item in own if item.name in table}

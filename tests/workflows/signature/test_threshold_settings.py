@@ -133,11 +133,21 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
         ("[activation]\nrearm_s = -1\n", "activation.rearm_s: is -1"),
         ("[signature]\ndebounce = 5\n", r"signature.debounce: belongs in another table.*\[activation\]"),
         ('[threshold]\nname = "combined"\nmembers = ["limit"]\n', "two or more"),
+        ("[signature]\nadaptive_level = -1\n", "signature.adaptive_level: is -1"),
+        (
+            'threshold = "glr"\n[signature]\nadaptive_level = 6\n',
+            "threshold: 'glr' does not follow a run.*adaptive_level",
+        ),
     ],
 )
 def test_a_wrong_threshold_is_one_line_that_names_its_key(door, text, said):
     with pytest.raises(ConfigurationError, match=said):
         read_benchmark_file(written(door, text))
+
+
+def test_a_signature_may_follow_its_runs(door):
+    rule = read_benchmark_file(written(door, "[signature]\nadaptive_level = 6\n")).rule
+    assert isinstance(rule, Signature) and rule.adaptive_level == 6.0
 
 
 def test_limits_set_by_hand_belong_to_one_detector_and_to_no_budget(door):
