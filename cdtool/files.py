@@ -19,7 +19,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -64,6 +64,17 @@ def write_bytes(path: Path, content: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write a complete file of UTF-8 text without changing its line ends. Raises OutputError, UsageError."""
     write_pieces(path, (text,))
+
+
+def write_texts(texts: Mapping[Path, str]) -> None:
+    """Write each text as `write_text` does; several are replaced together, or none. Raises OutputError."""
+    if len(texts) == 1:
+        for path, text in texts.items():
+            write_text(path, text)
+    elif texts:
+        with replaced(*texts) as parts:
+            for part, text in zip(parts, texts.values(), strict=True):
+                part.write_bytes(text.encode("utf-8", "replace"))
 
 
 def write_pieces(path: Path, pieces: Iterable[str]) -> None:

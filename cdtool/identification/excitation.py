@@ -100,10 +100,10 @@ def measure_excitation(runs: Sequence[FilteredRun]) -> Excitation:
         strokes += len(np.unique(run.stroke[moving]))
         reversals += _reversals(run)
     speed, acceleration, duration, noise = np.concatenate(columns, axis=1)
-    return _measured(speed, acceleration, duration, noise, strokes, reversals)
+    return excitation_of(speed, acceleration, duration, noise, strokes, reversals)
 
 
-def _measured(
+def excitation_of(
     speed: FloatArray,
     acceleration: FloatArray,
     duration: FloatArray,
@@ -111,6 +111,7 @@ def _measured(
     strokes: int,
     reversals: int,
 ) -> Excitation:
+    """Return what samples of motion excite (n,): speed, acceleration, time that each lasts [s], its noise or NaN."""
     total = float(np.sum(duration))
     if total <= 0.0:
         return Excitation((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0)

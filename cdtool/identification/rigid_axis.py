@@ -34,6 +34,7 @@ from cdtool.identification.friction_curve import (
     speed_edges,
 )
 from cdtool.identification.torque_lag import MotionColumns, apparent_lag, best_lag
+from cdtool.plain_text import counted
 from cdtool.recording import BoolArray, FloatArray
 
 # Fewer equations than this identify nothing.
@@ -253,7 +254,7 @@ def identify_rigid_axis(
             )
         raise IdentificationError(
             f"{runs[0].name}: hardly any motion ({len(equations.force)} usable equations, "
-            f"{excitation.moving_time:.3g} s in {len(runs)} recordings)",
+            f"{excitation.moving_time:.3g} s in {counted(len(runs), 'recording')})",
             f"identification needs at least {_FEWEST_EQUATIONS}: recordings in which the axis moves",
         )
     lag = _torque_lag(equations, excitation, settings)

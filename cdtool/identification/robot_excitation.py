@@ -12,13 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdtool.identification.excitation import Excitation, distinct_speeds
+from cdtool.identification.excitation import Excitation, excitation_of
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import BoolArray, FloatArray
 
-# Slow motion: below this share of the highest speed.
-_SLOW_SPEED = 0.1
 # A joint moves where this share of the samples within the window's half width [s] is above its stick speed: less is
 # noise of the speed at rest.
 _MOVING_SHARE, _HALF_WIDTH = 0.9, 0.1
@@ -139,7 +137,8 @@ def _of_joint(runs: Sequence[RobotRun], accelerations: Sequence[FloatArray], joi
             lowest, highest = min(lowest, float(known.min())), max(highest, float(known.max()))
     lowest, highest = (lowest, highest) if math.isfinite(lowest) else (math.nan, math.nan)
     speed, rate, duration = (np.concatenate(part) for part in (speeds, rates, durations))
-    moved = _measured(speed, rate, duration, (strokes, reversals))
+    # The acceleration is a smoothed derivative: the noise in it is not known.
+    moved = excitation_of(speed, rate, duration, np.full_like(speed, np.nan), strokes, reversals)
     return JointMotion(joint, moved, lowest, highest)
 
 
@@ -163,23 +162,3 @@ def _strokes_of(speed: FloatArray, moving: BoolArray) -> tuple[int, int]:
     sections = np.cumsum(edges > 0)[moving]
     strokes = 1 + int(np.count_nonzero((np.diff(direction) != 0) | (np.diff(sections) != 0)))
     return strokes, reversals
-
-
-def _measured(speed: FloatArray, acceleration: FloatArray, duration: FloatArray, counts: tuple[int, int]) -> Excitation:
-    total = float(np.sum(duration))
-    if total <= 0.0:
-        return Excitation((), 0.0, 0.0, 0.0, 0.0, math.nan, 0.0, 0.0, 0, 0)
-    size, share = np.abs(speed), duration / total
-    highest = float(np.quantile(size, 0.99))
-    return Excitation(
-        distinct_speeds(size, share),
-        float(np.sum(share[speed > 0.0])),
-        float(np.sum(share[size < _SLOW_SPEED * highest])),
-        highest,
-        math.sqrt(float(share @ acceleration**2)),
-        math.nan,
-        float(size @ duration),
-        total,
-        *counts,
-        float(np.quantile(np.abs(acceleration), 0.99)),
-    )

@@ -31,6 +31,7 @@ from cdtool.identification.estimate import (
 )
 from cdtool.identification.friction_profile import friction_profile, random_phases
 from cdtool.identification.start_ensemble import StartEnsemble, start_ensembles
+from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 
 # In the order of the vector of logarithms.
@@ -105,7 +106,7 @@ def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> Two
     ensembles = start_ensembles(runs)
     if not ensembles:
         raise IdentificationError(
-            f"none of {len(runs)} runs starts from rest",
+            f"none of {counted(len(runs), 'run')} starts from rest",
             "the drive's stiffness shows only in a start: log it from rest",
         )
     problem = _Problem(runs, ensembles, settings)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.evaluation.coverage_map import Cell, CellKey, CoverageMap
-from cdtool.files import replaced, write_text
+from cdtool.files import write_texts
 from cdtool.foreign_files import FIGURES, Kind, refuse_inputs, refuse_other_kind
 from cdtool.report.number_text import number
 from cdtool.report.output_names import check_output_names
@@ -45,13 +45,7 @@ def write_coverage(done: Coverage, targets: Sequence[Path]) -> None:
         from cdtool.report.plots.coverage_plot import plot_coverage
 
         plot_coverage(_with_panel_per_speed(done.map), done.machine, figure)
-    if len(texts) == 1:
-        for target, text in texts.items():
-            write_text(target, text)
-    elif texts:
-        with replaced(*texts) as parts:
-            for part, text in zip(parts, texts.values(), strict=True):
-                part.write_bytes(text.encode("utf-8", "replace"))
+    write_texts(texts)
 
 
 def _text(done: Coverage, target: Path) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cdtool.errors import UsageError
-from cdtool.files import replaced, write_text
+from cdtool.files import write_texts
 from cdtool.foreign_files import Kind, refuse_inputs, refuse_other_kind
 from cdtool.plain_text import plain
 from cdtool.report.output_names import check_output_names
@@ -84,11 +84,5 @@ def write_fleet(fleet: FleetIdentification, targets: Sequence[Path], inputs: Seq
 
 def _write(texts: Mapping[Path, str], inputs: Sequence[Path]) -> tuple[Path, ...]:
     refuse_inputs(texts, inputs)
-    if len(texts) == 1:
-        for target, text in texts.items():
-            write_text(target, text)
-    elif texts:
-        with replaced(*texts) as parts:
-            for part, text in zip(parts, texts.values(), strict=True):
-                part.write_bytes(text.encode("utf-8", "replace"))
+    write_texts(texts)
     return tuple(texts)

@@ -28,6 +28,7 @@ from cdtool.identification.torque_constant import TorqueScale
 from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.machines.coupled import CoupledMachine
+from cdtool.plain_text import counted
 from cdtool.recording import Recording
 from cdtool.remote.remote_path import location
 from cdtool.tables import read_toml
@@ -297,7 +298,7 @@ def identify(
         estimates += scale_estimates(joint.torque_scale, given, number) if joint.torque_scale else []
     if not estimates and not together and not _was_compared(joints):
         raise IdentificationError(
-            f"nothing can be identified from {len(recordings)} logs: {'; '.join(_reasons(joints))}",
+            f"nothing can be identified from {counted(len(recordings), 'log')}: {'; '.join(_reasons(joints))}",
             "see docs/identification.md for the motion that is needed",
         )
     changes = changes_of(machine_file.machine, given, estimates, together)
