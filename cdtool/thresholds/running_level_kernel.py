@@ -60,9 +60,8 @@ def follow_level(
             while old < k and time[old] <= time[k] - GUARD:
                 deviation = values[old, column] - mean[old, column] - level
                 if status[old, column] == Status.VALID and time[k] > frozen_until and math.isfinite(deviation):
-                    # Nothing is known of what happened in a gap.
-                    step = time[old + 1] - time[old]
-                    step = step if step <= GUARD else 0.0
+                    # What happened in a gap is unknown: the sample before it counts for the guard at most.
+                    step = min(time[old + 1] - time[old], GUARD)
                     learned += step
                     if learned > GUARD:
                         most = CLIP * spread[old, column]

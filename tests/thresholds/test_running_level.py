@@ -21,7 +21,7 @@ from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.running_level_kernel import CLIP, FREEZE, GUARD, MEMORY, START, WIDER
 from cdtool.thresholds.signature import Signature
-from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
+from tests.thresholds.strokes import TIME, N, jittering_clock, noise_runs, signal, stroke
 
 REACH = 6.0
 MOVING = 0.3 + 0.02  # the strokes begin to move at 0.3 s
@@ -159,6 +159,27 @@ def test_samples_that_are_not_valid_teach_nothing(following):
     values[1800:2300], status[1800:2300] = 200.0, Status.GAP
     _, band = following.evaluate(stroke(), Signal(TIME, values[:, np.newaxis], status, "N", True, ("axis",)))
     assert band.upper[2700, 0] == pytest.approx(band_of(following, np.full(N, 103.0))[1][2700], abs=0.05)
+
+
+def test_a_jittered_clock_with_lost_rows_changes_nothing_but_the_samples(still, following):
+    time = jittering_clock(N, 0.9, seed=8)
+    kept = np.random.default_rng(9).random(N) > 0.2
+    kept[1500:2200] = False
+    time = time[kept]
+    values = signal(np.full(len(time), 104.0), time)
+    limits = [item.evaluate(stroke(time=time), values)[1].upper[:, 0] for item in (following, still)]
+    settled = (time > MOVING + GUARD + START + 1.0) & np.isfinite(limits[1])
+    assert (limits[0] - limits[1])[settled] == pytest.approx(4.0, abs=0.3)
+
+
+def test_a_slow_log_is_not_watched_with_wide_limits_for_ever(following):
+    time = np.arange(0.0, 7.0, 0.4)
+    values = signal(np.full(len(time), 100.0), time)
+    learned = Signature(sides="two", adaptive_level=REACH).fit([(stroke(time=time), values)] * 12)
+    still = replace(learned, adaptive_level=0.0)
+    bands = [item.evaluate(stroke(time=time), values)[1] for item in (learned, still)]
+    widths = [(band.upper - band.lower)[:, 0] for band in bands]
+    assert np.isfinite(widths[1][-3]) and widths[0][-3] == pytest.approx(widths[1][-3])
 
 
 def test_the_factor_that_a_sample_meets_does_not_depend_on_the_factor_that_is_set(following):
