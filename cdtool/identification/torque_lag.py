@@ -92,7 +92,7 @@ def best_lag(motions: Sequence[MotionColumns]) -> TorqueLag:
     """
     from scipy.optimize import minimize_scalar
 
-    longest = min(len(item.rows) * item.run.low_pass.steps * item.run.run.period for item in motions) / _SETTLING
+    longest = max(len(item.rows) * item.run.low_pass.steps * item.run.run.period for item in motions) / _SETTLING
     lags = [lag for lag in _LAGS if lag <= max(longest, _LAGS[1])]
     found = []
     for form in LagForm:

@@ -80,6 +80,12 @@ def test_gaps_do_not_hide_a_lag(runs):
     assert fit.total_mass == pytest.approx(TRUTH["load_mass"], rel=0.03)
 
 
+def test_a_run_at_rest_beside_the_others_does_not_hide_their_lag(runs):
+    rest = replace(runs[0], torque=np.zeros(400), position=np.zeros(400))
+    fit = identify_rigid_axis([*(low_passed(run, 0.05) for run in runs), rest], 0.0, QUICK)
+    assert fit.torque_lag.time == pytest.approx(0.05, abs=5e-3)
+
+
 @pytest.mark.parametrize("samples", [-2.5, -1.0, 0.0, 0.25, 3.0])
 def test_a_shift_moves_a_line_and_marks_what_is_not_known(samples):
     moved = shifted(np.arange(8.0), samples)
