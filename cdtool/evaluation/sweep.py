@@ -163,12 +163,24 @@ def critical_factor(detection: Detection, activation: Activation) -> float:
         status = statistic.status[:, joint]
         present = status != Status.GAP  # a missing sample is skipped, as by the activation
         met = np.where(status == Status.VALID, met_at[:, joint], -np.inf)[present]
-        for debounce in np.unique(needed[present]):
-            if len(met) >= debounce:
-                held = np.lib.stride_tricks.sliding_window_view(met, debounce).min(axis=1)
-                there = needed[present][debounce - 1 :] == debounce
-                highest = max(highest, float(held[there].max(initial=-np.inf)))
+        highest = max(highest, highest_held(met, needed[present]))
     return highest
+
+
+@kernel(f"float64({READ_ONLY}, Array(int64, 1, 'C', readonly=True))")
+def highest_held(met: FloatArray, needed: npt.NDArray[np.int64]) -> float:
+    """Return the largest value that `needed` (n,) consecutive entries of `met` (n,), counted backward, all reach."""
+    best, reached = -np.inf, 0
+    for k in range(len(met)):
+        reached = reached + 1 if met[k] > best else 0
+        if 0 < needed[k] <= reached:
+            best = met[k]
+            for i in range(k - needed[k] + 1, k):
+                best = min(best, met[i])
+            reached = 0
+            while reached <= k and met[k - reached] > best:
+                reached += 1
+    return best
 
 
 @kernel(f"b1({READ_ONLY}, {_STATUS}, int64, int64)")

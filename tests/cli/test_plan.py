@@ -54,7 +54,7 @@ def source(tmp_path: Path) -> Path:
         ),
         (
             ("--false-alarms-at-most", "1/1000op"),
-            "a budget of 1/1000op false alarms: to set a safety factor for it, 1000 impact-free operations to learn "
+            "a budget of 1/1000op false alarms: to set a safety factor for it, 999 impact-free operations to learn "
             "from; to show that it is met, 2996 others without a false alarm; 4744 with one false alarm allowed",
         ),
         (
@@ -214,7 +214,7 @@ def test_only_the_contacts_of_the_group_named_count():
 
 def test_integers_are_shown_with_all_digits():
     done = cdtool("plan", "--false-alarms-at-most", "1/1000000op")
-    assert "a budget of 1/1000000op false alarms" in done.out and "1000000 impact-free operations" in done.out
+    assert "a budget of 1/1000000op false alarms" in done.out and "999999 impact-free operations" in done.out
     assert "2995733 others" in done.out and "e+" not in done.out
     assert "e+" not in cdtool("plan", "--missed-at-most", "0.000001").out
 

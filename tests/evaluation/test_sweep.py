@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cdtool.activation import Activation
 from cdtool.detection import Band, Status, Verdict
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget, set_factor
-from cdtool.evaluation.sweep import MULTIPLES, critical_factor, sweep
+from cdtool.evaluation.sweep import MULTIPLES, critical_factor, highest_held, sweep
 from cdtool.evaluation.truth.matching import match
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact
@@ -104,7 +106,7 @@ def test_the_factor_meets_a_budget_per_hour_and_a_smaller_one_violates_it():
 
 
 def test_too_small_an_exposure_is_refused_with_the_missing_amount():
-    with pytest.raises(UsageError, match=r"1/1000op needs 1000 impact-free operations.*20 were assessable.*add 980"):
+    with pytest.raises(UsageError, match=r"1/1000op needs 999 impact-free operations.*20 were assessable.*add 979"):
         set_factor(Budget(1e-3, "operation"), "d", [detection(seed) for seed in range(20)], ACTIVATION)
 
 
@@ -113,7 +115,7 @@ def test_unassessable_operations_do_not_count_as_exposure():
     status = np.full_like(runs[0].statistic.status, Status.NOT_APPLICABLE)
     blind = replace(runs[0], statistic=replace(runs[0].statistic, status=status))
     with pytest.raises(UsageError, match="11 were assessable"):
-        set_factor(Budget(1 / 12, "operation"), "d", [blind, *runs[1:]], ACTIVATION)
+        set_factor(Budget(1 / 13, "operation"), "d", [blind, *runs[1:]], ACTIVATION)
 
 
 def test_limits_without_spread_cannot_be_set():
@@ -136,9 +138,9 @@ def test_a_detection_without_a_threshold_never_alarms():
 
 
 def test_a_budget_states_the_missing_amount_with_all_digits():
-    with pytest.raises(UsageError, match=r"budget 1/2000000op needs 2000000 impact-free operations .* 12 were") as at:
+    with pytest.raises(UsageError, match=r"budget 1/2000000op needs 1999999 impact-free operations .* 12 were") as at:
         Budget.parse("1/2000000op").check(12.0, "gm")
-    assert "add 1999988 to the runs learned from" in at.value.hint
+    assert "add 1999987 to the runs learned from" in at.value.hint
     with pytest.raises(UsageError, match=r"needs 1 impact-free operation to be set, 0 were"):
         Budget.parse("1/op").check(0.0, "gm")
     assert [str(Budget.parse(text)) for text in ("1/3op", "0.002/op", "1/8h", "2500000/h")] == [
@@ -147,3 +149,40 @@ def test_a_budget_states_the_missing_amount_with_all_digits():
         "1/8h",
         "2500000/h",
     ]
+
+
+@given(
+    st.lists(st.integers(-3, 6), max_size=40).map(lambda values: np.array(values, dtype=np.float64)),
+    st.integers(1, 5),
+    st.integers(1, 5),
+)
+def test_the_highest_value_that_is_held_is_that_of_all_windows(values, debounce, later):
+    needed = np.where(np.arange(len(values)) < 20, debounce, later).astype(np.int64)
+    held = [values[k - n + 1 : k + 1].min() for k, n in enumerate(needed) if k + 1 >= n]
+    assert highest_held(values, needed) == max(held, default=-np.inf)
+
+
+def test_a_budget_with_a_confidence_is_met_that_often():
+    """The rate above the c-th largest of n is distributed as beta(c, n + 1 - c)."""
+    budget = Budget.parse("1/20op at 90%")
+    rng = np.random.default_rng(3)
+    rates = []
+    for _ in range(2000):
+        critical = np.sort(rng.random(120))[::-1]
+        rates.append(1.0 - critical[budget.allowed(120.0)])
+    assert 0.90 <= np.mean(np.array(rates) <= 0.05) < 0.98
+    assert budget.needed == 45.0 and budget.allowed(45.0) == 0 and budget.allowed(44.0) == -1
+
+
+def test_a_budget_by_hours_with_a_confidence_allows_fewer_alarms():
+    budget = Budget.parse("0.1/h at 95%")
+    assert budget.needed == pytest.approx(29.957, abs=1e-3)
+    assert (budget.allowed(29.9), budget.allowed(30.0), Budget.parse("0.1/h").allowed(30.0)) == (-1, 0, 2)
+    assert budget.allowed(200.0) < Budget.parse("0.1/h").allowed(200.0)
+
+
+@pytest.mark.parametrize("text", ["1/100op at 20%", "1/100op at 100%", "1/100op at", "1/100op at x%", "3/op at 95%"])
+def test_a_wrong_confidence_is_refused(text):
+    with pytest.raises(UsageError, match="false-alarm budget is"):
+        Budget.parse(text)
+    assert str(Budget.parse("1/100op at 95%")) == "1/100op at 95%"
