@@ -36,6 +36,7 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.injection.inject_section import INJECTED, InjectSection, read_inject_section
 from cdtool.workflows.injection.injected_logs import model_of
+from cdtool.workflows.log_groups import Split
 from cdtool.workflows.named_logs import LogsOf, labels_of, named_logs
 from cdtool.workflows.runs import RunReading, resolve_all, shown_path
 from cdtool.workflows.signature.threshold_settings import read_signature, read_threshold
@@ -73,7 +74,8 @@ class BenchmarkFile:
     not known before the logs are audited if `measures_synchronisation`.
     `mass_before_cell` [kg]. `window` [s] applies to a log outside all groups. `migrated` reports how keys of earlier
     versions were read. `sections` are the parts of scored logs that are used, `learned_sections` those of the logs
-    learned from, which end `guard` [s] before their first contact; None: they have no contact. `not_injected`: logs and
+    learned from, which end `guard` [s] before their first contact; None: they have no contact. `split`: which runs stay
+    together where runs set a limit for others. `not_injected`: logs and
     contacts of `inject` that were left out.
     """
 
@@ -102,6 +104,7 @@ class BenchmarkFile:
     sections: Mapping[Path, LogSection] = field(default_factory=dict)
     learned_sections: Mapping[Path, LogSection] = field(default_factory=dict)
     guard: float | None = None
+    split: Split = Split.RECORDING
     measures_synchronisation: bool = False
     inject: InjectSection | None = None
     not_injected: tuple[Skipped, ...] = ()
@@ -139,6 +142,7 @@ class BenchmarkFile:
             "learned_until": until,
             "learned_sections": self._in_words(self.learned_sections),
             "scored_without_own_part": others,
+            **({"split": self.split.value} if self.split is not Split.RECORDING else {}),
         }
 
     @cached_property
@@ -241,6 +245,7 @@ def read_benchmark_file(
     needs_runs = learning and not is_per_run(rule)
     learn_table = root.table("learn", required=needs_runs)
     guard = _guard(learn_table)
+    split = Split(learn_table.choice("split", [item.value for item in Split], Split.RECORDING.value))
     learn = found.sections(learn_table) if needs_runs or "learn" in root else {}
     force = root.table("force")
     mass_before_cell = _mass_before_cell(force)
@@ -283,6 +288,7 @@ def read_benchmark_file(
         sections=sections,
         learned_sections={path: section for path, section in learn.items() if section},
         guard=guard,
+        split=split,
         inject=inject,
     )
     root.finish()

@@ -202,6 +202,7 @@ def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources], detectors
         setup.activation,
         setup.watched,
         setup.guard,
+        setup.split,
         setup.window,
         learn,
     )

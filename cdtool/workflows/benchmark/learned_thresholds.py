@@ -140,7 +140,7 @@ def _learn(setup: BenchmarkFile, detector: str, pairs: Sequence[Pair], left_out:
     fitted = with_left_out(fit, left_out)(pairs)
     if not setup.budget:
         return _Made(fitted.thresholds, fitted.skipped)
-    made = calibrate(setup.budget, detector, kept(pairs, fitted.skipped), fit, setup.activation)
+    made = calibrate(setup.budget, detector, kept(pairs, fitted.skipped), fit, setup.activation, setup.split)
     result = CalibrationResult(detector, str(setup.budget), made.factor, made.operations, made.hours, made.alarms)
     thresholds = tuple(item.with_safety_factor(made.factor) for item in fitted.thresholds)
     return _Made(thresholds, fitted.skipped, (result,))

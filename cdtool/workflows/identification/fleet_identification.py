@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from datetime import UTC, date, datetime
 from enum import Enum
 from itertools import pairwise
 from pathlib import Path
@@ -22,6 +20,7 @@ from cdtool.recording import FloatArray
 from cdtool.remote.remote_path import location
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification, identify
+from cdtool.workflows.log_groups import by_machine, day_in_path, day_of
 from cdtool.workflows.runs import find_logs, read_log, shown_path
 
 # By machine, the logs of a machine are divided in their order into periods of at least so many logs, at most so many.
@@ -32,8 +31,6 @@ CHANGED_BEYOND = 3.0
 _SMALLEST_ERROR = 1e-3
 # Friction at the speed of the logs is compared if these speeds differ by at most this ratio.
 _SAME_SPEED = 1.1
-_DATE = re.compile(r"(?<!\d)((?:19|20)\d\d)[-_.]?(0[1-9]|1[0-2])[-_.]?(0[1-9]|[12]\d|3[01])(?!\d)")
-_DIGITS = re.compile(r"(\d+)")
 
 
 class Division(Enum):
@@ -211,7 +208,7 @@ def identify_fleet(
     """
     machine_file = read_machine_file(location(machine))
     paths = find_logs(map(str, logs), Path(), "LOGS")
-    named = _by_machine(paths, machine_file.machine.name)
+    named = by_machine(paths, machine_file.machine.name)
     skipped: list[Skipped] = []
     if by is Division.DAY:
         groups = _by_day(named, machine_file, skipped)
@@ -372,19 +369,6 @@ def _odd_period(
     return Drift(DriftKind.NONE, change, ratio, line)
 
 
-def _by_machine(paths: Sequence[Path], only: str) -> dict[str, list[Path]]:
-    """Return the logs by the first folder in which their paths differ, dates apart; `only` names a single machine."""
-    folders = [path.parent.parts for path in paths]
-    for level in range(max((len(parts) for parts in folders), default=0)):
-        names = [parts[level] if level < len(parts) else "." for parts in folders]
-        if len(set(names)) > 1 and not all(_date_in(name) for name in names):
-            found: dict[str, list[Path]] = {}
-            for name, path in zip(names, paths, strict=True):
-                found.setdefault(name, []).append(path)
-            return {name: sorted(found[name], key=_natural) for name in sorted(found, key=_natural_name)}
-    return {only: sorted(paths, key=_natural)}
-
-
 def _periods(logs: Sequence[Path]) -> list[tuple[str, tuple[Path, ...]]]:
     """Return a machine's logs in their order as periods, each named by its first log and its last."""
     count = min(len(logs) // _LOGS_PER_PERIOD, _MOST_PERIODS)
@@ -416,32 +400,9 @@ def _by_day(named: Mapping[str, Sequence[Path]], machine_file: MachineFile, skip
 
 
 def _day_of(log: Path, machine_file: MachineFile) -> str:
-    for part in reversed(log.parts):
-        day = _date_in(part)
-        if day:
-            return day
+    if day := day_in_path(log):
+        return day
     try:
-        began = read_log(log, machine_file).began
+        return day_of(log, read_log(log, machine_file).began)
     except CdtoolError:
         return ""
-    return "" if began is None else datetime.fromtimestamp(began, UTC).date().isoformat()
-
-
-def _date_in(text: str) -> str:
-    """Return the date in a name as 2026-11-27; empty without one."""
-    for match in _DATE.finditer(text):
-        year, month, day = map(int, match.groups())
-        try:
-            return date(year, month, day).isoformat()
-        except ValueError:  # the 31st of a month with 30 days
-            continue
-    return ""
-
-
-def _natural(path: Path) -> tuple[Any, ...]:
-    return (_date_in(str(path)), _natural_name(str(path)))
-
-
-def _natural_name(name: str) -> tuple[tuple[int, int | str], ...]:
-    """Return a sort key in which run 9 comes before run 10."""
-    return tuple((0, int(part)) if part.isdecimal() else (1, part) for part in _DIGITS.split(name) if part)

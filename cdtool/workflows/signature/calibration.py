@@ -9,6 +9,7 @@ from cdtool.errors import SignatureError, UsageError
 from cdtool.evaluation.false_alarm_budget import Budget, Calibrated, set_factor
 from cdtool.evaluation.results import Skipped
 from cdtool.pipeline import Detection, judge
+from cdtool.workflows.log_groups import Split, split_names
 from cdtool.workflows.signature.fitting import Fit, Pair
 
 # Runs are tested with thresholds learned from the other nine tenths.
@@ -26,7 +27,24 @@ def kept(pairs: Sequence[Pair], skipped: Sequence[Skipped]) -> list[Pair]:
     return [pair for pair in pairs if pair[0].name not in names]
 
 
-def calibrate(budget: Budget, detector: str, pairs: Sequence[Pair], fit: Fit, activation: Activation) -> Calibrated:
+def folds_of(pairs: Sequence[Pair], split: Split, count: int) -> list[int]:
+    """Return for each run the number of its fold: up to `count`, and what stays together by `split` in one of them.
+
+    Raises UsageError as `split_names`.
+    """
+    numbers: dict[str, int] = {}
+    names = split_names(split, [operation for operation, _ in pairs])
+    return [numbers.setdefault(name, len(numbers)) % count for name in names]
+
+
+def calibrate(
+    budget: Budget,
+    detector: str,
+    pairs: Sequence[Pair],
+    fit: Fit,
+    activation: Activation,
+    split: Split = Split.RECORDING,
+) -> Calibrated:
     """Return the safety factor for a budget, set on every run with thresholds learned from runs of other folds.
 
     Raises UsageError if there are too few runs for the budget, or to learn from nine tenths of them.
@@ -34,15 +52,16 @@ def calibrate(budget: Budget, detector: str, pairs: Sequence[Pair], fit: Fit, ac
     if budget.per == "operation":
         budget.check(len(pairs), detector)
     detections: list[Detection] = []
-    for fold in range(FOLDS):
-        others = [pair for i, pair in enumerate(pairs) if i % FOLDS != fold]
+    fold_of = folds_of(pairs, split, FOLDS)
+    for fold in sorted(set(fold_of)):
+        others = [pair for own, pair in zip(fold_of, pairs, strict=True) if own != fold]
         try:
             fitted = fit(others)
         except SignatureError as fault:
             raise _too_few(budget, detector, fault.message) from fault
         if fitted.skipped:
             raise _too_few(budget, detector, fitted.skipped[0].reason)
-        held_out = [pair for i, pair in enumerate(pairs) if i % FOLDS == fold]
+        held_out = [pair for own, pair in zip(fold_of, pairs, strict=True) if own == fold]
         detections += [
             judge(operation, detector, signal, fitted.thresholds, activation) for operation, signal in held_out
         ]
