@@ -128,7 +128,7 @@ def run_detector(operation: Operation, machine: Machine, detector: Detector, wat
     It runs over the whole log of the operation, without ground truth. Raises RecordingError, or ConfigurationError for
     an unknown joint.
     """
-    signal = _signal_of_log(operation, machine, detector, watched)
+    signal = signal_of_log(operation, machine, detector, watched)
     return signal if operation.log is None else signal.part(_rows(signal, operation))
 
 
@@ -138,7 +138,7 @@ def run_detector_on_each(
     """Return the detector's signal of each operation of one log in one run; raises as `run_detector`."""
     if not operations:
         return []
-    whole = _signal_of_log(operations[0], machine, detector, watched)
+    whole = signal_of_log(operations[0], machine, detector, watched)
     return [whole if item.log is None else whole.part(_rows(whole, item)) for item in operations]
 
 
@@ -158,8 +158,8 @@ def detect_operations(
     """
     if not operations:
         return []
-    signal = _signal_of_log(operations[0], machine, detector, watched)
-    return _judge_log(operations, detector.name, signal, thresholds, activation, hold)
+    signal = signal_of_log(operations[0], machine, detector, watched)
+    return judge_log(operations, detector.name, signal, thresholds, activation, hold)
 
 
 def _lost_inputs(detector: Detector, recording: Recording, machine: Machine, signal: Signal) -> BoolArray | None:
@@ -193,11 +193,15 @@ def judge(
 ) -> Detection:
     """Compare a detector's signal of an operation with thresholds; the log around the operation is ignored."""
     alone = replace(operation, log=None, cut="whole")
-    (detection,) = _judge_log([alone], detector, signal, thresholds, activation, HOLD)
+    (detection,) = judge_log([alone], detector, signal, thresholds, activation, HOLD)
     return replace(detection, operation=operation)
 
 
-def _signal_of_log(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str]) -> Signal:
+def signal_of_log(operation: Operation, machine: Machine, detector: Detector, watched: Sequence[str]) -> Signal:
+    """Return the detector's signal of the whole log of an operation, for the watched joints (empty: all).
+
+    Raises as `run_detector`.
+    """
     recording = operation.whole.without_ground_truth()
     signal = checked_signal(detector, recording, machine)
     lost = _lost_inputs(detector, recording, machine, signal)
@@ -226,7 +230,7 @@ def _rows(signal: Signal, operation: Operation) -> slice:
     return slice(None) if operation.log is None else signal.rows(part.start, part.end)
 
 
-def _judge_log(
+def judge_log(
     operations: Sequence[Operation],
     detector: str,
     signal: Signal,
@@ -234,6 +238,7 @@ def _judge_log(
     activation: Activation,
     hold: float,
 ) -> list[Detection]:
+    """Compare a detector's signal of a whole log with thresholds; as `detect_operations`."""
     if not thresholds:
         return [_nothing_learned(item, detector, signal.part(_rows(signal, item))) for item in operations]
     judgement = judged(operations[0].whole, signal, thresholds, operations[0].cut, hold)

@@ -81,9 +81,9 @@ class Threshold(Protocol):
     -----
     Optional: `by_class`, True if the rule learns each class of motion separately; what it fits then has `motion`, the
     class it belongs to. `per_run`, True, also of what it fits, if the limits are determined in each run itself: `fit`
-    needs no runs, and in a log that is cut each stroke is evaluated separately. A field `sides` that is None is set to
-    the machine's, a field `signature` that is None to [signature] of the benchmark file. docs/own-detector.md has a
-    complete example.
+    needs no runs, and in a log that is cut each stroke is evaluated separately. `searched`, the values that
+    `cdtool tune` tries, by the name of the setting. A field `sides` that is None is set to the machine's, a field
+    `signature` that is None to [signature] of the benchmark file. docs/own-detector.md has a complete example.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -70,6 +70,7 @@ class Cusum:
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
     fitted: ClassVar[tuple[type, ...]] = (FittedSequential,)
     by_class: ClassVar[bool] = True
+    searched: ClassVar[Mapping[str, tuple[float, ...]]] = {"order": (4, 12), "drift": (0.25, 0.5, 1.0, 2.0)}
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -71,6 +71,7 @@ class Innovation:
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
     fitted: ClassVar[tuple[type, ...]] = (FittedSequential,)
     by_class: ClassVar[bool] = True
+    searched: ClassVar[Mapping[str, tuple[int, ...]]] = {"order": (4, 12)}
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

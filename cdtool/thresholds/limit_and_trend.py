@@ -137,6 +137,7 @@ class LimitAndTrend:
     name: ClassVar[str] = "limit_and_trend"
     needs: ClassVar[tuple[str, ...]] = ()
     fitted: ClassVar[tuple[type, ...]] = (FittedStatisticLimit, FittedTrendTable)
+    searched: ClassVar[Mapping[str, tuple[float, ...]]] = {"time_constant": (0.005, 0.01, 0.02, 0.04)}
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

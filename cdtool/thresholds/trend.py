@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -58,6 +58,7 @@ class Trend:
     name: ClassVar[str] = "trend"
     needs: ClassVar[tuple[str, ...]] = ()
     fitted: ClassVar[tuple[type, ...]] = (FittedStatisticLimit,)
+    searched: ClassVar[Mapping[str, tuple[float, ...]]] = {"time_constant": (0.005, 0.01, 0.02, 0.04)}
 
     def __post_init__(self) -> None:
         check_sides(self.safety_factor, self.sides)

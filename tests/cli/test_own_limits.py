@@ -8,7 +8,7 @@ import pytest
 from cdtool.activation import Activation
 from cdtool.detection import Signal, Status
 from cdtool.operations import operations_of
-from cdtool.pipeline import _judge_log
+from cdtool.pipeline import judge_log
 from cdtool.recording import Recording, Series
 from cdtool.thresholds.baseline import Baseline
 from tests.command import cdtool, one_line
@@ -100,7 +100,7 @@ def there_and_back():
 def detections(how, sides):
     recording, signal = there_and_back()
     limits = Baseline(sides=sides).fit([])
-    return _judge_log(operations_of(recording, how), "any", signal, (limits,), Activation(), 1.0)
+    return judge_log(operations_of(recording, how), "any", signal, (limits,), Activation(), 1.0)
 
 
 def test_each_stroke_of_a_log_that_is_cut_has_limits_of_its_own():
@@ -119,7 +119,7 @@ def test_a_contact_that_halts_the_axis_is_judged_by_the_limits_of_its_stroke():
     halted = Recording("slide", "slide.csv", ("slide",), {"speed": Series(time, speed, "m/s")})
     pressed = signal.changed(values=rising[:, np.newaxis])
     limits = (Baseline(sides="one").fit([]),)
-    found = _judge_log(operations_of(halted, "motion"), "any", pressed, limits, Activation(), 1.0)
+    found = judge_log(operations_of(halted, "motion"), "any", pressed, limits, Activation(), 1.0)
     assert 5.0 < found[0].verdict.alarms[0].time < 5.3
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
@@ -185,6 +185,38 @@ def score_runs(
 
 
 @dataclass(frozen=True)
+class LogToScore:
+    """A log or run of a benchmark as it is scored: its part that is used, cut into operations, and its contacts.
+
+    `unwanted` are contacts of a log that should have none.
+    """
+
+    recording: Recording
+    operations: Sequence[Operation]
+    contacts: Sequence[Contact] = ()
+    unwanted: Sequence[Contact] = ()
+
+
+def logs_to_score(setup: BenchmarkFile, group: str, path: Path) -> Iterator[LogToScore | Skipped]:
+    """Yield a log as it is scored, or each of its runs; the reason for one that cannot be used."""
+    cut = RunCut.of(setup.operations)
+    loads: list[_WholeLog | _OneRun] = [_WholeLog(setup, group, path, None)]
+    if cut is not None:
+        try:
+            runs = read_runs(path, setup.machine_file, cut)
+        except CdtoolError as fault:
+            yield unread(path, setup.path.parent, fault)
+            return
+        yield from reported(runs, path, setup.path.parent)[0]
+        loads = [_OneRun(setup, location(logged.recording.source), logged, None) for logged in runs.runs]
+    for load in loads:
+        try:
+            yield _log_to_score(setup, group, path, load)
+        except CdtoolError as fault:
+            yield unread(load.path, setup.path.parent, fault)
+
+
+@dataclass(frozen=True)
 class _WholeLog:
     """Reads a log that is one recording."""
 
@@ -219,6 +251,24 @@ def _of_others(ranges: LearnedRanges | None, name: str) -> PlausibleRanges | Non
     return None if ranges is None else ranges.without(name)
 
 
+def _log_to_score(setup: BenchmarkFile, group: str, log: Path, load: _WholeLog | _OneRun) -> LogToScore:
+    """Read a log or one of its runs; `log` is its path in the benchmark file. Raises RecordingError."""
+    rules, path = setup.rules_of(group), load.path
+    whole = load()
+    section = setup.sections.get(log, _WHOLE)
+    recording = section.of(whole)
+    operations = operations_of(recording, setup.operations)
+    if group == HOLDOUT:
+        unwanted: Sequence[Contact] = unwanted_contacts(whole, rules)
+        return LogToScore(recording, operations, (), section.contacts_of(whole, unwanted) if section else unwanted)
+    contacts: Sequence[Contact] = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
+    if section and contacts:
+        contacts = section.contacts_of(whole, contacts)
+        if not contacts:
+            raise RecordingError(f"{path}: no contact {section}", "change from and to, or move it to [holdout]")
+    return LogToScore(recording, operations, contacts)
+
+
 def _score(
     setup: BenchmarkFile,
     group: str,
@@ -232,25 +282,12 @@ def _score(
     rules, path = setup.rules_of(group), load.path
     begin = perf_counter()
     try:
-        whole = load()
-        section = setup.sections.get(log, _WHOLE)
-        recording = section.of(whole)
-        operations = operations_of(recording, setup.operations)
-        contacts: Sequence[Contact] = ()
-        unwanted: Sequence[Contact] = ()
-        if group == HOLDOUT:
-            unwanted = unwanted_contacts(whole, rules)
-            unwanted = section.contacts_of(whole, unwanted) if section else unwanted
-        else:
-            contacts = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
-        if section and contacts:
-            contacts = section.contacts_of(whole, contacts)
-            if not contacts:
-                raise RecordingError(f"{path}: no contact {section}", "change from and to, or move it to [holdout]")
+        read = _log_to_score(setup, group, log, load)
     except CdtoolError as fault:
         scored.leave_out(unread(path, setup.path.parent, fault), fault)
         scored.reading = perf_counter() - begin
         return scored
+    recording, operations, contacts, unwanted = read.recording, read.operations, read.contacts, read.unwanted
     scored.reading = perf_counter() - begin
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
     scored.findings += lost(recording)

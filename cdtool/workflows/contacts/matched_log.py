@@ -85,8 +85,8 @@ class DetectedLog:
 def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -> MatchedLog:
     """Match the detections of each operation with the log's contacts; `rearm` [s] is a setting of the activation."""
     recording, contacts, found = log.recording, log.contacts, log.detections
-    inside = _by_operation(log.operations, contacts)
-    curves, doubts = _curves(recording, contacts, rules.mass_before_cell)
+    inside = contacts_by_operation(log.operations, contacts)
+    curves, doubts = force_curves(recording, contacts, rules.mass_before_cell)
     warned = log_warnings(recording, contacts, rules.onset)
     findings = [
         *_unseen_onsets(contacts, rules.window),
@@ -131,7 +131,7 @@ def contacts_of(operation: Operation, contacts: Sequence[Contact]) -> tuple[Cont
     )
 
 
-def _by_operation(operations: Sequence[Operation], contacts: Sequence[Contact]) -> list[tuple[Contact, ...]]:
+def contacts_by_operation(operations: Sequence[Operation], contacts: Sequence[Contact]) -> list[tuple[Contact, ...]]:
     """Return the contacts of each operation; one at the boundary of two belongs to the earlier."""
     taken: set[Contact] = set()
     found = []
@@ -185,7 +185,7 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
     return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
 
 
-def _curves(
+def force_curves(
     recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
 ) -> tuple[dict[int, ForceTimeCurve], list[Finding]]:
     """Return the force over each contact that has an onset, by its number; a contact without a force is reported."""

@@ -1,0 +1,97 @@
+"""The recordings that a detector is tuned on, each in one of a few folds that never assess themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from cdtool.evaluation.force.curve import ForceTimeCurve
+from cdtool.operations import Operation
+from cdtool.recording import BoolArray, Contact, FloatArray
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """An impact-free operation, and the number of its fold."""
+
+    operation: Operation
+    fold: int
+
+
+@dataclass(frozen=True)
+class StruckLog:
+    """A log with contacts: its operations with the contacts of each, the group, and the number of its fold.
+
+    A contact may be detected up to `window` [s] after its onset. `curves` has the force over each contact of each
+    operation, None where it is unknown. `is_injected`: the contacts were computed.
+    """
+
+    operations: tuple[Operation, ...]
+    contacts: tuple[tuple[Contact, ...], ...]
+    curves: tuple[tuple[ForceTimeCurve | None, ...], ...]
+    group: str
+    window: float
+    fold: int
+    is_injected: bool = False
+
+
+@dataclass(frozen=True)
+class TuningRecordings:
+    """Impact-free operations and logs with contacts, in `folds` folds.
+
+    A subset of them is numbered: 0 is everything, k + 1 is what is not in fold k. `subsets` is 1 if the runs outside a
+    fold are too few for the budget, so that no figure can be checked on recordings that chose nothing.
+    """
+
+    free: tuple[FreeRun, ...]
+    struck: tuple[StruckLog, ...]
+    folds: int
+    is_nested: bool
+
+    @property
+    def subsets(self) -> int:
+        """Return the number of subsets."""
+        return 1 + self.folds if self.is_nested else 1
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Return the names of the groups of contacts, in the order of the logs."""
+        return tuple(dict.fromkeys(item.group for item in self.struck))
+
+    @cached_property
+    def group_of(self) -> npt.NDArray[np.int64]:
+        """Return the number of its group for each contact (C,), in the order of the logs."""
+        return np.array([self.groups.index(log.group) for log in self.struck for _ in _each(log)], dtype=np.int64)
+
+    @cached_property
+    def window_of(self) -> FloatArray:
+        """Return the window of each contact (C,) [s]."""
+        return np.array([log.window for log in self.struck for _ in _each(log)], dtype=np.float64)
+
+    @cached_property
+    def peak_of(self) -> FloatArray:
+        """Return the highest force of each contact (C,) [N]; NaN where it is unknown."""
+        curves = [curve for log in self.struck for of_operation in log.curves for curve in of_operation]
+        return np.array([np.nan if curve is None else curve.peak for curve in curves], dtype=np.float64)
+
+    @cached_property
+    def fold_of(self) -> npt.NDArray[np.int64]:
+        """Return the fold of each contact (C,)."""
+        return np.array([log.fold for log in self.struck for _ in _each(log)], dtype=np.int64)
+
+    def free_in(self, subset: int) -> list[int]:
+        """Return the numbers of the impact-free operations in a subset."""
+        return [number for number, run in enumerate(self.free) if run.fold != subset - 1]
+
+    def contacts_in(self, subset: int) -> BoolArray:
+        """Return whether each contact (C,) is in a subset."""
+        inside: BoolArray = self.fold_of != subset - 1
+        return inside
+
+
+def _each(log: StruckLog) -> Sequence[Contact]:
+    return [contact for of_operation in log.contacts for contact in of_operation]
