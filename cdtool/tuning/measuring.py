@@ -84,6 +84,10 @@ class Measuring:
         except CdtoolError as fault:
             return Measured.unusable(fault.message)
 
+    def remember(self, candidate: Candidate, signals: tuple[list[Pair], list[Signal]]) -> None:
+        """Keep the signals of a candidate's gains, of the impact-free operations and of the logs with contacts."""
+        self._signals[candidate.gains] = signals
+
     def _measured(self, candidate: Candidate) -> Measured:
         recordings = self.recordings
         monitored, detected = self._assessed(candidate)

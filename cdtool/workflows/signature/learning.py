@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from cdtool.activation import Activation, ActivationSettings
 from cdtool.errors import UsageError
@@ -23,7 +24,8 @@ from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import PartOfLog, RunReading, check_joints, load_runs
+from cdtool.workflows.log_groups import Split
+from cdtool.workflows.runs import PartOfLog, RunReading, Runs, check_joints, load_runs
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.signature.normal_runs import normal_motions
@@ -139,12 +141,35 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     workers = options.workers or Workers(options.jobs)
     reading = RunReading(operations, onset=options.onset, part=part, workers=workers, progress=options.progress)
     runs = load_runs(paths, machine_file, reading)
+    return learned_from_runs(
+        runs, machine_file, instance, wanted, Setting(joints, operations, raised_by, budget, Split.RECORDING)
+    )
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a signature is learned with beside its rule: joints, how logs are cut, activation, budget, and its folds."""
+
+    joints: Sequence[str]
+    operations: str
+    activation: Activation
+    budget: Budget | None
+    split: Split
+
+
+def learned_from_runs(
+    runs: Runs, machine_file: MachineFile, instance: Any, rule: Threshold, setting: Setting
+) -> Learned:
+    """Learn the threshold of a detector from runs that have been read; raises as `learn`."""
+    joints, operations, budget = setting.joints, setting.operations, setting.budget
     pairs, skipped = signals_of(runs.operations, machine_file.machine, instance, joints, runs.skipped)
-    fit = fitting(wanted)
+    fit = fitting(rule)
     fitted = with_left_out(fit, [*runs.skipped, *skipped])(pairs)
-    thresholds, origin = fitted.thresholds, FactorOrigin("hand" if set_by_hand(wanted) else "default")
+    thresholds, origin = fitted.thresholds, FactorOrigin("hand" if set_by_hand(rule) else "default")
     if budget:
-        made = calibrate(budget, instance.name, in_fixed_order(kept(pairs, fitted.skipped)), fit, raised_by)
+        made = calibrate(
+            budget, instance.name, in_fixed_order(kept(pairs, fitted.skipped)), fit, setting.activation, setting.split
+        )
         thresholds = tuple(item.with_safety_factor(made.factor) for item in thresholds)
         origin = FactorOrigin("budget", str(budget), made.operations, made.alarms)
     signature = SignatureFile(
@@ -154,9 +179,9 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
         gains=asdict(instance),
         unit=instance.unit(machine_file.machine),
         joints=pairs[0][1].joints,
-        rule=wanted,
+        rule=rule,
         origin=origin,
-        activation=raised_by,
+        activation=setting.activation,
         current=thresholds,
         first=thresholds,
         runs=tuple(learned_run(operation) for operation in fitted.used),

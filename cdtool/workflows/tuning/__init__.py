@@ -1,0 +1,1 @@
+"""`cdtool tune`: search a detector's gains, threshold and activation at a false-alarm budget."""

@@ -1,0 +1,161 @@
+"""The recordings of a benchmark file that detectors are tuned on, each in a fold."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cdtool.errors import UsageError
+from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.operations import Operation
+from cdtool.plain_text import counted
+from cdtool.recording import Contact
+from cdtool.tuning.recordings import FreeRun, StruckLog, TuningRecordings
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
+from cdtool.workflows.contacts.matched_log import contacts_by_operation, force_curves
+from cdtool.workflows.execution.workers import Progress, Workers, in_order
+from cdtool.workflows.log_groups import Split, split_names
+from cdtool.workflows.runs import Runs, load_runs
+
+FOLDS = 5
+# To check a limit on runs that did not set it, a fifth of them is set aside.
+_TO_CHECK = FOLDS / (FOLDS - 1)
+
+
+@dataclass(frozen=True)
+class ReadRecordings:
+    """The runs learned from as they were read, and the recordings to tune on with what was left out of them."""
+
+    runs: Runs
+    recordings: TuningRecordings
+    skipped: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
+
+
+def read_recordings(
+    setup: BenchmarkFile, budget: Budget, seed: int, workers: Workers, progress: Progress | None = None
+) -> ReadRecordings:
+    """Read the impact-free runs and the logs with contacts of a benchmark file; the hold-out is not touched.
+
+    Raises UsageError if there are too few runs for the budget, or no contacts.
+    """
+    runs = load_runs(setup.learn, setup.machine_file, setup.run_reading(workers))
+    check_enough(budget, runs.operations)
+    listed = [(name, path) for name, group in setup.impacts.items() if name != HOLDOUT for path in group.logs]
+    read = in_order(_Reading(setup), listed, len(listed), workers, progress=progress, together=8)
+    struck: list[StruckLog] = []
+    skipped: list[Skipped] = []
+    for made in read:
+        struck += [item for item in made if isinstance(item, StruckLog)]
+        skipped += [item for item in made if isinstance(item, Skipped)]
+    if not struck:
+        raise UsageError(f"{setup.path}: no contact to tune on", "add logs with contacts under [impacts], or [inject]")
+    recordings = in_folds(runs.operations, struck, setup.split, seed, is_nested=is_checkable(budget, runs.operations))
+    return ReadRecordings(runs, recordings, (*runs.skipped, *skipped), runs.findings)
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """Reads a log with contacts, given with its group, or each of its runs."""
+
+    setup: BenchmarkFile
+
+    def __call__(self, item: tuple[str, Path]) -> list[StruckLog | Skipped]:
+        group, path = item
+        found: list[StruckLog | Skipped] = []
+        for log in logs_to_score(self.setup, group, path):
+            found += [log] if isinstance(log, Skipped) else [*self._struck(group, log)]
+        return found
+
+    def _struck(self, group: str, log: LogToScore) -> list[StruckLog | Skipped]:
+        rules, own = self.setup.rules_of(group), self.setup.impacts[group]
+        inside: list[tuple[Contact, ...]] = [
+            tuple(contact for contact in contacts if not contact.in_progress)
+            for contacts in contacts_by_operation(log.operations, log.contacts)
+        ]
+        if not any(inside):
+            return [Skipped(log.recording.name, "no contact with a known onset is inside an operation")]
+        curves, _ = force_curves(log.recording, log.contacts, rules.mass_before_cell)
+        number = {contact: index for index, contact in enumerate(log.contacts, 1)}
+        of_contacts = tuple(tuple(curves.get(number[contact]) for contact in contacts) for contacts in inside)
+        injected = own.injected is not None
+        return [StruckLog(tuple(log.operations), tuple(inside), of_contacts, group, rules.window, 0, injected)]
+
+
+def check_enough(budget: Budget, operations: Sequence[Operation]) -> None:
+    """Raise UsageError if there are too few impact-free runs to set a limit for the budget, with how many are needed.
+
+    A budget per hour is checked with the time that a detector could monitor.
+    """
+    if budget.per != "operation" or len(operations) >= budget.needed:
+        return
+    many = counted(len(operations), "impact-free run")
+    needed = f"{budget.needed:.0f} are needed to set the limit, {to_check(budget):.0f} to check it"
+    sure = ""
+    if budget.confidence is None:
+        sure = f", {Budget(budget.rate, budget.per, 0.95).needed:.0f} to be 95 % sure of it"
+    raise UsageError(f"{many} for a false-alarm budget of {budget}: {needed}{sure}", "add runs, or choose a larger one")
+
+
+def to_check(budget: Budget) -> float:
+    """Return the exposure that is needed to set a limit without a fifth of it, and to check it on that."""
+    exchangeable = budget.needed + 1.0 if budget.per == "operation" and budget.confidence is None else budget.needed
+    return math.ceil(_TO_CHECK * exchangeable - 1e-9) if budget.per == "operation" else _TO_CHECK * exchangeable
+
+
+def is_checkable(budget: Budget, operations: Sequence[Operation]) -> bool:
+    """Return whether there are enough runs to check a limit on runs that did not set it."""
+    if budget.per == "operation":
+        return len(operations) >= to_check(budget)
+    return sum(item.recording.duration for item in operations) / 3600.0 >= to_check(budget)
+
+
+def in_folds(
+    free: Sequence[Operation], struck: Sequence[StruckLog], split: Split, seed: int, *, is_nested: bool
+) -> TuningRecordings:
+    """Return the recordings dealt to up to five folds, in an order that depends on their content and the seed only.
+
+    Contacts of each group are dealt evenly. What stays together by `split` is in one fold, and so are parts of one
+    recording. Raises UsageError as `split_names`.
+    """
+
+    def order(operation: Operation) -> tuple[str, int, str]:
+        own = hashlib.sha256(f"{seed} {operation.recording.digest}".encode()).hexdigest()
+        return own, operation.number, operation.name
+
+    ordered = sorted(free, key=order)
+    names: dict[int, str] = {}
+    if split is not Split.RECORDING:
+        first = [item.operations[0] for item in struck]
+        split_names(split, ordered)
+        both = [*ordered, *first]
+        names = dict(zip(map(id, both), split_names(split, both), strict=True))
+    fold_of: dict[str, int] = {}
+
+    def fold(operation: Operation, dealt: int) -> int:
+        name = names.get(id(operation)) or operation.whole.digest or operation.whole.name
+        return fold_of.setdefault(name, dealt % FOLDS)
+
+    runs = [FreeRun(item, fold(item, number if not names else len(fold_of))) for number, item in enumerate(ordered)]
+    by_group: dict[str, list[StruckLog]] = {}
+    for log in struck:
+        by_group.setdefault(log.group, []).append(log)
+    placed = []
+    for members in by_group.values():
+        for number, log in enumerate(sorted(members, key=lambda item: order(item.operations[0]))):
+            placed.append((log, fold(log.operations[0], number if not names else len(fold_of))))
+    return TuningRecordings(
+        tuple(runs),
+        tuple(_in_fold(log, number) for log, number in placed),
+        max(FOLDS if not names else 0, *(number + 1 for number in fold_of.values())),
+        is_nested,
+    )
+
+
+def _in_fold(log: StruckLog, fold: int) -> StruckLog:
+    return StruckLog(log.operations, log.contacts, log.curves, log.group, log.window, fold, log.is_injected)

@@ -1,0 +1,405 @@
+"""Tune the detectors of a benchmark file at a false-alarm budget, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdtool.activation import DEBOUNCE_TIME, Activation
+from cdtool.errors import CdtoolError, UsageError, nearest
+from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.kernel_warm_up import compile_loaded
+from cdtool.motion.applicable import HOLD
+from cdtool.pipeline import run_detector, signal_of_log
+from cdtool.thresholds import THRESHOLDS
+from cdtool.thresholds.base import FittedThreshold, Threshold
+from cdtool.thresholds.settings import with_context
+from cdtool.tuning.candidate import Candidate, Measured
+from cdtool.tuning.grid import SHORTEST_DEBOUNCE, debounces_to_try, rules_to_try
+from cdtool.tuning.measuring import Choice, HeldOut, Measuring, Pair
+from cdtool.tuning.objective import WORSE_AT_MOST, Goal, Objective
+from cdtool.tuning.recordings import TuningRecordings
+from cdtool.tuning.search import Scored, Searched, search
+from cdtool.tuning.tuned import (
+    TunedDetector,
+    apparent_figures,
+    pareto_of,
+    pooled,
+    sensitivities_of,
+    settings_of,
+    steps_of,
+)
+from cdtool.value_words import value_in_words
+from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors
+from cdtool.workflows.benchmark.determinants import how_logs_are_read
+from cdtool.workflows.benchmark.with_injected import with_injected
+from cdtool.workflows.execution.workers import Progress, Workers, in_order
+from cdtool.workflows.runs import Runs
+from cdtool.workflows.signature.fitting import fitting, for_machine
+from cdtool.workflows.store.digest import code_version, digest_of
+from cdtool.workflows.tuning.journal import Journal
+from cdtool.workflows.tuning.recordings_to_tune import ReadRecordings, read_recordings
+
+# Which contacts a detector is tuned on.
+IMPACTS = ("real", "injected", "both")
+# Called after each round of a search: the detector, the candidates measured so far, and the best so far in words.
+Watch = Callable[[str, int, str], None]
+
+
+@dataclass(frozen=True)
+class TuningOptions:
+    """How detectors are tuned.
+
+    `impacts`: which contacts if there are real and injected ones. `worse_at_most`: the share by which a group may get
+    worse than by default. `shortest_debounce` [s]. `seed` decides how recordings are dealt to the folds.
+    """
+
+    budget: Budget
+    detectors: tuple[str, ...] = ()
+    goal: Goal = Goal.LATENCY
+    impacts: str | None = None
+    worse_at_most: float = WORSE_AT_MOST
+    shortest_debounce: float = SHORTEST_DEBOUNCE
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """The tuned detectors, the best first; what was left out; and the inputs.
+
+    `unusable` maps detectors that cannot be tuned to the reason. `is_nested`: there are figures of recordings that
+    chose nothing. `groups` has the number of contacts by group.
+    """
+
+    setup: BenchmarkFile
+    options: TuningOptions
+    detectors: tuple[TunedDetector, ...]
+    unusable: Mapping[str, str]
+    runs: Runs
+    groups: Mapping[str, int]
+    is_nested: bool
+    skipped: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
+
+
+def tune(
+    file: str | Path | BenchmarkFile,
+    options: TuningOptions,
+    *,
+    journals: Path | None = None,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+    watch: Watch = lambda name, count, best: None,  # noqa: ARG005
+) -> Tuning:
+    """Search gains, threshold and debounce of the detectors of a benchmark file at a false-alarm budget.
+
+    Parameters
+    ----------
+    file : str, Path or BenchmarkFile
+        The benchmark file: [learn] has the impact-free runs, [impacts] or [inject] the contacts. The hold-out is not
+        used.
+    options : TuningOptions
+        The budget, and what is searched for.
+    journals : Path, optional
+        A folder for what is measured, from which an interrupted search goes on.
+    workers : Workers, optional
+        How many candidates are measured at a time; the result does not depend on it.
+    progress : callable, optional
+        Called while logs are read.
+    watch : callable, optional
+        Called after each round of a search.
+
+    Returns
+    -------
+    Tuning
+        The tuned detectors, the best first.
+
+    Raises
+    ------
+    UsageError
+        The runs cannot support the budget, real and injected contacts are mixed, or there is no contact.
+    ConfigurationError
+        The benchmark file is wrong.
+
+    Examples
+    --------
+    >>> from cdtool.evaluation.false_alarm_budget import Budget
+    >>> options = TuningOptions(Budget.parse("1/20op"), ("momentum",))
+    >>> tune("sample_logs/gate/benchmark.toml", options)
+    Traceback (most recent call last):
+    cdtool.errors.UsageError: 10 impact-free runs for a false-alarm budget of 1/20op: 19 are needed to set the limit...
+    """
+    workers = workers or Workers()
+    setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=options.detectors)
+    setup = with_detectors(setup, options.detectors) if options.detectors else setup
+    setup = _with_impacts(setup, options.impacts, workers, progress)
+    with workers.ready():
+        compile_loaded()
+        read = read_recordings(setup, options.budget, options.seed, workers, progress)
+        made: list[TunedDetector] = []
+        unusable: dict[str, str] = {}
+        skipped = list(read.skipped)
+        for name in setup.detectors:
+            try:
+                tuned, left_out = _TuningOf(setup, options, read, name, workers).tuned(journals, watch)
+            except CdtoolError as fault:
+                unusable[name] = fault.message
+                continue
+            made.append(tuned)
+            skipped += left_out
+    if not made:
+        name, reason = next(iter(unusable.items()))
+        raise UsageError(f"no detector can be tuned; {name}: {reason}", "check the logs with cdtool info")
+    groups = dict(zip(read.recordings.groups, _counts(read.recordings), strict=True))
+    return Tuning(
+        setup,
+        options,
+        tuple(sorted(made, key=lambda item: item.honest.score)),
+        unusable,
+        read.runs,
+        groups,
+        read.recordings.is_nested,
+        tuple(dict.fromkeys((*skipped, *setup.not_injected))),
+        read.findings,
+    )
+
+
+def _counts(recordings: TuningRecordings) -> list[int]:
+    return [int(count) for count in np.bincount(recordings.group_of, minlength=len(recordings.groups))]
+
+
+def _with_impacts(
+    setup: BenchmarkFile, impacts: str | None, workers: Workers, progress: Progress | None
+) -> BenchmarkFile:
+    """Return the benchmark with the contacts to tune on; raises UsageError if two kinds would be mixed unasked."""
+    if impacts is not None and impacts not in IMPACTS:
+        raise UsageError(f"--impacts is '{impacts}'", nearest(impacts, IMPACTS))
+    real = [name for name in setup.impacts if name != HOLDOUT]
+    if impacts is None and real and setup.inject is not None:
+        raise UsageError(
+            f"{setup.path} has real contacts ({', '.join(real)}) and injected ones",
+            "give --impacts real, --impacts injected, or --impacts both",
+        )
+    if impacts == "real":
+        return replace(setup, inject=None)
+    if impacts == "injected" and setup.inject is None:
+        raise UsageError(f"--impacts injected, but {setup.path} has no section [inject]", "add one: docs/injection.md")
+    setup = with_injected(setup, workers, progress)
+    if impacts != "injected":
+        return setup
+    kept = {name: group for name, group in setup.impacts.items() if group.injected is not None or name == HOLDOUT}
+    return replace(setup, impacts=kept)
+
+
+@dataclass(frozen=True)
+class _TuningOf:
+    """The tuning of one detector."""
+
+    setup: BenchmarkFile
+    options: TuningOptions
+    read: ReadRecordings
+    name: str
+    workers: Workers
+
+    def tuned(self, journals: Path | None, watch: Watch) -> tuple[TunedDetector, list[Skipped]]:
+        """Return the tuned detector, and the recordings that it cannot use."""
+        recordings, signals, skipped = self._usable()
+        period = float(np.median([signal.period for _, signal in signals[0]]))
+        debounces, activations = self._activations(period)
+        rule = for_machine(self.setup.rule, self.setup.machine_file.machine)
+        default = Candidate.of(self._detector, rule)
+        measuring = self._measuring(recordings, activations)
+        measuring.remember(default, signals)
+        objective = Objective(self.options.goal, recordings, self.options.worse_at_most)
+        journal = self._journal(journals, measuring)
+        words = [_debounce_words(activation) for activation in activations]
+        measure = _MeasuresAll(measuring, self.workers, journal)
+        channels = set.intersection(*(set(run.operation.recording.channels) for run in recordings.free))
+        grid = [Candidate(default.gains, item) for item in self._rules(rule, channels)]
+        found = search(
+            default,
+            0,
+            grid,
+            objective,
+            measure,
+            lambda count, best: watch(self.name, count, in_words(best, words) if best else ""),
+        )
+        if not np.isfinite(found.best.score):
+            reason = found.measured[default.key].reason or "no candidate is acceptable"
+            raise UsageError(f"{self.name} cannot be tuned: {reason}", "check the logs with cdtool info")
+        return self._result(found, objective, measure, debounces, words), skipped
+
+    @property
+    def _detector(self) -> Any:
+        return self.setup.machine_file.detector(self.name)
+
+    def _usable(self) -> tuple[TuningRecordings, tuple[list[Pair], list[Any]], list[Skipped]]:
+        """Return the recordings that the detector can use with its signals of them, and what is left out."""
+        recordings, setup = self.read.recordings, self.setup
+        machine, skipped = setup.machine_file.machine, []
+        free, pairs, struck, signals = [], [], [], []
+        for run in recordings.free:
+            try:
+                pairs.append((run.operation, run_detector(run.operation, machine, self._detector, setup.watched)))
+                free.append(run)
+            except CdtoolError as fault:
+                skipped.append(Skipped(run.operation.name, str(fault)))
+        for log in recordings.struck:
+            refused = setup.impacts[log.group].refused.get(self.name)
+            if refused is not None:
+                continue
+            try:
+                signals.append(signal_of_log(log.operations[0], machine, self._detector, setup.watched))
+                struck.append(log)
+            except CdtoolError as fault:
+                skipped.append(Skipped(log.operations[0].whole.name, str(fault)))
+        if not pairs or not struck:
+            reason = skipped[0].reason if skipped else "injected contacts cannot test it"
+            raise UsageError(f"{self.name} cannot be used on these logs: {reason}", "check the logs with cdtool info")
+        fitted = fitting(for_machine(setup.signature, machine))(pairs)
+        names = {item.recording for item in fitted.skipped}
+        skipped += fitted.skipped
+        usable = [number for number, run in enumerate(free) if run.operation.name not in names]
+        made = replace(recordings, free=tuple(free[number] for number in usable), struck=tuple(struck))
+        return made, ([pairs[number] for number in usable], signals), skipped
+
+    def _activations(self, period: float) -> tuple[list[int], tuple[Activation, ...]]:
+        """Return the debounces to try [samples] and their activations, the benchmark file's first."""
+        given = self.setup.activation
+        own = given.debounce or max(1, round(DEBOUNCE_TIME / period))
+        others = [count for count in debounces_to_try(period, self.options.shortest_debounce) if count != own]
+        return [own, *others], (given, *(replace(given, debounce=count) for count in others))
+
+    def _rules(self, default: Threshold, channels: set[str]) -> list[Threshold]:
+        """Return the rules to try: every registered one, the benchmark file's with its own settings."""
+        machine, setup = self.setup.machine_file.machine, self.setup
+        signature = replace(setup.signature, adaptive_level=0.0)
+        rules: list[Threshold] = []
+        for name in THRESHOLDS.usable_names():
+            rule = THRESHOLDS.load(name)
+            made = setup.signature if name == "signature" else with_context(rule(), setup.signature.sides, signature)
+            rules.append(default if name == default.name else for_machine(made, machine))
+        return rules_to_try(rules, channels)
+
+    def _measuring(self, recordings: TuningRecordings, activations: tuple[Activation, ...]) -> Measuring:
+        setup = self.setup
+        hold = max(HOLD, *(log.window for log in recordings.struck))
+        machine = setup.machine_file.machine
+        return Measuring(
+            recordings, machine, self._detector, setup.watched, self.options.budget, activations, learned, hold
+        )
+
+    def _journal(self, folder: Path | None, measuring: Measuring) -> Journal | None:
+        if folder is None:
+            return None
+        recordings = measuring.recordings
+        free = [(run.operation.recording.digest, run.operation.number, run.fold) for run in recordings.free]
+        struck = [
+            (log.operations[0].whole.digest, log.group, log.fold, log.window, log.contacts) for log in recordings.struck
+        ]
+        key = digest_of(
+            code_version(),
+            how_logs_are_read(self.setup),
+            self._detector,
+            self.setup.watched,
+            self.options.budget,
+            measuring.activations,
+            measuring.hold,
+            recordings.is_nested,
+            free,
+            struck,
+        )
+        return Journal(folder / f"{self.name}.jsonl", key)
+
+    def _result(
+        self, found: Searched, objective: Objective, measure: _MeasuresAll, debounces: list[int], words: list[str]
+    ) -> TunedDetector:
+        seed, best = self.options.seed, found.best
+        default = Scored(found.default, found.default_debounce, best.costs, found.subsets[0].default.score)
+        nested = default_nested = None
+        chosen = [subset.best for subset in found.subsets[1:]]
+        default_reason = found.measured[found.default.key].reason
+        if chosen:
+            nested = pooled(objective, measure.held_out(chosen), seed)
+            if not default_reason:
+                default_nested = pooled(objective, measure.held_out([default] * len(chosen)), seed)
+        apparent = apparent_figures(objective, found, best, seed)
+        assert apparent is not None, "the best candidate can be used"
+        measured = found.measured[best.candidate.key]
+        unusable: dict[str, str] = {}
+        for key, item in found.measured.items():
+            if item.reason:
+                unusable.setdefault(_rule_name(key), item.reason)
+        given = self.setup.activation.debounce
+        return TunedDetector(
+            detector=self.name,
+            short_name=self._detector.short_name,
+            default=found.default,
+            choice=best.candidate,
+            debounce=debounces[best.debounce] if best.debounce else given,
+            factor=float(measured.factors[best.debounce, 0]),
+            apparent=apparent,
+            nested=nested,
+            default_apparent=None if default_reason else apparent_figures(objective, found, default, seed),
+            default_nested=default_nested,
+            default_reason=default_reason,
+            sensitivities=sensitivities_of(found, debounces),
+            steps=steps_of(found),
+            pareto=pareto_of(objective, found, words),
+            candidates=len(found.measured),
+            unusable=unusable,
+            chosen_in_folds=tuple(in_words(item, words) for item in chosen),
+        )
+
+
+def learned(rule: Threshold, pairs: Sequence[Pair]) -> tuple[FittedThreshold, ...]:
+    """Return the thresholds that a rule learns from runs; raises SignatureError, also for a run that is left out."""
+    return fitting(rule)(pairs).thresholds
+
+
+def _rule_name(key: str) -> str:
+    from json import loads
+
+    return str(loads(key)[1]["rule"])
+
+
+def _debounce_words(activation: Activation) -> str:
+    return "9 ms" if activation.debounce is None else f"{activation.debounce} samples"
+
+
+def in_words(item: Scored, debounces: Sequence[str]) -> str:
+    """Return a choice in words: threshold, settings, debounce."""
+    settings = ", ".join(f"{name} {value_in_words(value)}" for name, value in settings_of(item.candidate).items())
+    return f"{item.candidate.rule.name}, {settings}, debounce {debounces[item.debounce]}"
+
+
+@dataclass(frozen=True)
+class _MeasuresAll:
+    """Measures candidates and choices with several workers; what a journal has is not measured again."""
+
+    measuring: Measuring
+    workers: Workers
+    journal: Journal | None
+
+    def __call__(self, candidates: Sequence[Candidate]) -> list[Measured]:
+        """Return what each candidate gives."""
+        known: dict[str, Measured] = dict(self.journal.known) if self.journal else {}
+        new = [item for item in candidates if item.key not in known]
+        for item, made in zip(new, self._all(new), strict=True):
+            known[item.key] = made
+            if self.journal:
+                self.journal.add(item, made)
+        return [known[item.key] for item in candidates]
+
+    def held_out(self, chosen: Sequence[Scored]) -> list[HeldOut]:
+        """Return what the choice without each fold gives on that fold."""
+        choices = [Choice(item.candidate, item.debounce, fold) for fold, item in enumerate(chosen)]
+        return list(self._all(choices))
+
+    def _all(self, items: Sequence[Any]) -> Iterator[Any]:
+        return in_order(self.measuring, items, len(items), self.workers)
