@@ -85,7 +85,7 @@ class Detector(Protocol):
         ...
 
 
-def gain(default: float, unit: str, meaning: str) -> Any:
+def gain(default: float, unit: str, meaning: str, *, searched: bool = True) -> Any:
     """Return the dataclass field of a gain, with its unit and meaning as metadata.
 
     Parameters
@@ -96,6 +96,8 @@ def gain(default: float, unit: str, meaning: str) -> Any:
         Unit for a linear axis, for example "rad/s"; "1" for a ratio.
     meaning : str
         What the gain sets, as `cdtool list detectors` shows it.
+    searched : bool
+        Whether `cdtool tune` searches it: not what belongs to a sensor, or decides where the method applies.
 
     Returns
     -------
@@ -112,7 +114,7 @@ def gain(default: float, unit: str, meaning: str) -> Any:
     >>> fields(TorqueRate)[0].default, fields(TorqueRate)[0].metadata["unit"]
     (2.0, 'Hz')
     """
-    return field(default=default, metadata={"unit": unit, "meaning": meaning})
+    return field(default=default, metadata={"unit": unit, "meaning": meaning, "searched": searched})
 
 
 def require_positive(detector: object, *names: str) -> None:

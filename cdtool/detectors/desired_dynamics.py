@@ -73,7 +73,9 @@ class DesiredDynamics:
     """
 
     cutoff: Gain = gain(5.0, "Hz", "cut-off frequency of the low-pass")
-    tracking_limit: Gain = gain(0.2, "m", "tracking error beyond which the method is not applicable (rad: robots)")
+    tracking_limit: Gain = gain(
+        0.2, "m", "tracking error beyond which the method is not applicable (rad: robots)", searched=False
+    )
 
     name: ClassVar[str] = "desired_dynamics"
     short_name: ClassVar[str] = "ddd"

@@ -75,7 +75,9 @@ class Energy:
     """
 
     bandwidth: Gain = gain(10.0, "rad/s", "observer gain k: the residual follows the power with time constant 1/k")
-    minimum_speed: Gain = gain(0.03, "m/s", "below it the observer is not applicable; norm of the joints' speeds")
+    minimum_speed: Gain = gain(
+        0.03, "m/s", "below it the observer is not applicable; norm of the joints' speeds", searched=False
+    )
 
     name: ClassVar[str] = "energy"
     short_name: ClassVar[str] = "eo"

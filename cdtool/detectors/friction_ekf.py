@@ -117,13 +117,19 @@ class FrictionEkf:
     """
 
     sigma_acceleration: Gain = gain(0.1, "m/s2", "noise of the accelerometer, structure included (standard deviation)")
-    sigma_speed: Gain = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
+    sigma_speed: Gain = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)", searched=False)
     friction_drift: Gain = gain(220.0, "N s/m per sqrt(s)", "how fast the friction may change: the square is q_d")
-    drift_acceleration: Gain = gain(9e-3, "m/s2 per sample", "unmodelled force over mass (standard deviation)")
-    drift_speed: Gain = gain(1e-4, "m/s per sample", "unmodelled speed (standard deviation)")
-    sigma_position: Gain = gain(1e-3, "rad", "noise of the angle (standard deviation); planar arm")
-    drift_position: Gain = gain(1e-4, "rad per sample", "unmodelled angle (standard deviation); planar arm")
-    minimum_speed: Gain = gain(0.03, "m/s", "below it the filter is not applicable; 15 % of the nominal speed")
+    drift_acceleration: Gain = gain(
+        9e-3, "m/s2 per sample", "unmodelled force over mass (standard deviation)", searched=False
+    )
+    drift_speed: Gain = gain(1e-4, "m/s per sample", "unmodelled speed (standard deviation)", searched=False)
+    sigma_position: Gain = gain(1e-3, "rad", "noise of the angle (standard deviation); planar arm", searched=False)
+    drift_position: Gain = gain(
+        1e-4, "rad per sample", "unmodelled angle (standard deviation); planar arm", searched=False
+    )
+    minimum_speed: Gain = gain(
+        0.03, "m/s", "below it the filter is not applicable; 15 % of the nominal speed", searched=False
+    )
 
     name: ClassVar[str] = "friction_ekf"
     short_name: ClassVar[str] = "feekf"

@@ -86,7 +86,7 @@ class InertialMomentum:
 
     bandwidth: Gain = gain(10.0, "rad/s", "observer gain K")
     crossover: Gain = gain(5.0, "rad/s", "w_c: below it the speed counts, above it the accelerometer")
-    damping: Gain = gain(1.0, "1", "zeta of the complementary filter, 0.7 to 1")
+    damping: Gain = gain(1.0, "1", "zeta of the complementary filter, 0.7 to 1", searched=False)
 
     name: ClassVar[str] = "inertial_momentum"
     short_name: ClassVar[str] = "igm"

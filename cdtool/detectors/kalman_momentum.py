@@ -77,8 +77,10 @@ class KalmanMomentum:
     [0.0, 30.0]
     """
 
-    sigma_speed: Gain = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)")
-    sigma_torque: Gain = gain(20.0, "N", "noise of torque and model, white from sample to sample (standard deviation)")
+    sigma_speed: Gain = gain(3.5e-3, "m/s", "noise of the speed (standard deviation)", searched=False)
+    sigma_torque: Gain = gain(
+        20.0, "N", "noise of torque and model, white from sample to sample (standard deviation)", searched=False
+    )
     contact_drift: Gain = gain(13.0, "N per sqrt(s)", "how fast the contact torque may change")
 
     name: ClassVar[str] = "kalman_momentum"

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 from cdtool.tuning.candidate import Candidate
 
 # The first factor; the last one is the smallest that is tried. So many evaluations at most.
-_FIRST, _LAST = 2.0, 2.0**0.25
+_FIRST, _LAST = 2.0, 2.0**0.5
 EVALUATIONS = 40
 # A gain is not moved further from where it began than by this factor.
 FARTHEST = 32.0
 # An improvement below this [log cost] is none.
-_LEAST_GAIN = 2e-3
+_LEAST_GAIN = 1e-2
 
 
 @dataclass
@@ -75,11 +76,16 @@ def _size(candidate: Candidate, name: str) -> float:
     return float(value[0] if isinstance(value, tuple) else value)
 
 
-def movable_gains(candidate: Candidate) -> tuple[str, ...]:
-    """Return the names of the gains that a factor changes: finite numbers above 0."""
+def movable_gains(detector: Any, candidate: Candidate) -> tuple[str, ...]:
+    """Return the names of the gains that are searched: numbers above 0 that the detector does not leave out."""
+    left_out = {item.name for item in fields(detector) if not item.metadata.get("searched", True)}
     found = []
     for name, value in candidate.gains:
         values = value if isinstance(value, tuple) else (value,)
-        if values and all(isinstance(item, float) and 0.0 < item < math.inf for item in values):
+        if (
+            name not in left_out
+            and values
+            and all(isinstance(item, float) and 0.0 < item < math.inf for item in values)
+        ):
             found.append(name)
     return tuple(found)

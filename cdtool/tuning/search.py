@@ -14,7 +14,7 @@ import numpy as np
 
 from cdtool.recording import FloatArray
 from cdtool.tuning.candidate import Candidate, Measured
-from cdtool.tuning.coordinate_search import CoordinateSearch, movable_gains
+from cdtool.tuning.coordinate_search import CoordinateSearch
 from cdtool.tuning.objective import Objective
 
 # The gains are searched for so many rules, those with the best settings of different kinds.
@@ -99,6 +99,7 @@ def search(
     default: Candidate,
     default_debounce: int,
     rules: Sequence[Candidate],
+    gains: tuple[str, ...],
     objective: Objective,
     measure: Measure,
     watch: Watch = lambda count, best: None,  # noqa: ARG005
@@ -113,6 +114,8 @@ def search(
         The number of the default's debounce.
     rules : sequence of Candidate
         The first part of the search, with the default gains.
+    gains : tuple of str
+        The names of the gains that are searched.
     objective : Objective
         What is minimised.
     measure : callable
@@ -145,7 +148,7 @@ def search(
         subsets.append(made)
     watch(len(known), subsets[0].best)
     running: list[tuple[SubsetSearch, CoordinateSearch]] = [
-        (item, CoordinateSearch(start.candidate, start.score, movable_gains(start.candidate)))
+        (item, CoordinateSearch(start.candidate, start.score, gains))
         for item in subsets
         for start in item.best_rules(_RULES)
     ]

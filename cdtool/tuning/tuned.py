@@ -205,19 +205,20 @@ def apparent_figures(objective: Objective, searched: Searched, item: Scored, see
     return figures_of(objective, measured.latency[at], measured.force[at], measured.assessable, counts, seed)
 
 
-def settings_of(candidate: Candidate) -> dict[str, Any]:
-    """Return the searched gains and settings of a candidate by name, numbers or lists of them."""
+def settings_of(candidate: Candidate, gains: Sequence[str]) -> dict[str, Any]:
+    """Return the settings of the rule that are searched, and these gains, by name: numbers or tuples of them."""
     searched = getattr(candidate.rule, "searched", {})
-    return {**dict(candidate.gains), **{name: getattr(candidate.rule, name) for name in searched}}
+    own = dict(candidate.gains)
+    return {**{name: getattr(candidate.rule, name) for name in searched}, **{name: own[name] for name in gains}}
 
 
-def sensitivities_of(searched: Searched, debounces: Sequence[int]) -> tuple[Sensitivity, ...]:
-    """Return what each gain and setting does around the choice, from what the search has tried.
+def sensitivities_of(searched: Searched, debounces: Sequence[int], gains: Sequence[str]) -> tuple[Sensitivity, ...]:
+    """Return what each searched gain and setting does around the choice, from what the search has tried.
 
     A setting of which no other value was tried with the others as chosen has one value only.
     """
     found, best = searched.subsets[0], searched.best
-    chosen = settings_of(best.candidate)
+    chosen = settings_of(best.candidate, gains)
     tried: dict[str, dict[float, float]] = {name: {} for name in chosen}
     for scored in found.known.values():
         for item in scored:
@@ -225,7 +226,7 @@ def sensitivities_of(searched: Searched, debounces: Sequence[int]) -> tuple[Sens
                 continue
             if item.candidate.rule.name != best.candidate.rule.name:
                 continue
-            other = settings_of(item.candidate)
+            other = settings_of(item.candidate, gains)
             different = [name for name in chosen if other[name] != chosen[name]]
             for name in chosen if not different else different[:1] if len(different) == 1 else ():
                 tried[name][_number(other[name])] = math.exp(item.score - best.score)

@@ -7,17 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.identification.rigid_axis import CrossValidation
 from cdtool.plain_text import counted
-from cdtool.report.html.identification_section import PageSection, images_of
-from cdtool.report.html.page_tables import classes, visible
+from cdtool.report.html.page_tables import visible
 from cdtool.report.html.robot_identification_sections import robot_sections
-from cdtool.report.html.self_contained import content_policy, page_part, page_template
+from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of
 from cdtool.report.identification_words import (
     listed_numbers,
     short_number,
@@ -47,18 +45,6 @@ if TYPE_CHECKING:
 _MOST_FIGURES = 40
 
 
-@dataclass(frozen=True)
-class IdentificationPage:
-    """Everything that the template shows."""
-
-    title: str
-    headline: str
-    counts: str
-    tone: str
-    scope: tuple[str, ...]
-    sections: tuple[PageSection, ...]
-
-
 def identification_html(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -> str:
     """Return the page of one machine: changes, what is not identifiable, plan, errors and misfit."""
     missing = sum(len(joint.not_identifiable) for joint in done.joints)
@@ -70,16 +56,15 @@ def identification_html(done: IdentifiedMachine, evidence: Sequence[JointEvidenc
         sections += _joint_sections(joint, shown, name)
     sections[1:1] = robot_sections(done, evidence)
     sections += _left_out(done.skipped, done.findings)
-    return _rendered(
-        IdentificationPage(
-            f"Model parameters of {visible(done.machine)}",
-            f"{counted(known, 'value')} identified, {together} known only together, {missing} not identifiable",
-            f"From {counted(len(done.runs), 'impact-free run')}.",
-            "unknown" if missing else "good",
-            (done.machine, counted(len(done.runs), "run")),
-            tuple(section for section in sections if section.tables or section.images or section.note),
-        )
-    )
+    return SectionsPage(
+        "Identification",
+        f"Model parameters of {visible(done.machine)}",
+        f"{counted(known, 'value')} identified, {together} known only together, {missing} not identifiable",
+        f"From {counted(len(done.runs), 'impact-free run')}.",
+        "unknown" if missing else "good",
+        (done.machine, counted(len(done.runs), "run")),
+        tuple(section for section in sections if section.tables or section.images or section.note),
+    ).html()
 
 
 _ORIGIN = (
@@ -280,16 +265,15 @@ def drift_html(fleet: FleetIdentification) -> str:
             sections.append(PageSection(visible(item.machine), images=image))
     sections += _left_out(fleet.skipped, fleet.findings)
     headline = f"{len(names)} of {counted(assessable, 'machine')} changed" if assessable else "No machine is assessable"
-    return _rendered(
-        IdentificationPage(
-            "Model parameters over time",
-            headline,
-            f"A parameter changed if its change is beyond 3 standard errors. Divided by {fleet.by.value}.",
-            "unknown" if changed or not assessable else "good",
-            (counted(len(fleet.machines), "machine"), counted(sum(item.logs for item in fleet.machines), "log")),
-            tuple(section for section in sections if section.tables or section.images or section.note),
-        )
-    )
+    return SectionsPage(
+        "Identification",
+        "Model parameters over time",
+        headline,
+        f"A parameter changed if its change is beyond 3 standard errors. Divided by {fleet.by.value}.",
+        "unknown" if changed or not assessable else "good",
+        (counted(len(fleet.machines), "machine"), counted(sum(item.logs for item in fleet.machines), "log")),
+        tuple(section for section in sections if section.tables or section.images or section.note),
+    ).html()
 
 
 _DRIFT = (
@@ -333,11 +317,3 @@ def _machines_table(fleet: FleetIdentification) -> Table:
     headings = [f"{visible(name)} [{unit}]" if unit else visible(name) for name, unit in names]
     columns = [Column("machine"), Column("logs", numeric=True), *(Column(item, numeric=True) for item in headings)]
     return Table("machines", "Parameters from all logs of a machine, ± standard error", columns, rows)
-
-
-def _rendered(page: IdentificationPage) -> str:
-    from markupsafe import Markup
-
-    style = page_part("report.css") + "img {\n  max-width: 100%;\n  height: auto;\n  background: #ffffff;\n}\n"
-    template = page_template("identification.html.j2")
-    return template.render(page=page, style=Markup(style), policy=content_policy(style), classes=classes)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from cdtool.report.html.identification_section import PageSection, images_of
 from cdtool.report.html.page_tables import visible
+from cdtool.report.html.sections_page import PageSection, images_of
 from cdtool.report.identification_words import (
     listed_numbers,
     short_number,

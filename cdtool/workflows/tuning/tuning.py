@@ -20,6 +20,7 @@ from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.settings import with_context
 from cdtool.tuning.candidate import Candidate, Measured
+from cdtool.tuning.coordinate_search import movable_gains
 from cdtool.tuning.grid import SHORTEST_DEBOUNCE, debounces_to_try, rules_to_try
 from cdtool.tuning.measuring import Choice, HeldOut, Measuring, Pair
 from cdtool.tuning.objective import WORSE_AT_MOST, Goal, Objective
@@ -218,6 +219,7 @@ class _TuningOf:
         objective = Objective(self.options.goal, recordings, self.options.worse_at_most)
         journal = self._journal(journals, measuring)
         words = [_debounce_words(activation) for activation in activations]
+        gains = movable_gains(self._detector, default)
         measure = _MeasuresAll(measuring, self.workers, journal)
         channels = set.intersection(*(set(run.operation.recording.channels) for run in recordings.free))
         grid = [Candidate(default.gains, item) for item in self._rules(rule, channels)]
@@ -225,9 +227,10 @@ class _TuningOf:
             default,
             0,
             grid,
+            gains,
             objective,
             measure,
-            lambda count, best: watch(self.name, count, in_words(best, words) if best else ""),
+            lambda count, best: watch(self.name, count, in_words(best, words, gains) if best else ""),
         )
         if not np.isfinite(found.best.score):
             reason = found.measured[default.key].reason or "no candidate is acceptable"
@@ -320,6 +323,7 @@ class _TuningOf:
         self, found: Searched, objective: Objective, measure: _MeasuresAll, debounces: list[int], words: list[str]
     ) -> TunedDetector:
         seed, best = self.options.seed, found.best
+        gains = movable_gains(self._detector, found.default)
         default = Scored(found.default, found.default_debounce, best.costs, found.subsets[0].default.score)
         nested = default_nested = None
         chosen = [subset.best for subset in found.subsets[1:]]
@@ -348,12 +352,12 @@ class _TuningOf:
             default_apparent=None if default_reason else apparent_figures(objective, found, default, seed),
             default_nested=default_nested,
             default_reason=default_reason,
-            sensitivities=sensitivities_of(found, debounces),
+            sensitivities=sensitivities_of(found, debounces, gains),
             steps=steps_of(found),
             pareto=pareto_of(objective, found, words),
             candidates=len(found.measured),
             unusable=unusable,
-            chosen_in_folds=tuple(in_words(item, words) for item in chosen),
+            chosen_in_folds=tuple(in_words(item, words, gains) for item in chosen),
         )
 
 
@@ -372,9 +376,10 @@ def _debounce_words(activation: Activation) -> str:
     return "9 ms" if activation.debounce is None else f"{activation.debounce} samples"
 
 
-def in_words(item: Scored, debounces: Sequence[str]) -> str:
-    """Return a choice in words: threshold, settings, debounce."""
-    settings = ", ".join(f"{name} {value_in_words(value)}" for name, value in settings_of(item.candidate).items())
+def in_words(item: Scored, debounces: Sequence[str], gains: Sequence[str]) -> str:
+    """Return a choice in words: threshold, settings and searched gains, debounce."""
+    chosen = settings_of(item.candidate, gains).items()
+    settings = ", ".join(f"{name} {value_in_words(value)}" for name, value in chosen)
     return f"{item.candidate.rule.name}, {settings}, debounce {debounces[item.debounce]}"
 
 

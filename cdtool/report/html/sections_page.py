@@ -1,4 +1,7 @@
-"""A section of the page of an identification: tables, figures as data URIs, and a note."""
+"""A page of sections, one file without script: tables, figures as data URIs, and notes.
+
+Text from logs and files is escaped by the template. A content security policy allows only this style and the figures.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cdtool.errors import CdtoolError
+from cdtool.report.html.page_tables import classes
+from cdtool.report.html.self_contained import content_policy, page_part, page_template
 from cdtool.report.plots.identification_plots import png
 from cdtool.report.table import Table
 
@@ -35,6 +40,27 @@ class PageSection:
     tables: tuple[Table, ...] = ()
     images: tuple[PageImage, ...] = ()
     note: str = ""
+
+
+@dataclass(frozen=True)
+class SectionsPage:
+    """Everything that the template shows; `kind` begins the title of the window, by which the file is recognised."""
+
+    kind: str
+    title: str
+    headline: str
+    counts: str
+    tone: str
+    scope: tuple[str, ...]
+    sections: tuple[PageSection, ...]
+
+    def html(self) -> str:
+        """Return the page."""
+        from markupsafe import Markup
+
+        style = page_part("report.css") + "img {\n  max-width: 100%;\n  height: auto;\n  background: #ffffff;\n}\n"
+        template = page_template("sections.html.j2")
+        return template.render(page=self, style=Markup(style), policy=content_policy(style), classes=classes)
 
 
 def images_of(figures: Sequence[tuple[Callable[[], Figure], str]]) -> tuple[PageImage, ...]:
