@@ -36,6 +36,7 @@ COMMANDS: Mapping[str, str] = {
     "score": "cdtool.cli.score:score",
     "compare": "cdtool.cli.compare:compare",
     "plan": "cdtool.cli.plan:plan",
+    "tune": "cdtool.cli.tune:tune",
     "identify": "cdtool.cli.identify:identify",
     "inject": "cdtool.cli.inject:inject",
     "coverage": "cdtool.cli.coverage:coverage",

@@ -10,12 +10,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.identification.rigid_axis import CrossValidation
 from cdtool.plain_text import counted
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.robot_identification_sections import robot_sections
-from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of
+from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
 from cdtool.report.identification_words import (
     listed_numbers,
     short_number,
@@ -55,7 +54,7 @@ def identification_html(done: IdentifiedMachine, evidence: Sequence[JointEvidenc
         name = f"{joint.joint}: " if len(done.joints) > 1 else ""
         sections += _joint_sections(joint, shown, name)
     sections[1:1] = robot_sections(done, evidence)
-    sections += _left_out(done.skipped, done.findings)
+    sections += left_out_sections(done.skipped, done.findings)
     return SectionsPage(
         "Identification",
         f"Model parameters of {visible(done.machine)}",
@@ -238,15 +237,6 @@ def _refused_table(joint: JointIdentification) -> Table:
     return Table("refused", "Methods that could not be used", (Column("method"), Column("reason")), rows)
 
 
-def _left_out(skipped: Sequence[Skipped], findings: Sequence[RecordingFinding]) -> list[PageSection]:
-    tables = []
-    for name, title, items in (("skipped", "Left out", skipped), ("findings", "Warnings", findings)):
-        if items:
-            rows = [[name_cell(visible(item.recording)), Cell(visible(item.reason))] for item in items]
-            tables.append(Table(name, title, (Column("recording"), Column("reason")), rows))
-    return [PageSection("Left out and warnings", tuple(tables))]
-
-
 def drift_html(fleet: FleetIdentification) -> str:
     """Return the page of a fleet: which parameters changed, and the parameters of each machine over time."""
     changed = [(item.machine, series) for item in fleet.machines for series in item.changed]
@@ -263,7 +253,7 @@ def drift_html(fleet: FleetIdentification) -> str:
             caption = visible(f"Periods: {', '.join(several[0].periods)}.")
             image = images_of([(partial(draw_drift, several, item.machine), caption)])
             sections.append(PageSection(visible(item.machine), images=image))
-    sections += _left_out(fleet.skipped, fleet.findings)
+    sections += left_out_sections(fleet.skipped, fleet.findings)
     headline = f"{len(names)} of {counted(assessable, 'machine')} changed" if assessable else "No machine is assessable"
     return SectionsPage(
         "Identification",

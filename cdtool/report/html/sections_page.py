@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cdtool.errors import CdtoolError
-from cdtool.report.html.page_tables import classes
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.report.html.page_tables import classes, visible
 from cdtool.report.html.self_contained import content_policy, page_part, page_template
 from cdtool.report.plots.identification_plots import png
-from cdtool.report.table import Table
+from cdtool.report.table import Cell, Column, Table, name_cell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -74,3 +75,13 @@ def images_of(figures: Sequence[tuple[Callable[[], Figure], str]]) -> tuple[Page
         source = f"data:image/png;base64,{base64.b64encode(png(figure)).decode()}"
         images.append(PageImage(source, caption, round(figure.get_figwidth() * _PIXELS)))
     return tuple(images)
+
+
+def left_out_sections(skipped: Sequence[Skipped], findings: Sequence[RecordingFinding]) -> list[PageSection]:
+    """Return a section with what was left out and the warnings; without tables if there is nothing."""
+    tables = []
+    for name, title, items in (("skipped", "Left out", skipped), ("findings", "Warnings", findings)):
+        if items:
+            rows = [[name_cell(visible(item.recording)), Cell(visible(item.reason))] for item in items]
+            tables.append(Table(name, title, (Column("recording"), Column("reason")), rows))
+    return [PageSection("Left out and warnings", tuple(tables))]

@@ -1,0 +1,155 @@
+"""`cdtool tune`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdtool.cli import completions
+from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
+from cdtool.cli.options import ForceOption, JsonOption, listed
+from cdtool.cli.place import Place, location
+from cdtool.errors import UsageError, nearest
+from cdtool.plain_text import counted
+
+if TYPE_CHECKING:
+    from cdtool.workflows.tuning.tuning import Tuning, Watch
+
+_SHOWN = 110
+
+
+def tune(
+    file: Annotated[
+        Place, typer.Argument(parser=location, help="Benchmark file with [learn] and [impacts] or [inject].")
+    ],
+    false_alarm_budget: Annotated[
+        str,
+        typer.Option(
+            "--false-alarm-budget", help="As 1/100op or 0.1/h: met on average; 1/100op at 95%: with that confidence."
+        ),
+    ],
+    output: Annotated[
+        Place, typer.Option("--output", "-o", parser=location, help="Folder for what is tuned, and for the search.")
+    ],
+    detectors: Annotated[
+        str | None,
+        typer.Option(
+            "--detectors",
+            help="Detectors instead of the file's, as gm,feekf.",
+            autocompletion=completions.detector_list,
+        ),
+    ] = None,
+    objective: Annotated[
+        str, typer.Option("--objective", help="latency (mean), p95, or force (mean force at the alarm).")
+    ] = "latency",
+    impacts: Annotated[
+        str | None, typer.Option("--impacts", help="real, injected or both, if the file has both kinds.")
+    ] = None,
+    worse_at_most: Annotated[
+        float, typer.Option("--worse-at-most", min=0.0, help="Share by which a group may get worse than by default.")
+    ] = 0.1,
+    shortest_debounce: Annotated[
+        float, typer.Option("--shortest-debounce", min=0.0, help="Shortest debounce to try [ms].")
+    ] = 3.0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Decides which recordings assess which others.")] = 0,
+    force: ForceOption = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of candidates to measure in parallel.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Tune gains, threshold and debounce at a false-alarm budget, with figures of recordings that chose nothing.
+
+    Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
+    """
+    from cdtool.evaluation.false_alarm_budget import Budget
+    from cdtool.report.tuning_files import open_folder, write_tuning
+    from cdtool.tuning.objective import Goal
+    from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+    from cdtool.workflows.execution.workers import Workers
+    from cdtool.workflows.tuning.tuned_files import tuning_summary
+    from cdtool.workflows.tuning.tuning import TuningOptions
+    from cdtool.workflows.tuning.tuning import tune as run
+
+    goals = [item.value for item in Goal]
+    if objective not in goals:
+        raise UsageError(f"--objective is '{objective}'", nearest(objective, goals))
+    names = listed(detectors or "")
+    options = TuningOptions(
+        Budget.parse(false_alarm_budget), names, Goal(objective), impacts, worse_at_most, 1e-3 * shortest_debounce, seed
+    )
+    setup = read_benchmark_file(file, detectors=names)
+    searches = open_folder(output, setup.inputs, force=force)
+    with progress("reading") as advance, _watching() as watch:
+        done = run(setup, options, journals=searches, workers=Workers(jobs), progress=advance, watch=watch)
+    written = write_tuning(done, output)
+    print_skipped(done.skipped, done.findings)
+    if as_json:
+        print_json(tuning_summary(done))
+    else:
+        _show(done)
+        for path in written:
+            typer.echo(f"written: {plain(path)}")
+    leave(done.skipped)
+
+
+@contextmanager
+def _watching() -> Iterator[Watch]:
+    """Print the best so far to a terminal, after each round of a search."""
+
+    def watch(detector: str, count: int, best: str) -> None:
+        if sys.stderr.isatty():
+            words = f"{detector}: {counted(count, 'candidate')}, best so far: {best}"
+            typer.echo(plain(words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."), err=True)
+
+    yield watch
+
+
+def _show(done: Tuning) -> None:
+    from cdtool.report.html.tuning_page import debounce_words, injected_words
+    from cdtool.workflows.tuning.tuned_files import described_choice
+
+    rows = []
+    for tuned in done.detectors:
+        before = tuned.default_nested or tuned.default_apparent
+        for place, (group, figures) in enumerate(tuned.honest.groups.items()):
+            first = place == 0
+            interval = figures.interval_ms
+            rows.append(
+                (
+                    tuned.short_name if first else "",
+                    tuned.choice.rule.name if first else "",
+                    debounce_words(tuned) if first else "",
+                    group,
+                    number(before.groups[group].mean_ms) if before else "-",
+                    number(figures.mean_ms),
+                    "-" if interval.reason else f"{number(interval.low)} to {number(interval.high)}",
+                    f"{figures.missed} of {figures.contacts}",
+                    f"{tuned.honest.alarming} of {tuned.honest.free}" if first else "",
+                )
+            )
+    kind = "nested" if done.is_nested else "apparent"
+    columns = [("detector", "left"), ("threshold", "left"), ("debounce", "left"), ("group", "left")]
+    columns += [("default\nms", "right"), ("tuned\nms", "right"), ("95 % interval\nms", "right"), ("missed", "right")]
+    columns += [("alarming\nfree runs", "right")]
+    table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} figures")
+    for tuned in done.detectors:
+        settings = described_choice(tuned)
+        edges = [item.name for item in tuned.sensitivities if item.is_at_edge]
+        text = f"{tuned.short_name}: {settings or 'default settings'}"
+        text += f"; at the edge of the search: {', '.join(edges)}" if edges else ""
+        typer.echo(plain(text))
+    typer.echo(_meaning(done) + injected_words(done))
+
+
+def _meaning(done: Tuning) -> str:
+    if done.is_nested:
+        return "nested: each figure is of recordings that neither chose the settings nor set the limit. "
+    from cdtool.workflows.tuning.recordings_to_tune import to_check
+
+    return (
+        f"apparent: of the recordings that chose the settings; {to_check(done.options.budget):.0f} impact-free runs "
+        "are needed to check them on others. "
+    )

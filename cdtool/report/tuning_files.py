@@ -1,0 +1,69 @@
+"""The files in the folder that `cdtool tune` writes: machine file, benchmark files, signatures, report and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from cdtool.errors import UsageError
+from cdtool.files import write_texts
+from cdtool.foreign_files import Kind, refuse_inputs, refuse_other_kind
+from cdtool.plain_text import plain
+from cdtool.remote.remote_path import is_remote
+from cdtool.signature_store import write_signature
+from cdtool.strict_json import strict_json
+from cdtool.workflows.tuning.tuned_files import (
+    MACHINE,
+    MARK,
+    benchmark_text,
+    files_of,
+    machine_text,
+    tuned_signature,
+    tuning_summary,
+)
+from cdtool.workflows.tuning.tuning import Tuning
+
+PAGE, JSON, SEARCH = "tuning.html", "tuning.json", "search"
+_KINDS = {
+    ".toml": Kind(MARK.encode(), "file of cdtool tune"),
+    ".html": Kind(b"<title>Tuning", "report of cdtool tune"),
+    ".json": Kind(b'"tool": "cdtool tune"', "results of cdtool tune"),
+}
+
+
+def open_folder(folder: Path, inputs: Iterable[Path], *, force: bool = False) -> Path:
+    """Create the output folder and return that of the searches in it.
+
+    Raises UsageError for a folder at a URL, a file of that name, an input in it that would be replaced, or a file that
+    `cdtool tune` did not write, unless `force`.
+    """
+    if is_remote(folder):
+        raise UsageError(f"--output is '{plain(folder)}'", "give a folder of this machine: the search is kept there")
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{plain(folder)}: exists and is not a folder", "choose another name")
+    fixed = [folder / name for name in (MACHINE, "benchmark.toml", PAGE, JSON)]
+    refuse_inputs(fixed, inputs)
+    for target in fixed:
+        refuse_other_kind(target, _KINDS[target.suffix], force=force)
+    try:
+        (folder / SEARCH).mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise UsageError(f"{plain(folder)}: cannot be created: {fault.strerror}", "choose another name") from fault
+    return folder / SEARCH
+
+
+def write_tuning(tuning: Tuning, folder: Path) -> tuple[Path, ...]:
+    """Write what was tuned into a folder, all texts or none; return the files. Raises OutputError, SignatureError."""
+    from cdtool.report.html.tuning_page import tuning_html
+
+    texts = {folder / MACHINE: machine_text(tuning, folder)}
+    texts |= {folder / name: benchmark_text(tuning, tuned, folder) for name, tuned in files_of(tuning)}
+    texts[folder / PAGE] = tuning_html(tuning)
+    texts[folder / JSON] = strict_json(tuning_summary(tuning)) + "\n"
+    signatures = {
+        folder / f"signature_{tuned.detector}.json": tuned_signature(tuning, tuned) for tuned in tuning.detectors
+    }
+    write_texts(texts)
+    for path, learned in signatures.items():
+        write_signature(path, learned.signature)
+    return (*texts, *signatures)
