@@ -92,6 +92,7 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "score": _JUDGES,
     "compare": _ALWAYS | {ExitStatus.VIOLATED, ExitStatus.INCONCLUSIVE},
     "plan": _ALWAYS,
+    "tune": _CAN_LOSE,
     "convert": _CAN_LOSE,
     "recover": _CAN_LOSE,
     "identify": _CAN_LOSE,

@@ -253,9 +253,7 @@ def described_choice(tuned: TunedDetector) -> str:
     """Return the searched settings of the threshold, and the gains that are not the default ones, in words."""
     rule, default = tuned.choice.rule, dict(tuned.default.gains)
     parts = [f"{name} {_short(getattr(rule, name))}" for name in getattr(rule, "searched", {})]
-    parts += [
-        f"{name} {_short(value)}" for name, value in tuned.choice.gains if name in gains or value != default[name]
-    ]
+    parts += [f"{name} {_short(value)}" for name, value in tuned.choice.gains if value != default[name]]
     return ", ".join(parts)
 
 
