@@ -108,7 +108,13 @@ def _watching() -> Iterator[Watch]:
 
 
 def _show(done: Tuning) -> None:
-    from cdtool.report.html.tuning_page import debounce_words, injected_words
+    from cdtool.report.html.tuning_page import (
+        alarms_words,
+        debounce_words,
+        injected_words,
+        range_words,
+        rejection_words,
+    )
     from cdtool.workflows.tuning.tuned_files import described_choice
 
     rows = []
@@ -125,15 +131,21 @@ def _show(done: Tuning) -> None:
                     group,
                     number(before.groups[group].mean_ms) if before else "-",
                     number(figures.mean_ms),
-                    "-" if interval.reason else f"{number(interval.low)} to {number(interval.high)}",
+                    range_words(figures) if interval.reason else f"{number(interval.low)} to {number(interval.high)}",
                     f"{figures.missed} of {figures.contacts}",
                     f"{tuned.honest.alarming} of {tuned.honest.free}" if first else "",
+                    alarms_words(tuned.honest) if first else "",
                 )
             )
     kind = "nested" if done.is_nested else "apparent"
     columns = [("detector", "left"), ("threshold", "left"), ("debounce", "left"), ("group", "left")]
-    columns += [("default\nms", "right"), ("tuned\nms", "right"), ("95 % interval\nms", "right"), ("missed", "right")]
-    columns += [("alarming\nfree runs", "right")]
+    columns += [
+        ("default\nms", "right"),
+        ("tuned\nms", "right"),
+        ("95 % interval\nor range, ms", "right"),
+        ("missed", "right"),
+    ]
+    columns += [("alarming\nfree runs", "right"), ("95 % interval", "right")]
     table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} figures")
     for tuned in done.detectors:
         settings = described_choice(tuned)
@@ -141,6 +153,8 @@ def _show(done: Tuning) -> None:
         text = f"{tuned.short_name}: {settings or 'default settings'}"
         text += f"; at the edge of the search: {', '.join(edges)}" if edges else ""
         typer.echo(plain(text))
+        for words in rejection_words(tuned):
+            typer.echo(plain(f"  {words}"))
     typer.echo(_meaning(done) + injected_words(done))
 
 

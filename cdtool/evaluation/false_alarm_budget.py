@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy.typing as npt
 
 from cdtool.activation import Activation
 from cdtool.errors import UsageError
-from cdtool.evaluation.sweep import critical_factor, sweep
+from cdtool.evaluation.sweep import critical_factors, sweep
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted, digits
 from cdtool.recording import FloatArray
@@ -132,13 +133,17 @@ class MonitoredRun:
     alarms: Callable[[FloatArray], npt.NDArray[np.int64]]
 
     @classmethod
-    def of(cls, detection: Detection, activation: Activation) -> MonitoredRun:
-        """Return it for an operation whose threshold was not learned from it."""
-        return cls(
-            critical_factor(detection, activation),
-            detection.assessed_seconds,
-            lambda factors: sweep(detection, (), activation, 0.0, factors).false_alarms,
-        )
+    def of_each(cls, detection: Detection, activations: Sequence[Activation]) -> list[MonitoredRun]:
+        """Return it for an operation and each of several activations; the threshold was not learned from it."""
+        seconds, critical = detection.assessed_seconds, critical_factors(detection, activations)
+        return [
+            cls(factor, seconds, partial(_alarms, detection, activation))
+            for factor, activation in zip(critical, activations, strict=True)
+        ]
+
+
+def _alarms(detection: Detection, activation: Activation, factors: FloatArray) -> npt.NDArray[np.int64]:
+    return sweep(detection, (), activation, 0.0, factors).false_alarms
 
 
 def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], activation: Activation) -> Calibrated:
@@ -177,7 +182,7 @@ def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], a
     `cdtool.learn_signature` sets a factor with `false_alarm_budget`.
     """
     judged = [item for item in detections if item.assessed_seconds > 0.0]
-    return factor_for(budget, detector, [MonitoredRun.of(item, activation) for item in judged])
+    return factor_for(budget, detector, [MonitoredRun.of_each(item, [activation])[0] for item in judged])
 
 
 def factor_for(budget: Budget, detector: str, runs: Sequence[MonitoredRun]) -> Calibrated:

@@ -156,14 +156,22 @@ def critical_factor(detection: Detection, activation: Activation) -> float:
 
     -inf if there are never as many consecutive assessable samples as the debounce needs.
     """
+    return critical_factors(detection, [activation])[0]
+
+
+def critical_factors(detection: Detection, activations: Sequence[Activation]) -> list[float]:
+    """Return the `critical_factor` of a detection for each of several activations."""
     statistic, met_at = detection.statistic, detection.exceedance()
-    needed = activation.needed(statistic.time)
-    highest = -np.inf
+    highest = [-np.inf] * len(activations)
     for joint in range(met_at.shape[1]):
         status = statistic.status[:, joint]
         present = status != Status.GAP  # a missing sample is skipped, as by the activation
-        met = np.where(status == Status.VALID, met_at[:, joint], -np.inf)[present]
-        highest = max(highest, highest_held(met, needed[present]))
+        met = np.where(status == Status.VALID, met_at[:, joint], -np.inf)
+        met = met if present.all() else met[present]
+        for number, activation in enumerate(activations):
+            needed = activation.needed(statistic.time)
+            found = highest_held(met, needed if len(met) == len(needed) else needed[present])
+            highest[number] = max(highest[number], found)
     return highest
 
 

@@ -76,6 +76,10 @@ class FittedSequential:
         innovations = self.whitening.innovations(recording, signal)
         return self.limit.evaluate(recording, self.rule.statistic(innovations, self.side, self.whitening.longest_gap))
 
+    def band_of(self, recording: Recording, statistic: Signal) -> Band:
+        """Return the band of a statistic that was evaluated before."""
+        return self.limit.evaluate(recording, statistic)[1]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the threshold as JSON values."""
         return {

@@ -62,6 +62,10 @@ class FittedStatisticLimit:
         """Return the statistic and its band; raises UsageError if the number of joints differs."""
         return self.limit.evaluate(recording, self.rule.statistic(signal, self.period))
 
+    def band_of(self, recording: Recording, statistic: Signal) -> Band:
+        """Return the band of a statistic that was evaluated before."""
+        return self.limit.evaluate(recording, statistic)[1]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the threshold as JSON values."""
         return {

@@ -125,8 +125,8 @@ class Measuring:
             for number, run in enumerate(recordings.free):
                 if run.fold == fold:
                     detection = judge(*_named(free[number], self.detector.name), thresholds, self.activations[0])
-                    for of_debounce, activation in zip(runs, self.activations, strict=True):
-                        of_debounce[number] = MonitoredRun.of(detection, activation)
+                    for of_debounce, made in zip(runs, MonitoredRun.of_each(detection, self.activations), strict=True):
+                        of_debounce[number] = made
             for number, log in enumerate(recordings.struck):
                 if log.fold == fold:
                     detected[number] = self._detections(log, struck[number], thresholds, self.activations[0])
@@ -143,23 +143,19 @@ class Measuring:
         recordings, fold, name = self.recordings, choice.fold, self.detector.name
         activation, rule = self.activations[choice.debounce], choice.candidate.rule
         free, struck = self._signals_of(choice.candidate)
+
+        def monitored(number: int, thresholds: tuple[FittedThreshold, ...]) -> MonitoredRun:
+            detection = judge(*_named(free[number], name), thresholds, activation)
+            return MonitoredRun.of_each(detection, [activation])[0]
+
         inner: list[MonitoredRun] = []
         for other in range(recordings.folds):
-            if other == fold:
-                continue
-            thresholds = self._learned(rule, free, (fold, other))
-            inner += [
-                MonitoredRun.of(judge(*_named(free[number], name), thresholds, activation), activation)
-                for number, run in enumerate(recordings.free)
-                if run.fold == other
-            ]
+            if other != fold:
+                thresholds = self._learned(rule, free, (fold, other))
+                inner += [monitored(i, thresholds) for i, run in enumerate(recordings.free) if run.fold == other]
         factor = factor_for(self.budget, name, inner).factor
         thresholds = self._learned(rule, free, (fold,))
-        own = [
-            MonitoredRun.of(judge(*_named(free[number], name), thresholds, activation), activation)
-            for number, run in enumerate(recordings.free)
-            if run.fold == fold
-        ]
+        own = [monitored(i, thresholds) for i, run in enumerate(recordings.free) if run.fold == fold]
         latencies, forces, valid = [], [], []
         for number, log in enumerate(recordings.struck):
             if log.fold != fold:

@@ -7,7 +7,7 @@ searches share what is measured; a search chooses among the candidates that it a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,8 +60,13 @@ class SubsetSearch:
     @property
     def best(self) -> Scored:
         """Return the best of all; the default if nothing else is acceptable and better."""
+        return self.best_without(())
+
+    def best_without(self, rules: Collection[str]) -> Scored:
+        """Return the best whose kind of rule is none of these; the default if nothing is acceptable and better."""
         found = [item for key in self.known if (item := self.best_of(key)) is not None]
-        return min((self.default, *found), key=lambda item: item.score)
+        allowed = [item for item in found if item.candidate.rule.name not in rules]
+        return min((self.default, *allowed), key=lambda item: item.score)
 
     def best_rules(self, count: int) -> list[Scored]:
         """Return the best of each kind of rule, so many of them."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.interval import Interval
+from cdtool.evaluation.statistics.rates import binomial_share
 from cdtool.recording import FloatArray
 from cdtool.tuning.candidate import Candidate
 from cdtool.tuning.measuring import HeldOut
@@ -27,7 +28,7 @@ _EDGE = 0.01
 class GroupFigures:
     """The latencies of a group's contacts [ms]: mean with its 95 % interval, 95th percentile, force at the alarm [N].
 
-    A missed contact counts as its window in mean and percentile, which are NaN without contacts.
+    A missed contact counts as its window in mean, range and percentile. The interval has no bounds below 10 contacts.
     """
 
     contacts: int
@@ -35,6 +36,7 @@ class GroupFigures:
     not_assessable: int
     mean_ms: float
     interval_ms: Interval
+    range_ms: tuple[float, float]
     p95_ms: float
     force_n: float
 
@@ -47,6 +49,12 @@ class Figures:
     alarming: int
     free: int
     score: float
+    costs: FloatArray
+
+    @property
+    def alarm_share(self) -> Interval:
+        """Return the share of impact-free operations that alarm, with its exact 95 % interval."""
+        return binomial_share(self.alarming, self.free)
 
 
 @dataclass(frozen=True)
@@ -110,6 +118,18 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Rejection:
+    """A kind of rule that was best but is not chosen: on recordings that chose nothing, a group is much worse.
+
+    `ratio` is the cost of the group over that of the default.
+    """
+
+    rule: str
+    group: str
+    ratio: float
+
+
+@dataclass(frozen=True)
 class ParetoPoint:
     """A candidate that no other one beats in every group, with its apparent costs (ms, or N) by group."""
 
@@ -145,6 +165,7 @@ class TunedDetector:
     candidates: int
     unusable: dict[str, str]
     chosen_in_folds: tuple[str, ...]
+    rejected: tuple[Rejection, ...] = ()
 
     @property
     def honest(self) -> Figures:
@@ -175,10 +196,12 @@ def figures_of(
             int((~assessable[own]).sum()),
             float(np.mean(values[own])),
             bca(values[own], range(int(own.sum())), "mean", seed=seed),
+            (float(np.min(values[own])), float(np.max(values[own]))),
             float(np.quantile(values[own], 0.95)),
             float(np.mean(known)) if len(known) else math.nan,
         )
-    return Figures(found, *counts, objective.score(objective.costs_of(latency, force, everything)))
+    costs = objective.costs_of(latency, force, everything)
+    return Figures(found, *counts, objective.score(costs), costs)
 
 
 def pooled(objective: Objective, held_out: Sequence[HeldOut], seed: int) -> Figures | None:
@@ -212,12 +235,14 @@ def settings_of(candidate: Candidate, gains: Sequence[str]) -> dict[str, Any]:
     return {**{name: getattr(candidate.rule, name) for name in searched}, **{name: own[name] for name in gains}}
 
 
-def sensitivities_of(searched: Searched, debounces: Sequence[int], gains: Sequence[str]) -> tuple[Sensitivity, ...]:
+def sensitivities_of(
+    searched: Searched, best: Scored, debounces: Sequence[int], gains: Sequence[str]
+) -> tuple[Sensitivity, ...]:
     """Return what each searched gain and setting does around the choice, from what the search has tried.
 
     A setting of which no other value was tried with the others as chosen has one value only.
     """
-    found, best = searched.subsets[0], searched.best
+    found = searched.subsets[0]
     chosen = settings_of(best.candidate, gains)
     tried: dict[str, dict[float, float]] = {name: {} for name in chosen}
     for scored in found.known.values():
@@ -249,7 +274,7 @@ def _number(value: Any) -> float:
     return float(value[0] if isinstance(value, tuple) else value)
 
 
-def steps_of(searched: Searched) -> tuple[Step, ...]:
+def steps_of(searched: Searched, best: Scored) -> tuple[Step, ...]:
     """Return what debounce, threshold and gains contributed, one after the other; none without a usable default."""
     found = searched.subsets[0]
     if not math.isfinite(found.default.score):
@@ -260,10 +285,11 @@ def steps_of(searched: Searched) -> tuple[Step, ...]:
         for key in found.known
         if (item := found.best_of(key)) is not None and item.candidate.gains == searched.default.gains
     ]
+    of_rule = [item.score for item in of_default_gains if item.candidate.rule.name == best.candidate.rule.name]
     scores = [found.default.score]
     scores.append(min(scores[-1], by_debounce.score if by_debounce else math.inf))
-    scores.append(min(scores[-1], min((item.score for item in of_default_gains), default=math.inf)))
-    scores.append(min(scores[-1], found.best.score))
+    scores.append(min(scores[-1], min(of_rule, default=math.inf)))
+    scores.append(min(scores[-1], best.score))
     names = ("debounce", "threshold", "gains")
     return tuple(
         Step(name, 1.0 - math.exp(after - before))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 from cdtool.plain_text import counted
@@ -13,7 +14,7 @@ from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.tuning_plots import draw_pareto, draw_sensitivity
 from cdtool.report.table import Cell, Column, Table, count_cell, interval_cell, number_cell, tabulate
 from cdtool.tuning.objective import Goal
-from cdtool.tuning.tuned import Figures, ParetoPoint, Sensitivity, TunedDetector
+from cdtool.tuning.tuned import Figures, GroupFigures, ParetoPoint, Sensitivity, TunedDetector
 from cdtool.workflows.tuning.tuned_files import described_choice
 from cdtool.workflows.tuning.tuning import Tuning
 
@@ -79,7 +80,7 @@ def _detectors_table(tuning: Tuning) -> Table:
 
     def mean(name: str, item: TunedDetector) -> Cell:
         figures = item.honest.groups.get(name)
-        return Cell(NOTHING) if figures is None else interval_cell(figures.interval_ms)
+        return Cell(NOTHING) if figures is None else _mean_cell(figures)
 
     def default(name: str, item: TunedDetector) -> Cell:
         figures = item.default_nested or item.default_apparent
@@ -94,15 +95,44 @@ def _detectors_table(tuning: Tuning) -> Table:
     for name in groups:
         fields.append((Column(f"{visible(name)}, default [ms]", numeric=True), partial(default, name)))
         fields.append((Column(f"{visible(name)}, tuned [ms]", numeric=True), partial(mean, name)))
-    fields.append(
-        (Column("alarming free runs", numeric=True), lambda item: Cell(f"{item.honest.alarming} of {item.honest.free}"))
-    )
+    fields.append((Column("alarming free runs", numeric=True), lambda item: _alarms_cell(item.honest)))
     return tabulate("detectors", "Mean latency, a missed contact counted as its window", fields, tuning.detectors)
+
+
+def _mean_cell(figures: GroupFigures) -> Cell:
+    """Return the cell of a mean with its interval, or with the range of values too few for one."""
+    if not figures.interval_ms.reason:
+        return interval_cell(figures.interval_ms)
+    return replace(number_cell(figures.mean_ms), details=(range_words(figures),))
+
+
+def range_words(figures: GroupFigures) -> str:
+    """Return the range of latencies in words."""
+    return f"range {number(figures.range_ms[0])} to {number(figures.range_ms[1])}"
+
+
+def _alarms_cell(figures: Figures) -> Cell:
+    return Cell(f"{figures.alarming} of {figures.free}", (alarms_words(figures),))
+
+
+def alarms_words(figures: Figures) -> str:
+    """Return the 95 % interval of the share of alarming runs in words."""
+    share = figures.alarm_share
+    return f"{100.0 * share.low:.1f} to {100.0 * share.high:.1f} %"
 
 
 def debounce_words(tuned: TunedDetector) -> str:
     """Return the debounce of a choice in words."""
     return "9 ms" if tuned.debounce is None else counted(tuned.debounce, "sample")
+
+
+def rejection_words(tuned: TunedDetector) -> list[str]:
+    """Return why kinds of rules that were best are not chosen, a sentence each, without its full stop."""
+    return [
+        f"Not chosen: {item.rule}, with which {visible(item.group)} is {100.0 * (item.ratio - 1.0):.0f} % worse than "
+        "by default on recordings that chose nothing"
+        for item in tuned.rejected
+    ]
 
 
 def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
@@ -118,7 +148,8 @@ def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
     if any(len(item.tried) > 1 for item in tuned.sensitivities):
         words = "Cost around the choice, one gain or setting changed at a time; grey: at most 5 % more."
         figures.append((partial(draw_sensitivity, tuned.sensitivities), words))
-    note = "" if not tuned.default_reason else f"The default cannot be used: {visible(tuned.default_reason)}."
+    note = "" if not tuned.default_reason else f"The default cannot be used: {visible(tuned.default_reason)}. "
+    note += " ".join(f"{words}." for words in rejection_words(tuned))
     more = [_sensitivity_table(tuned.sensitivities), _pareto_table(tuned.pareto, groups)]
     if tuned.chosen_in_folds:
         rows = [[Cell(str(number)), Cell(visible(text))] for number, text in enumerate(tuned.chosen_in_folds, 1)]
@@ -148,10 +179,10 @@ def _figures_table(tuned: TunedDetector) -> Table:
             Column("not assessable", numeric=True),
             lambda item: count_cell(item[1].groups[item[2]].not_assessable, "unknown"),
         ),
-        (Column("mean [ms]", numeric=True), lambda item: interval_cell(item[1].groups[item[2]].interval_ms)),
+        (Column("mean [ms]", numeric=True), lambda item: _mean_cell(item[1].groups[item[2]])),
         (Column("P95 [ms]", numeric=True), lambda item: number_cell(item[1].groups[item[2]].p95_ms)),
         (Column("force at alarm [N]", numeric=True), lambda item: number_cell(item[1].groups[item[2]].force_n)),
-        (Column("alarming free runs", numeric=True), lambda item: Cell(f"{item[1].alarming} of {item[1].free}")),
+        (Column("alarming free runs", numeric=True), lambda item: _alarms_cell(item[1])),
     )
     return tabulate("figures", "Latency by group, with the 95 % interval of the mean", fields, items)
 

@@ -73,7 +73,7 @@ def benchmark_text(tuning: Tuning, tuned: TunedDetector, folder: Path) -> str:
     document["false_alarm_budget"] = str(tuning.options.budget)
     if "signature" in document:
         document["signature"].pop("safety_factor", None)
-    document["threshold"] = _threshold(tuned.choice.rule)
+    document["threshold"] = _threshold(tuned.choice.rule, setup.signature.sides)
     if tuned.debounce is not None:
         activation = document.setdefault("activation", tomlkit.table())
         item = tomlkit.item(tuned.debounce)
@@ -87,8 +87,8 @@ def benchmark_text(tuning: Tuning, tuned: TunedDetector, folder: Path) -> str:
     return "\n".join([*_why(tuning, tuned), tomlkit.dumps(document)])
 
 
-def _threshold(rule: Threshold) -> Any:
-    """Return `threshold` of a benchmark file: the settings that differ from the rule's default ones."""
+def _threshold(rule: Threshold, sides: str | None) -> Any:
+    """Return `threshold` of a benchmark file: the settings that differ from the rule's default ones and `sides`."""
     import tomlkit
 
     if rule.name == "signature":
@@ -98,7 +98,8 @@ def _threshold(rule: Threshold) -> Any:
     default = type(rule)()
     for item in fields(rule):
         value = getattr(rule, item.name)
-        if item.name not in _ELSEWHERE and value is not None and (value != getattr(default, item.name)):
+        usual = (None, getattr(default, item.name), sides if item.name == "sides" else None)
+        if item.name not in _ELSEWHERE and value not in usual:
             table[item.name] = list(value) if isinstance(value, tuple) else value
     return table
 
@@ -217,6 +218,7 @@ def _tuned_values(tuned: TunedDetector) -> dict[str, Any]:
         "candidates": tuned.candidates,
         "unusable": dict(tuned.unusable),
         "chosen_in_folds": list(tuned.chosen_in_folds),
+        "rejected": [asdict(item) for item in tuned.rejected],
     }
 
 
@@ -235,12 +237,21 @@ def _figures(figures: Figures | None) -> dict[str, Any] | None:
             "mean_ms": item.mean_ms,
             "mean_low_ms": item.interval_ms.low,
             "mean_high_ms": item.interval_ms.high,
+            "shortest_ms": item.range_ms[0],
+            "longest_ms": item.range_ms[1],
             "p95_ms": item.p95_ms,
             "force_at_alarm_n": item.force_n,
         }
         for name, item in figures.groups.items()
     }
-    return {"groups": groups, "alarming": figures.alarming, "free_runs": figures.free}
+    share = figures.alarm_share
+    return {
+        "groups": groups,
+        "alarming": figures.alarming,
+        "free_runs": figures.free,
+        "alarm_share_low": share.low,
+        "alarm_share_high": share.high,
+    }
 
 
 def files_of(tuning: Tuning) -> list[tuple[str, TunedDetector]]:

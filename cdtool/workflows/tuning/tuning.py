@@ -27,6 +27,8 @@ from cdtool.tuning.objective import WORSE_AT_MOST, Goal, Objective
 from cdtool.tuning.recordings import TuningRecordings
 from cdtool.tuning.search import Scored, Searched, search
 from cdtool.tuning.tuned import (
+    Figures,
+    Rejection,
     TunedDetector,
     apparent_figures,
     pareto_of,
@@ -322,16 +324,14 @@ class _TuningOf:
     def _result(
         self, found: Searched, objective: Objective, measure: _MeasuresAll, debounces: list[int], words: list[str]
     ) -> TunedDetector:
-        seed, best = self.options.seed, found.best
+        seed = self.options.seed
         gains = movable_gains(self._detector, found.default)
-        default = Scored(found.default, found.default_debounce, best.costs, found.subsets[0].default.score)
-        nested = default_nested = None
-        chosen = [subset.best for subset in found.subsets[1:]]
+        default = found.subsets[0].default
         default_reason = found.measured[found.default.key].reason
-        if chosen:
-            nested = pooled(objective, measure.held_out(chosen), seed)
-            if not default_reason:
-                default_nested = pooled(objective, measure.held_out([default] * len(chosen)), seed)
+        default_nested = None
+        if len(found.subsets) > 1 and not default_reason:
+            default_nested = pooled(objective, measure.held_out([default] * (len(found.subsets) - 1)), seed)
+        best, chosen, nested, rejected = _checked_choice(found, objective, measure, default_nested, seed)
         apparent = apparent_figures(objective, found, best, seed)
         assert apparent is not None, "the best candidate can be used"
         measured = found.measured[best.candidate.key]
@@ -352,13 +352,35 @@ class _TuningOf:
             default_apparent=None if default_reason else apparent_figures(objective, found, default, seed),
             default_nested=default_nested,
             default_reason=default_reason,
-            sensitivities=sensitivities_of(found, debounces, gains),
-            steps=steps_of(found),
+            sensitivities=sensitivities_of(found, best, debounces, gains),
+            steps=steps_of(found, best),
             pareto=pareto_of(objective, found, words),
             candidates=len(found.measured),
             unusable=unusable,
             chosen_in_folds=tuple(in_words(item, words, gains) for item in chosen),
+            rejected=tuple(rejected),
         )
+
+
+def _checked_choice(
+    found: Searched, objective: Objective, measure: _MeasuresAll, default: Figures | None, seed: int
+) -> tuple[Scored, list[Scored], Figures | None, list[Rejection]]:
+    """Return the choice, those without each fold, their nested figures, and the kinds of rules that were rejected.
+
+    A kind that makes a group much worse than by default on recordings that chose nothing is left out of the search.
+    """
+    rejected: list[Rejection] = []
+    while True:
+        without = [item.rule for item in rejected]
+        best = found.subsets[0].best_without(without)
+        chosen = [subset.best_without(without) for subset in found.subsets[1:]]
+        nested = pooled(objective, measure.held_out(chosen), seed) if chosen else None
+        is_default = best.candidate.key == found.default.key
+        if default is None or nested is None or is_default or objective.is_acceptable(nested.costs, default.costs):
+            return best, chosen, nested, rejected
+        ratios = nested.costs / default.costs
+        worst = int(np.nanargmax(ratios))
+        rejected.append(Rejection(best.candidate.rule.name, objective.recordings.groups[worst], float(ratios[worst])))
 
 
 def learned(rule: Threshold, pairs: Sequence[Pair]) -> tuple[FittedThreshold, ...]:
