@@ -36,7 +36,7 @@ MOST_ALARMS, MOST_SECONDS, NESTED_OFF = 0.022, 180.0, 0.10
 
 @dataclass
 class Checked:
-    """Of one seed: the better detector in words, nested and fresh mean latencies [ms], alarms in fresh runs, seconds."""
+    """Of one seed: the better detector, nested and fresh mean latencies [ms], alarms in fresh runs, seconds."""
 
     words: str
     nested: dict[str, float]

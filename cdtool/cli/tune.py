@@ -43,6 +43,10 @@ def tune(
             autocompletion=completions.detector_list,
         ),
     ] = None,
+    thresholds: Annotated[
+        str | None,
+        typer.Option("--thresholds", help="Thresholds to try, as signature,glr. Default: all."),
+    ] = None,
     objective: Annotated[
         str, typer.Option("--objective", help="latency (mean), p95, or force (mean force at the alarm).")
     ] = "latency",
@@ -78,7 +82,14 @@ def tune(
         raise UsageError(f"--objective is '{objective}'", nearest(objective, goals))
     names = listed(detectors or "")
     options = TuningOptions(
-        Budget.parse(false_alarm_budget), names, Goal(objective), impacts, worse_at_most, 1e-3 * shortest_debounce, seed
+        Budget.parse(false_alarm_budget),
+        names,
+        Goal(objective),
+        impacts,
+        worse_at_most,
+        1e-3 * shortest_debounce,
+        seed,
+        listed(thresholds or ""),
     )
     setup = read_benchmark_file(file, detectors=names)
     searches = open_folder(output, setup.inputs, force=force)

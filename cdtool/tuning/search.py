@@ -17,8 +17,9 @@ from cdtool.tuning.candidate import Candidate, Measured
 from cdtool.tuning.coordinate_search import CoordinateSearch
 from cdtool.tuning.objective import Objective
 
-# The gains are searched for so many rules, those with the best settings of different kinds.
-_RULES = 3
+# The gains are searched for so many rules, those with the best settings of different kinds: with all recordings, and
+# without a fold. A search without a fold finds no more than one with all, so that nested figures are on the safe side.
+_RULES, _RULES_WITHOUT_FOLD = 3, 1
 # Measures candidates, in their order.
 Measure = Callable[[Sequence[Candidate]], Sequence[Measured]]
 # Called after each round with the candidates measured so far, and the best one of all recordings.
@@ -155,7 +156,7 @@ def search(
     running: list[tuple[SubsetSearch, CoordinateSearch]] = [
         (item, CoordinateSearch(start.candidate, start.score, gains))
         for item in subsets
-        for start in item.best_rules(_RULES)
+        for start in item.best_rules(_RULES_WITHOUT_FOLD if item.subset else _RULES)
     ]
     while running:
         asked = [(item, own, own.ask()) for item, own in running]

@@ -128,6 +128,11 @@ def _detect(files: Folder, *logs: Path) -> Outcome:
     return cdtool("detect", *logs, "-m", files.machine, "-d", "gm", "--limit", 400)
 
 
+def _tune(files: Folder, benchmark: Path) -> Outcome:
+    options = ("--false-alarm-budget", "1/3op", "--thresholds", "limit", "-o", files.path / "tuned")
+    return cdtool("tune", benchmark, *options)
+
+
 def _update(files: Folder, *logs: Path) -> Outcome:
     shutil.copy(files.signature, files.path / "u.json")
     return cdtool("signature", "update", files.path / "u.json", *logs, "-m", files.machine)
@@ -196,6 +201,9 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("compare", 4): lambda f: _compare(f, [160.0] * 4, "--require-power", old=LATENCIES[:4]),
     ("plan", 0): lambda _: cdtool("plan", "--missed-at-most", "5%"),
     ("plan", 2): lambda _: cdtool("plan", "--missed-at-most", "x"),
+    ("tune", 0): lambda f: _tune(f, f.benchmark()),
+    ("tune", 2): lambda f: _tune(f, f.absent),
+    ("tune", 3): lambda f: _tune(f, f.benchmark('[impacts.soft]\nlogs = ["soft/01.csv", "empty.csv"]\n')),
     ("convert", 0): lambda f: cdtool("convert", f.log, f.path / "out.mcap"),
     ("convert", 2): lambda f: cdtool("convert", f.absent, f.path / "out.mcap"),
     ("convert", 3): lambda f: cdtool("convert", f.cut, f.path / "out.mcap"),

@@ -48,6 +48,7 @@ commands = [
     ("identify", *sorted(folder.glob("free/*.csv")), "-m", machine, "-o", folder / "identified.toml"),
     ("inject", folder / "inject.toml", "-o", folder / "crash_tests"),
     ("coverage", folder / "inject.toml", "-o", folder / "coverage.png"),
+    ("tune", folder / "benchmark.toml", "--false-alarm-budget", "1/2op", "--thresholds", "limit", "-o", folder / "t"),
 ]
 print(json.dumps([(" ".join(map(str, item[:2])), cdtool(*item).status, "pandas" in sys.modules) for item in commands]))
 """

@@ -177,6 +177,7 @@ def tuning_summary(tuning: Tuning) -> dict[str, Any]:
         "false_alarm_budget": str(options.budget),
         "objective": options.goal.value,
         "impacts": options.impacts,
+        "thresholds": list(options.thresholds) or "all",
         "injected_groups": [name for name, group in tuning.setup.impacts.items() if group.injected is not None],
         "worse_at_most": options.worse_at_most,
         "seed": options.seed,

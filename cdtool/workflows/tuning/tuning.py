@@ -59,7 +59,8 @@ class TuningOptions:
     """How detectors are tuned.
 
     `impacts`: which contacts if there are real and injected ones. `worse_at_most`: the share by which a group may get
-    worse than by default. `shortest_debounce` [s]. `seed` decides how recordings are dealt to the folds.
+    worse than by default. `shortest_debounce` [s]. `seed` decides how recordings are dealt to the folds. `thresholds`:
+    the kinds that are tried; all if it is empty. The benchmark file's own is always the default to compare with.
     """
 
     budget: Budget
@@ -69,6 +70,13 @@ class TuningOptions:
     worse_at_most: float = WORSE_AT_MOST
     shortest_debounce: float = SHORTEST_DEBOUNCE
     seed: int = 0
+    thresholds: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        known = THRESHOLDS.usable_names()
+        for name in self.thresholds:
+            if name not in known:
+                raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
 
 
 @dataclass(frozen=True)
@@ -285,7 +293,7 @@ class _TuningOf:
         machine, setup = self.setup.machine_file.machine, self.setup
         signature = replace(setup.signature, adaptive_level=0.0)
         rules: list[Threshold] = []
-        for name in THRESHOLDS.usable_names():
+        for name in self.options.thresholds or THRESHOLDS.usable_names():
             rule = THRESHOLDS.load(name)
             made = setup.signature if name == "signature" else with_context(rule(), setup.signature.sides, signature)
             rules.append(default if name == default.name else for_machine(made, machine))

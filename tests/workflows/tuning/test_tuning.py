@@ -1,0 +1,238 @@
+"""`cdtool tune` on a few simulated recordings: choices, honest figures, files that can be used, and refusals."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import cdtool as api
+from cdtool import simulate_gate
+from cdtool.bounded_loading import parse_toml
+from cdtool.errors import UsageError
+from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.report.tuning_files import open_folder
+from cdtool.signature_store import read_signature
+from cdtool.thresholds.limit import Limit
+from cdtool.tuning.objective import Goal
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.workflows.execution.workers import Workers
+from cdtool.workflows.tuning import tuning as module
+from cdtool.workflows.tuning.tuned_files import tuning_summary
+from cdtool.workflows.tuning.tuning import TuningOptions, tune
+from tests.command import cdtool as command
+
+BUDGET = Budget.parse("1/20op")
+OPTIONS = TuningOptions(BUDGET, ("momentum",), thresholds=("signature", "glr"))
+QUICK = TuningOptions(Budget.parse("1/5op"), ("momentum",), thresholds=("limit",))
+ARGUMENTS = ("--detectors", "gm", "--thresholds", "signature,glr", "--false-alarm-budget", "1/20op")
+
+
+@pytest.fixture(scope="module")
+def gate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tuned") / "gate"
+    simulate_gate(folder, {"free": 25, "stiff": 4, "soft": 4, "holdout": 2}, seed=31)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def quick(gate: Path) -> BenchmarkFile:
+    """Few runs and a threshold that is learned and assessed in no time."""
+    setup = read_benchmark_file(gate / "benchmark.toml")
+    return replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+
+
+@pytest.fixture(scope="module")
+def journals(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("journals")
+
+
+@pytest.fixture(scope="module")
+def done(gate: Path, journals: Path):
+    return tune(gate / "benchmark.toml", OPTIONS, journals=journals)
+
+
+@pytest.fixture(scope="module")
+def written(done, gate: Path, journals: Path, tmp_path_factory: pytest.TempPathFactory):
+    """The command, which goes on with the search of `done`."""
+    folder = tmp_path_factory.mktemp("out") / "tuned"
+    shutil.copytree(journals, folder / "search")
+    outcome = command("tune", gate / "benchmark.toml", *ARGUMENTS, "-o", folder)
+    assert outcome.status == 0, outcome.err
+    return folder, outcome
+
+
+def test_the_choice_is_faster_than_the_default_on_recordings_that_chose_nothing(done):
+    (tuned,) = done.detectors
+    assert done.is_nested and tuned.nested and tuned.default_nested
+    assert tuned.choice.rule.name == "glr"
+    for group in ("stiff", "soft"):
+        assert tuned.nested.groups[group].mean_ms < 0.9 * tuned.default_nested.groups[group].mean_ms
+    assert tuned.nested.groups["stiff"].contacts == 4 and tuned.nested.free == 25
+    assert len(tuned.chosen_in_folds) == 5 and sum("glr" in words for words in tuned.chosen_in_folds) >= 3
+
+
+def test_too_few_contacts_have_a_range_and_no_interval(done):
+    figures = done.detectors[0].honest.groups["stiff"]
+    assert "10" in figures.interval_ms.reason
+    assert figures.range_ms[0] <= figures.mean_ms <= figures.range_ms[1]
+    share = done.detectors[0].honest.alarm_share
+    assert share.low <= done.detectors[0].honest.alarming / 25 <= share.high < 0.5
+
+
+def test_the_result_depends_on_neither_the_number_of_workers_nor_on_an_interruption(quick, tmp_path):
+    first = tune(quick, QUICK, journals=tmp_path)
+    expected = json.dumps(tuning_summary(first), default=str)
+    two = tune(quick, QUICK, workers=Workers(2))
+    assert json.dumps(tuning_summary(two), default=str) == expected
+    journal = tmp_path / "momentum.jsonl"
+    text = journal.read_text(encoding="utf-8")
+    journal.write_text(text[: int(0.6 * len(text))], encoding="utf-8")
+    again = tune(quick, QUICK, journals=tmp_path)
+    assert json.dumps(tuning_summary(again), default=str) == expected
+    assert sorted(journal.read_text(encoding="utf-8").splitlines()) == sorted(text.splitlines())
+
+
+def test_a_search_that_is_complete_is_not_measured_again(quick, tmp_path, monkeypatch):
+    tune(quick, QUICK, journals=tmp_path)
+    measured = []
+    usual = module.Measuring._measured
+    monkeypatch.setattr(module.Measuring, "_measured", lambda own, item: measured.append(item) or usual(own, item))
+    tune(quick, QUICK, journals=tmp_path)
+    assert measured == []
+    tune(quick, replace(QUICK, budget=Budget.parse("1/6op")), journals=tmp_path)
+    assert measured
+
+
+def test_another_seed_deals_the_recordings_otherwise(quick):
+    one, other = (tune(quick, replace(QUICK, seed=seed)) for seed in (0, 1))
+    assert one.detectors[0].default_nested != other.detectors[0].default_nested
+
+
+@pytest.mark.parametrize("goal", [Goal.P95, Goal.FORCE])
+def test_other_objectives(quick, goal):
+    made = tune(quick, replace(QUICK, goal=goal))
+    tuned = made.detectors[0]
+    assert tuned.honest.score <= tuned.default_nested.score + 0.1
+    assert tuned.nested.groups["stiff"].force_n > 100.0
+
+
+def test_the_files_can_be_used(written, gate):
+    folder = written[0]
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        "machine.toml",
+        "benchmark.toml",
+        "signature_momentum.json",
+        "tuning.html",
+        "tuning.json",
+        "search",
+    }
+    made = api.benchmark(folder / "benchmark.toml").results
+    summary = json.loads((folder / "tuning.json").read_text(encoding="utf-8"))
+    chosen = summary["detectors"][0]["chosen"]
+    assert made.provenance["gains"]["momentum"] == chosen["gains"]
+    assert made.provenance["threshold"] == chosen["threshold"]["rule"] == "glr"
+    assert made.provenance["debounce_samples"] == chosen["debounce"] == 3
+    signature = read_signature(folder / "signature_momentum.json")
+    factor = signature.current[0].safety_factor
+    assert made.calibration[0].safety_factor == pytest.approx(factor)
+    # The factor of the search has five folds, that of learning ten.
+    assert chosen["safety_factor"] == pytest.approx(factor, rel=0.15)
+    log = gate / "stiff" / "01.csv"
+    found = command("detect", log, "-m", folder / "machine.toml", "-s", folder / "signature_momentum.json")
+    assert found.status == 0 and "alarm" in found.out
+
+
+def test_files_state_what_was_chosen_and_why(written):
+    folder, outcome = written
+    text = (folder / "benchmark.toml").read_text(encoding="utf-8")
+    assert text.startswith("# Tuned by cdtool tune from benchmark.toml for momentum at 1/20op.")
+    assert "# These figures are of recordings that chose nothing." in text
+    assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12}
+    machine = (folder / "machine.toml").read_text(encoding="utf-8")
+    assert "tuned at 1/20op; was 10.0" in machine and "mounted backward" in machine
+    assert "nested figures" in outcome.out and "neither chose the settings" in outcome.out
+
+
+def test_the_report_has_figures_and_no_script(written):
+    page = (written[0] / "tuning.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 2 and "<script" not in page
+    for words in ("Nested figures", "tuned, nested", "How flat the optimum is", "What each choice saved", "evidence"):
+        assert words in page
+
+
+def test_it_may_run_again_into_its_folder_but_replaces_no_other_file(written, tmp_path):
+    folder = tmp_path / "tuned"
+    shutil.copytree(written[0], folder)
+    assert open_folder(folder, ()) == folder / "search"
+    (folder / "machine.toml").write_text("[machine]\n", encoding="utf-8")
+    with pytest.raises(UsageError, match="already exists and contains no file of cdtool tune"):
+        open_folder(folder, ())
+    assert open_folder(folder, (), force=True).is_dir()
+    with pytest.raises(UsageError, match="exists and is not a folder"):
+        open_folder(folder / "tuning.html", ())
+
+
+def test_its_own_input_is_never_overwritten(gate):
+    arguments = ("--false-alarm-budget", "1/20op", "-o", gate, "--force")
+    done = command("tune", gate / "benchmark.toml", *arguments)
+    assert done.status == 2 and "is read by this command" in done.err
+
+
+def test_too_few_runs_are_refused_with_the_numbers_needed(tmp_path):
+    simulate_gate(tmp_path / "gate", {"free": 14, "stiff": 1}, seed=32)
+    done = command("tune", tmp_path / "gate" / "benchmark.toml", "--false-alarm-budget", "1/20op", "-o", tmp_path / "t")
+    assert done.status == 2
+    assert "19 are needed to set the limit, 25 to check it, 59 to be 95 % sure of it" in done.err
+
+
+def test_between_the_two_numbers_figures_are_apparent(gate):
+    setup = read_benchmark_file(gate / "benchmark.toml")
+    few = replace(setup, learn=setup.learn[:20], threshold="limit", rule=Limit())
+    made = tune(few, replace(QUICK, budget=BUDGET))
+    assert not made.is_nested and made.detectors[0].nested is None
+    assert made.detectors[0].chosen_in_folds == ()
+
+
+def test_without_contacts_there_is_nothing_to_tune_on(gate):
+    setup = read_benchmark_file(gate / "benchmark.toml")
+    with pytest.raises(UsageError, match="no contact to tune on"):
+        tune(replace(setup, impacts={}), OPTIONS)
+
+
+def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
+    model = "[model.drive]\nstiffness = 8e4\n[model.controller]\nperiod = 0.001\nspeed_gain = 4300\n"
+    machine = (gate / "machine.toml").read_text(encoding="utf-8")
+    (gate / "model.toml").write_text(machine + model, encoding="utf-8")
+    text = (gate / "benchmark.toml").read_text(encoding="utf-8").replace('"machine.toml"', '"model.toml"')
+    inject = '[inject]\nlogs = ["free/01.csv", "free/02.csv"]\npositions = ["0.5m"]\nfolder = "injected_here"\n'
+    inject += "[inject.obstacles.hard]\nstiffness_n_per_mm = 500\n"
+    (gate / "both.toml").write_text(text + inject, encoding="utf-8")
+    both = read_benchmark_file(gate / "both.toml")
+    both = replace(both, learn=both.learn[:12], threshold="limit", rule=Limit())
+    with pytest.raises(UsageError, match=r"has real contacts \(stiff, soft\) and injected ones"):
+        tune(both, QUICK)
+    made = tune(both, replace(QUICK, impacts="injected"))
+    assert set(made.groups) == {"injected_hard"}
+    real = tune(both, replace(QUICK, impacts="real"))
+    assert set(real.groups) == {"stiff", "soft"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--objective", "speed"), "--objective is 'speed'"),
+        (("--thresholds", "glx"), "unknown threshold 'glx'"),
+        (("--impacts", "all"), "--impacts is 'all'"),
+        (("--impacts", "injected"), "has no section [inject]"),
+        (("--false-alarm-budget", "often"), "false-alarm budget is 'often'"),
+        (("--detectors", "gx"), "gx"),
+    ],
+)
+def test_wrong_options_are_one_line(gate, tmp_path, arguments, words):
+    done = command("tune", gate / "benchmark.toml", "--false-alarm-budget", "1/20op", "-o", tmp_path / "t", *arguments)
+    assert done.status == 2 and words in done.err and done.err.count("\n") == 1
