@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from cdtool.evaluation.statistics.interval import Interval
+from cdtool.plain_text import digits as plain_digits
 
 NOTHING = "–"
 NOT_REACHED = "not reached"
@@ -26,6 +27,15 @@ def spoken(word: str) -> str:
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number with the given count of significant digits."""
     return NOTHING if value is None else _written(value, _decimals(value, digits))
+
+
+def short(value: float) -> str:
+    """Return a number with up to three significant digits, without zeros that say nothing.
+
+    >>> short(3.0), short(38.89), short(0.07071)
+    ('3', '38.9', '0.0707')
+    """
+    return plain_digits(float(f"{value:.3g}"))
 
 
 def with_interval(interval: Interval) -> str:

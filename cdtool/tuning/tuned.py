@@ -145,7 +145,8 @@ class TunedDetector:
     `apparent` figures are those of the recordings that chose, each assessed without its fold; `nested` those of
     recordings that chose nothing, None if there are too few runs; `default` and `default_nested` those of what the
     benchmark file has, at the same budget, None if it cannot be used: `default_reason`. `chosen_in_folds` are the
-    choices without each fold, in words. `debounce` [samples] is None for the default of 9 ms.
+    choices without each fold, in words. `debounce` [samples] is None for the default of 9 ms. `tried_costs` are the
+    apparent costs (ms, or N) by group of everything that was tried.
     """
 
     detector: str
@@ -166,6 +167,7 @@ class TunedDetector:
     unusable: dict[str, str]
     chosen_in_folds: tuple[str, ...]
     rejected: tuple[Rejection, ...] = ()
+    tried_costs: tuple[tuple[float, ...], ...] = ()
 
     @property
     def honest(self) -> Figures:
@@ -295,6 +297,13 @@ def steps_of(searched: Searched, best: Scored) -> tuple[Step, ...]:
         Step(name, 1.0 - math.exp(after - before))
         for name, before, after in zip(names, scores[:-1], scores[1:], strict=True)
     )
+
+
+def tried_costs_of(objective: Objective, searched: Searched) -> tuple[tuple[float, ...], ...]:
+    """Return the costs (ms, or N) by group of every candidate with every debounce."""
+    factor = 1.0 if objective.goal is Goal.FORCE else 1e3
+    items = [item for scored in searched.subsets[0].known.values() for item in scored if math.isfinite(item.score)]
+    return tuple(tuple(factor * float(cost) for cost in item.costs if np.isfinite(cost)) for item in items)
 
 
 def pareto_of(objective: Objective, searched: Searched, words: Sequence[str]) -> tuple[ParetoPoint, ...]:

@@ -10,7 +10,7 @@ from cdtool.plain_text import counted
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, images_of, left_out_sections
 from cdtool.report.model import NO_CERTIFICATE
-from cdtool.report.number_text import NOTHING, number
+from cdtool.report.number_text import NOTHING, number, short
 from cdtool.report.plots.tuning_plots import draw_pareto, draw_sensitivity
 from cdtool.report.table import Cell, Column, Table, count_cell, interval_cell, number_cell, tabulate
 from cdtool.tuning.objective import Goal
@@ -190,13 +190,11 @@ def _figures_table(tuned: TunedDetector) -> Table:
 def _sensitivity_table(items: Sequence[Sensitivity]) -> Table:
     fields = (
         (Column("gain or setting"), lambda item: Cell(visible(item.name))),
-        (Column("chosen", numeric=True), lambda item: number_cell(item.chosen)),
+        (Column("chosen", numeric=True), lambda item: Cell(short(item.chosen))),
         (Column("tried", numeric=True), lambda item: Cell(str(len(item.tried)))),
         (
             Column("at most 5 % more cost", numeric=True),
-            lambda item: Cell(
-                f"{number(item.flat_from)} to {number(item.flat_to)}" if len(item.tried) > 1 else NOTHING
-            ),
+            lambda item: Cell(f"{short(item.flat_from)} to {short(item.flat_to)}" if len(item.tried) > 1 else NOTHING),
         ),
         (
             Column("edge"),
@@ -223,4 +221,4 @@ def _cost_cell(place: int, item: ParetoPoint) -> Cell:
 
 def _settings(item: ParetoPoint) -> str:
     rule = item.candidate.rule
-    return ", ".join(f"{name} {number(getattr(rule, name))}" for name in getattr(rule, "searched", {})) or NOTHING
+    return ", ".join(f"{name} {short(getattr(rule, name))}" for name in getattr(rule, "searched", {})) or NOTHING

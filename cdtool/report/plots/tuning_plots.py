@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from cdtool.detectors.look import BLUE, RED
+from cdtool.report.number_text import short
 from cdtool.report.plots.figures import drawing, label, new_figure
 from cdtool.tuning.objective import Goal
 from cdtool.tuning.tuned import FLAT, Sensitivity, TunedDetector
@@ -20,14 +21,18 @@ _COSTS = {
     Goal.P95: "95th percentile [ms]",
     Goal.FORCE: "mean force at the alarm [N]",
 }
-_OTHERS, _COLUMNS = "0.5", 3
+_OTHERS, _TRIED, _COLUMNS = "0.45", "0.75", 3
 
 
 def draw_pareto(tuned: TunedDetector, groups: Sequence[str], goal: Goal) -> Figure:
     """Draw the costs of the first two groups: what none beats in every group, the choice, and the default."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     with drawing():
         figure = new_figure(5.2, 3.6)
         axes = figure.subplots()
+        others = [costs[:2] for costs in tuned.tried_costs if len(costs) > 1]
+        axes.plot(*zip(*others, strict=True), ".", color=_TRIED, markersize=4, label="tried")
         points = [(point.costs[0], point.costs[1]) for point in tuned.pareto]
         axes.plot(*zip(*points, strict=True), "o-", color=_OTHERS, markersize=4, label="not beaten in every group")
         for figures, style, words in (
@@ -39,8 +44,18 @@ def draw_pareto(tuned: TunedDetector, groups: Sequence[str], goal: Goal) -> Figu
                 axes.plot([first], [second], style, color=RED if words == "default" else BLUE, label=words)
         axes.set_xlabel(f"{label(groups[0])}: {_COSTS[goal]}")
         axes.set_ylabel(f"{label(groups[1])}: {_COSTS[goal]}")
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(base=10.0, subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(FuncFormatter(_plain))
+            axis.set_minor_formatter(NullFormatter())
         axes.legend()
         return figure
+
+
+def _plain(value: float, place: int) -> str:  # noqa: ARG001  the formatter gives the place too
+    return short(value)
 
 
 def _cost(figures: object, goal: Goal) -> float:
@@ -73,4 +88,8 @@ def _draw_setting(axes: Axes, item: Sensitivity) -> None:
     axes.plot([item.chosen], [1.0], "D", color=BLUE)
     if min(values) > 0.0 and max(values) / min(values) >= 4.0:
         axes.set_xscale("log")
+    low, high = min(values), max(values)
+    ticks = sorted({low, item.chosen, high})
+    axes.set_xticks(ticks, [short(tick) for tick in ticks])
+    axes.set_xticks([], minor=True)
     axes.set_xlabel(label(item.name.replace("_", " ")) + (" (at the edge)" if item.is_at_edge else ""))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,7 @@ from cdtool.tuning.tuned import (
     sensitivities_of,
     settings_of,
     steps_of,
+    tried_costs_of,
 )
 from cdtool.value_words import value_in_words
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors
@@ -367,6 +368,7 @@ class _TuningOf:
             unusable=unusable,
             chosen_in_folds=tuple(in_words(item, words, gains) for item in chosen),
             rejected=tuple(rejected),
+            tried_costs=tried_costs_of(objective, found),
         )
 
 
@@ -375,20 +377,25 @@ def _checked_choice(
 ) -> tuple[Scored, list[Scored], Figures | None, list[Rejection]]:
     """Return the choice, those without each fold, their nested figures, and the kinds of rules that were rejected.
 
-    A kind that makes a group much worse than by default on recordings that chose nothing is left out of the search.
+    A kind that makes a group much worse than by default on recordings that chose nothing is left out of the search:
+    either what was chosen without each fold, or the choice itself with limits that were set without the fold.
     """
     rejected: list[Rejection] = []
     while True:
         without = [item.rule for item in rejected]
         best = found.subsets[0].best_without(without)
         chosen = [subset.best_without(without) for subset in found.subsets[1:]]
-        nested = pooled(objective, measure.held_out(chosen), seed) if chosen else None
-        is_default = best.candidate.key == found.default.key
-        if default is None or nested is None or is_default or objective.is_acceptable(nested.costs, default.costs):
+        nested = pooled(objective, measure.held_out(chosen), seed)
+        if default is None or nested is None or best.candidate.key == found.default.key:
             return best, chosen, nested, rejected
-        ratios = nested.costs / default.costs
+        of_choice = pooled(objective, measure.held_out([best] * len(chosen)), seed)
+        checked = [item for item in (nested, of_choice) if item is not None]
+        ratios = np.max([item.costs / default.costs for item in checked], axis=0)
+        if all(objective.is_acceptable(item.costs, default.costs) for item in checked):
+            return best, chosen, nested, rejected
         worst = int(np.nanargmax(ratios))
-        rejected.append(Rejection(best.candidate.rule.name, objective.recordings.groups[worst], float(ratios[worst])))
+        group = objective.recordings.groups[worst]
+        rejected.append(Rejection(best.candidate.rule.name, group, float(ratios[worst])))
 
 
 def learned(rule: Threshold, pairs: Sequence[Pair]) -> tuple[FittedThreshold, ...]:
@@ -420,6 +427,7 @@ class _MeasuresAll:
     measuring: Measuring
     workers: Workers
     journal: Journal | None
+    _held_out: dict[tuple[str, int, int], HeldOut] = field(default_factory=dict)
 
     def __call__(self, candidates: Sequence[Candidate]) -> list[Measured]:
         """Return what each candidate gives."""
@@ -434,7 +442,14 @@ class _MeasuresAll:
     def held_out(self, chosen: Sequence[Scored]) -> list[HeldOut]:
         """Return what the choice without each fold gives on that fold."""
         choices = [Choice(item.candidate, item.debounce, fold) for fold, item in enumerate(chosen)]
-        return list(self._all(choices))
+        new = [item for item in choices if self._key(item) not in self._held_out]
+        for item, made in zip(new, self._all(new), strict=True):
+            self._held_out[self._key(item)] = made
+        return [self._held_out[self._key(item)] for item in choices]
+
+    @staticmethod
+    def _key(choice: Choice) -> tuple[str, int, int]:
+        return choice.candidate.key, choice.debounce, choice.fold
 
     def _all(self, items: Sequence[Any]) -> Iterator[Any]:
         return in_order(self.measuring, items, len(items), self.workers)
