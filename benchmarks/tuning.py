@@ -20,12 +20,10 @@ from time import perf_counter
 
 from timing import environment, table
 
-from cdtool import benchmark, simulate_gate
-from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool import benchmark, simulate_gate, tune
 from cdtool.report.tuning_files import open_folder, write_tuning
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, ImpactGroup, read_benchmark_file
 from cdtool.workflows.execution.workers import Workers
-from cdtool.workflows.tuning.tuning import TuningOptions, tune
 
 FIRST_SEED, FRESH = 801, 100_000
 DETECTORS = ("friction_ekf", "inertial_momentum")
@@ -47,7 +45,7 @@ class Checked:
     seconds: dict[str, float]
 
 
-def check(folder: Path, seed: int, free: int, impacts: int, fresh: int, budget: Budget) -> Checked:
+def check(folder: Path, seed: int, free: int, impacts: int, fresh: int, budget: str) -> Checked:
     """Tune each detector on recordings of a seed, and check the better one on those of another."""
     simulate_gate(folder / "gate", {"free": free, "holdout": 1, "stiff": impacts, "soft": impacts}, seed=seed)
     counts = {"holdout": fresh, "stiff": impacts, "soft": impacts}
@@ -58,7 +56,7 @@ def check(folder: Path, seed: int, free: int, impacts: int, fresh: int, budget: 
         file = folder / "gate" / "benchmark.toml"
         target = folder / name
         searches = open_folder(target, ())
-        done = tune(file, TuningOptions(budget, (name,)), journals=searches, workers=Workers(2))
+        done = tune(file, budget, detectors=(name,), journals=searches, workers=Workers(2))
         write_tuning(done, target)
         seconds[name] = perf_counter() - begin
         made.append((done.detectors[0], target))
@@ -106,7 +104,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--free", type=int, default=200, help="impact-free runs to tune on")
     parser.add_argument("--impacts", type=int, default=30, help="impacts of each kind, to tune on and to check on")
     parser.add_argument("--fresh", type=int, default=200, help="impact-free runs to check on")
-    parser.add_argument("--budget", type=Budget.parse, default=Budget.parse("1/100op"))
+    parser.add_argument("--budget", default="1/100op")
     options = parser.parse_args(arguments)
     print(environment())
     found = []
@@ -142,7 +140,7 @@ def main(arguments: list[str]) -> int:
         for item in found
     ]
     table(head, rows)
-    faults = faults_of(found) if (options.free, str(options.budget)) == (200, "1/100op") else []
+    faults = faults_of(found) if (options.free, options.budget) == (200, "1/100op") else []
     print(*faults, sep="\n")
     return int(bool(faults))
 

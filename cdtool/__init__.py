@@ -21,6 +21,7 @@ Every command is available as a function:
     cdtool.identify(logs, "machine.toml", "machine.toml")               -> IdentifiedMachine: parameters with errors
     cdtool.inject("benchmark.toml", "injected")                         -> Injected: impacts made from impact-free logs
     cdtool.coverage("benchmark.toml")                                   -> Coverage: latency over position and stiffness
+    cdtool.tune("benchmark.toml", "1/100op")                            -> Tuning: gains, threshold, debounce
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
     cdtool.study_sensors("machine.toml", ...)                           -> SensorStudy
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.signature.upkeep import check_signature
     from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
     from cdtool.workflows.study.study import study_sensors
+    from cdtool.workflows.tuning.tuning import tune
 
 _API = {
     "__version__": "cdtool.version:__version__",
@@ -78,6 +80,7 @@ _API = {
     "plan": "cdtool.workflows.planning:plan",
     "info": "cdtool.workflows.information:info",
     "study_sensors": "cdtool.workflows.study.study:study_sensors",
+    "tune": "cdtool.workflows.tuning.tuning:tune",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
 }
@@ -106,6 +109,7 @@ __all__ = [
     "simulate_arm",
     "simulate_gate",
     "study_sensors",
+    "tune",
     "update_signature",
 ]
 

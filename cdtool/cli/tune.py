@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,11 +12,10 @@ from cdtool.cli import completions
 from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
 from cdtool.cli.options import ForceOption, JsonOption, listed
 from cdtool.cli.place import Place, location
-from cdtool.errors import UsageError, nearest
 from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
-    from cdtool.workflows.tuning.tuning import Tuning, Watch
+    from cdtool.workflows.tuning.tuning import Tuning
 
 _SHOWN = 110
 
@@ -64,37 +62,33 @@ def tune(
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of candidates to measure in parallel.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Tune gains, threshold and debounce at a false-alarm budget, with figures of recordings that chose nothing.
+    """Tune gains, threshold and debounce at a false-alarm budget, with results of recordings that chose nothing.
 
     Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
     """
-    from cdtool.evaluation.false_alarm_budget import Budget
     from cdtool.report.tuning_files import open_folder, write_tuning
-    from cdtool.tuning.objective import Goal
     from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
     from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.tuning.tuned_files import tuning_summary
-    from cdtool.workflows.tuning.tuning import TuningOptions
-    from cdtool.workflows.tuning.tuning import tune as run
+    from cdtool.workflows.tuning.tuning import TuningOptions, tune_detectors
 
-    goals = [item.value for item in Goal]
-    if objective not in goals:
-        raise UsageError(f"--objective is '{objective}'", nearest(objective, goals))
     names = listed(detectors or "")
     options = TuningOptions(
-        Budget.parse(false_alarm_budget),
-        names,
-        Goal(objective),
-        impacts,
-        worse_at_most,
-        1e-3 * shortest_debounce,
-        seed,
-        listed(thresholds or ""),
+        false_alarm_budget,
+        detectors=names,
+        thresholds=listed(thresholds or ""),
+        objective=objective,
+        impacts=impacts,
+        worse_at_most=worse_at_most,
+        shortest_debounce=1e-3 * shortest_debounce,
+        seed=seed,
+        workers=Workers(jobs),
+        watch=_watch,
     )
     setup = read_benchmark_file(file, detectors=names)
     searches = open_folder(output, setup.inputs, force=force)
-    with progress("reading") as advance, _watching() as watch:
-        done = run(setup, options, journals=searches, workers=Workers(jobs), progress=advance, watch=watch)
+    with progress("reading") as advance:
+        done = tune_detectors(setup, replace(options, journals=searches, progress=advance))
     written = write_tuning(done, output)
     print_skipped(done.skipped, done.findings)
     if as_json:
@@ -106,16 +100,11 @@ def tune(
     leave(done.skipped)
 
 
-@contextmanager
-def _watching() -> Iterator[Watch]:
+def _watch(detector: str, count: int, best: str) -> None:
     """Print the best so far to a terminal, after each round of a search."""
-
-    def watch(detector: str, count: int, best: str) -> None:
-        if sys.stderr.isatty():
-            words = f"{detector}: {counted(count, 'candidate')}, best so far: {best}"
-            typer.echo(plain(words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."), err=True)
-
-    yield watch
+    if sys.stderr.isatty():
+        words = f"{detector}: {counted(count, 'candidate')}, best so far: {best}"
+        typer.echo(plain(words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."), err=True)
 
 
 def _show(done: Tuning) -> None:
@@ -157,7 +146,7 @@ def _show(done: Tuning) -> None:
         ("missed", "right"),
     ]
     columns += [("alarming\nfree runs", "right"), ("95 % interval", "right")]
-    table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} figures")
+    table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} results")
     for tuned in done.detectors:
         settings = described_choice(tuned)
         edges = [item.name for item in tuned.sensitivities if item.is_at_edge]
@@ -171,7 +160,7 @@ def _show(done: Tuning) -> None:
 
 def _meaning(done: Tuning) -> str:
     if done.is_nested:
-        return "nested: each figure is of recordings that neither chose the settings nor set the limit. "
+        return "nested: each result is of recordings that neither chose the settings nor set the limit. "
     from cdtool.workflows.tuning.recordings_to_tune import to_check
 
     return (

@@ -77,7 +77,7 @@ class Budget:
         """
         if self.per == "operation":
             if self.confidence is None or self.rate >= 1.0:
-                return max(math.ceil(1.0 / self.rate - 1.0 - 1e-6), 1.0)
+                return float(max(math.ceil(1.0 / self.rate - 1.0 - 1e-6), 1))
             return float(math.ceil(math.log1p(-self.confidence) / math.log1p(-self.rate) - 1e-9))
         return (1.0 if self.confidence is None else -math.log1p(-self.confidence)) / self.rate
 

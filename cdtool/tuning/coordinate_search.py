@@ -8,7 +8,7 @@ from typing import Any
 
 from cdtool.tuning.candidate import Candidate
 
-# The first factor; the last one is the smallest that is tried. So many evaluations at most.
+# The first factor; the last one is the smallest that is tried. The number of evaluations is limited.
 _FIRST, _LAST = 2.0, 2.0**0.5
 EVALUATIONS = 40
 # A gain is not moved further from where it began than by this factor.
@@ -36,7 +36,7 @@ class CoordinateSearch:
         self._scores[self.best.key] = self.score
 
     def ask(self) -> list[Candidate]:
-        """Return the candidates whose scores are to be told next; empty at the end."""
+        """Return the candidates whose scores are needed next; empty at the end."""
         while self.step >= _LAST - 1e-9 and self.names and self.evaluated < EVALUATIONS:
             around = [item for item in self._around() if item.key not in self._scores]
             if around:

@@ -10,7 +10,7 @@ from typing import Any
 from cdtool.errors import CdtoolError
 from cdtool.thresholds.base import Threshold
 
-# Samples in succession that raise an alarm, and the shortest time that they take [s] unless another one is asked for.
+# Consecutive samples that raise an alarm, and the shortest time that they take [s] unless another one is asked for.
 DEBOUNCES = (1, 3, 5, 9)
 SHORTEST_DEBOUNCE = 3e-3
 

@@ -1,6 +1,6 @@
 """The search for one detector: a grid of rules, then gains, for all recordings and again without each of their folds.
 
-What is chosen without a fold is assessed on it: these nested figures are of recordings that chose nothing. All of these
+What is chosen without a fold is assessed on it: these nested results are of recordings that chose nothing. All of these
 searches share what is measured; a search chooses among the candidates that it asked for itself.
 """
 
@@ -18,7 +18,7 @@ from cdtool.tuning.coordinate_search import CoordinateSearch
 from cdtool.tuning.objective import Objective
 
 # The gains are searched for so many rules, those with the best settings of different kinds: with all recordings, and
-# without a fold. A search without a fold finds no more than one with all, so that nested figures are on the safe side.
+# without a fold. A search without a fold finds no more than one with all, so that nested results are on the safe side.
 _RULES, _RULES_WITHOUT_FOLD = 3, 1
 # Measures candidates, in their order.
 Measure = Callable[[Sequence[Candidate]], Sequence[Measured]]

@@ -1,4 +1,4 @@
-"""The result of tuning a detector: the choice with its figures, what led to it, and how sure it is."""
+"""The result of tuning a detector: the choice with its results, what led to it, and how sure it is."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _EDGE = 0.01
 
 
 @dataclass(frozen=True)
-class GroupFigures:
+class GroupResults:
     """The latencies of a group's contacts [ms]: mean with its 95 % interval, 95th percentile, force at the alarm [N].
 
     A missed contact counts as its window in mean, range and percentile. The interval has no bounds below 10 contacts.
@@ -42,10 +42,10 @@ class GroupFigures:
 
 
 @dataclass(frozen=True)
-class Figures:
+class ChoiceResults:
     """What a choice gives: by group, and the number of impact-free operations that alarm."""
 
-    groups: dict[str, GroupFigures]
+    groups: dict[str, GroupResults]
     alarming: int
     free: int
     score: float
@@ -142,7 +142,7 @@ class ParetoPoint:
 class TunedDetector:
     """A detector with the choice, its debounce and the safety factor that meets the budget.
 
-    `apparent` figures are those of the recordings that chose, each assessed without its fold; `nested` those of
+    `apparent` results are those of the recordings that chose, each assessed without its fold; `nested` those of
     recordings that chose nothing, None if there are too few runs; `default` and `default_nested` those of what the
     benchmark file has, at the same budget, None if it cannot be used: `default_reason`. `chosen_in_folds` are the
     choices without each fold, in words. `debounce` [samples] is None for the default of 9 ms. `tried_costs` are the
@@ -155,10 +155,10 @@ class TunedDetector:
     choice: Candidate
     debounce: int | None
     factor: float
-    apparent: Figures
-    nested: Figures | None
-    default_apparent: Figures | None
-    default_nested: Figures | None
+    apparent: ChoiceResults
+    nested: ChoiceResults | None
+    default_apparent: ChoiceResults | None
+    default_nested: ChoiceResults | None
     default_reason: str
     sensitivities: tuple[Sensitivity, ...]
     steps: tuple[Step, ...]
@@ -170,20 +170,20 @@ class TunedDetector:
     tried_costs: tuple[tuple[float, ...], ...] = ()
 
     @property
-    def honest(self) -> Figures:
-        """Return the nested figures, the apparent ones if there are none."""
+    def honest(self) -> ChoiceResults:
+        """Return the nested results, the apparent ones if there is no such result."""
         return self.nested or self.apparent
 
 
-def figures_of(
+def results_of(
     objective: Objective,
     latency: FloatArray,
     force: FloatArray,
     assessable: np.ndarray[Any, np.dtype[np.bool_]],
     counts: tuple[int, int],
     seed: int,
-) -> Figures:
-    """Return the figures of latencies [s] and forces [N] of all contacts (C,); `counts`: alarming and free runs."""
+) -> ChoiceResults:
+    """Return the results of latencies [s] and forces [N] of all contacts (C,); `counts`: alarming and free runs."""
     recordings = objective.recordings
     everything = np.ones(len(latency), dtype=bool)
     values = 1e3 * np.where(np.isnan(latency), recordings.window_of, latency)
@@ -192,7 +192,7 @@ def figures_of(
         own = recordings.group_of == number
         missed = np.isnan(latency[own]) & assessable[own]
         known = force[own][np.isfinite(force[own])]
-        found[name] = GroupFigures(
+        found[name] = GroupResults(
             int(own.sum()),
             int(missed.sum()),
             int((~assessable[own]).sum()),
@@ -203,11 +203,11 @@ def figures_of(
             float(np.mean(known)) if len(known) else math.nan,
         )
     costs = objective.costs_of(latency, force, everything)
-    return Figures(found, *counts, objective.score(costs), costs)
+    return ChoiceResults(found, *counts, objective.score(costs), costs)
 
 
-def pooled(objective: Objective, held_out: Sequence[HeldOut], seed: int) -> Figures | None:
-    """Return the figures of all folds together; None if one could not be assessed."""
+def pooled(objective: Objective, held_out: Sequence[HeldOut], seed: int) -> ChoiceResults | None:
+    """Return the results of all folds together; None if one could not be assessed."""
     if not held_out or any(item.reason for item in held_out):
         return None
     count = len(objective.recordings.fold_of)
@@ -217,17 +217,17 @@ def pooled(objective: Objective, held_out: Sequence[HeldOut], seed: int) -> Figu
         numbers = list(item.contacts)
         latency[numbers], force[numbers], assessable[numbers] = item.latency, item.force, item.assessable
     counts = (sum(item.alarming for item in held_out), sum(item.free for item in held_out))
-    return figures_of(objective, latency, force, assessable, counts, seed)
+    return results_of(objective, latency, force, assessable, counts, seed)
 
 
-def apparent_figures(objective: Objective, searched: Searched, item: Scored, seed: int) -> Figures | None:
-    """Return the figures of a candidate on the recordings that chose it; None if it cannot be used."""
+def apparent_results(objective: Objective, searched: Searched, item: Scored, seed: int) -> ChoiceResults | None:
+    """Return the results of a candidate on the recordings that chose it; None if it cannot be used."""
     measured = searched.measured[item.candidate.key]
     if measured.reason:
         return None
     at = item.debounce, 0
     counts = (int(measured.alarming[at]), len(objective.recordings.free))
-    return figures_of(objective, measured.latency[at], measured.force[at], measured.assessable, counts, seed)
+    return results_of(objective, measured.latency[at], measured.force[at], measured.assessable, counts, seed)
 
 
 def settings_of(candidate: Candidate, gains: Sequence[str]) -> dict[str, Any]:

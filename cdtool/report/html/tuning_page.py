@@ -1,4 +1,4 @@
-"""The HTML page of a tuning: choices with honest figures, what led to them, and how sure they are. Without script."""
+"""The HTML page of a tuning: choices with honest results, what led to them, and how sure they are. Without script."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cdtool.report.number_text import NOTHING, number, short
 from cdtool.report.plots.tuning_plots import draw_pareto, draw_sensitivity
 from cdtool.report.table import Cell, Column, Table, count_cell, interval_cell, number_cell, tabulate
 from cdtool.tuning.objective import Goal
-from cdtool.tuning.tuned import Figures, GroupFigures, ParetoPoint, Sensitivity, TunedDetector
+from cdtool.tuning.tuned import ChoiceResults, GroupResults, ParetoPoint, Sensitivity, TunedDetector
 from cdtool.workflows.tuning.tuned_files import described_choice
 from cdtool.workflows.tuning.tuning import Tuning
 
@@ -24,11 +24,11 @@ _GOALS = {
     Goal.FORCE: "mean force at the alarm",
 }
 NESTED_NOTE = (
-    "Nested figures: the search is repeated five times without a fifth of the recordings, and each choice is assessed "
-    "on the fifth that neither chose it nor set its limit. Apparent figures are those of the recordings that chose."
+    "Nested results: the search is repeated five times without a fifth of the recordings, and each choice is assessed "
+    "on the fifth that neither chose it nor set its limit. Apparent results are those of the recordings that chose."
 )
 APPARENT_NOTE = (
-    "There are too few impact-free runs to set a limit without a fifth of them: all figures are apparent, of the "
+    "There are too few impact-free runs to set a limit without a fifth of them: all results are apparent, of the "
     "recordings that chose. Expect latencies 2 to 8 % longer and more false alarms on others."
 )
 
@@ -71,7 +71,7 @@ def injected_words(tuning: Tuning) -> str:
     return f"The contacts of {', '.join(map(visible, names))} were computed (injected), not measured. "
 
 
-def _means(figures: Figures) -> str:
+def _means(figures: ChoiceResults) -> str:
     return ", ".join(f"{name} {number(item.mean_ms)} ms" for name, item in figures.groups.items())
 
 
@@ -99,23 +99,23 @@ def _detectors_table(tuning: Tuning) -> Table:
     return tabulate("detectors", "Mean latency, a missed contact counted as its window", fields, tuning.detectors)
 
 
-def _mean_cell(figures: GroupFigures) -> Cell:
+def _mean_cell(figures: GroupResults) -> Cell:
     """Return the cell of a mean with its interval, or with the range of values too few for one."""
     if not figures.interval_ms.reason:
         return interval_cell(figures.interval_ms)
     return replace(number_cell(figures.mean_ms), details=(range_words(figures),))
 
 
-def range_words(figures: GroupFigures) -> str:
+def range_words(figures: GroupResults) -> str:
     """Return the range of latencies in words."""
     return f"range {number(figures.range_ms[0])} to {number(figures.range_ms[1])}"
 
 
-def _alarms_cell(figures: Figures) -> Cell:
+def _alarms_cell(figures: ChoiceResults) -> Cell:
     return Cell(f"{figures.alarming} of {figures.free}", (alarms_words(figures),))
 
 
-def alarms_words(figures: Figures) -> str:
+def alarms_words(figures: ChoiceResults) -> str:
     """Return the 95 % interval of the share of alarming runs in words."""
     share = figures.alarm_share
     return f"{100.0 * share.low:.1f} to {100.0 * share.high:.1f} %"
@@ -137,7 +137,7 @@ def rejection_words(tuned: TunedDetector) -> list[str]:
 
 def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
     name, groups = visible(tuned.detector), list(tuned.apparent.groups)
-    tables = [_figures_table(tuned)]
+    tables = [_results_table(tuned)]
     if tuned.steps:
         rows = [[Cell(item.name), Cell(f"{100.0 * item.saved:.1f} %")] for item in tuned.steps]
         tables.append(Table("steps", "What each choice saved of the cost", (Column("choice"), Column("saved")), rows))
@@ -156,12 +156,12 @@ def _sections_of(tuning: Tuning, tuned: TunedDetector) -> list[PageSection]:
         columns = (Column("without fold"), Column("choice"))
         more.append(Table("folds", "What is chosen without a fifth of the recordings", columns, rows))
     return [
-        PageSection(f"{name}: figures", tuple(tables), note=note),
+        PageSection(f"{name}: results", tuple(tables), note=note),
         PageSection(f"{name}: around the choice", tuple(more), images_of(figures)),
     ]
 
 
-def _figures_table(tuned: TunedDetector) -> Table:
+def _results_table(tuned: TunedDetector) -> Table:
     kinds = (
         ("default, nested", tuned.default_nested),
         ("tuned, nested", tuned.nested),
@@ -171,7 +171,7 @@ def _figures_table(tuned: TunedDetector) -> Table:
     items = [(words, figures, name) for words, figures in kinds if figures is not None for name in figures.groups]
 
     fields = (
-        (Column("figures"), lambda item: Cell(item[0])),
+        (Column("results"), lambda item: Cell(item[0])),
         (Column("group"), lambda item: Cell(visible(item[2]))),
         (Column("contacts", numeric=True), lambda item: count_cell(item[1].groups[item[2]].contacts)),
         (Column("missed", numeric=True), lambda item: count_cell(item[1].groups[item[2]].missed, "bad")),
@@ -184,7 +184,7 @@ def _figures_table(tuned: TunedDetector) -> Table:
         (Column("force at alarm [N]", numeric=True), lambda item: number_cell(item[1].groups[item[2]].force_n)),
         (Column("alarming free runs", numeric=True), lambda item: _alarms_cell(item[1])),
     )
-    return tabulate("figures", "Latency by group, with the 95 % interval of the mean", fields, items)
+    return tabulate("results", "Latency by group, with the 95 % interval of the mean", fields, items)
 
 
 def _sensitivity_table(items: Sequence[Sensitivity]) -> Table:

@@ -1,4 +1,4 @@
-"""Figures of a tuning: the candidates that none beats in every group, and the cost around the choice."""
+"""ChoiceResults of a tuning: the candidates that none beats in every group, and the cost around the choice."""
 
 from __future__ import annotations
 

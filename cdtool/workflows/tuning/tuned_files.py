@@ -14,7 +14,7 @@ from cdtool.remote.remote_path import joined, relative_name
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.stored import rule_to_dict
 from cdtool.tuning.candidate import Candidate
-from cdtool.tuning.tuned import Figures, TunedDetector
+from cdtool.tuning.tuned import ChoiceResults, TunedDetector
 from cdtool.version import __version__
 from cdtool.workflows.signature.learning import Learned, Setting, learned_from_runs
 from cdtool.workflows.tuning.tuning import Tuning
@@ -147,9 +147,9 @@ def _why(tuning: Tuning, tuned: TunedDetector) -> list[str]:
             means = ", ".join(f"{name} {item.mean_ms:.1f} ms" for name, item in figures.groups.items())
             lines.append(f"# {words}: mean latency {means}; {figures.alarming} of {figures.free} free runs alarm.")
     lines.append(
-        "# These figures are of recordings that chose nothing."
+        "# These results are of recordings that chose nothing."
         if tuned.nested
-        else "# These figures are apparent: of the recordings that chose. Check them on others."
+        else "# These results are apparent: of the recordings that chose. Check them on others."
     )
     saved = ", ".join(f"{item.name} {100.0 * item.saved:.0f} %" for item in tuned.steps)
     return [*lines, *([f"# What each choice saved: {saved}."] if saved else [])]
@@ -175,7 +175,7 @@ def tuning_summary(tuning: Tuning) -> dict[str, Any]:
         "benchmark": tuning.setup.path.name,
         "benchmark_sha256": tuning.setup.digest,
         "false_alarm_budget": str(options.budget),
-        "objective": options.goal.value,
+        "objective": options.objective,
         "impacts": options.impacts,
         "thresholds": list(options.thresholds) or "all",
         "injected_groups": [name for name, group in tuning.setup.impacts.items() if group.injected is not None],
@@ -195,10 +195,10 @@ def _tuned_values(tuned: TunedDetector) -> dict[str, Any]:
         "detector": tuned.detector,
         "chosen": {**_candidate(tuned.choice), "debounce": tuned.debounce, "safety_factor": tuned.factor},
         "default": _candidate(tuned.default),
-        "nested": _figures(tuned.nested),
-        "apparent": _figures(tuned.apparent),
-        "default_nested": _figures(tuned.default_nested),
-        "default_apparent": _figures(tuned.default_apparent),
+        "nested": _results(tuned.nested),
+        "apparent": _results(tuned.apparent),
+        "default_nested": _results(tuned.default_nested),
+        "default_apparent": _results(tuned.default_apparent),
         "default_reason": tuned.default_reason,
         "sensitivity": [
             {
@@ -227,7 +227,7 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {"gains": dict(candidate.gains), "threshold": rule_to_dict(candidate.rule)}
 
 
-def _figures(figures: Figures | None) -> dict[str, Any] | None:
+def _results(figures: ChoiceResults | None) -> dict[str, Any] | None:
     if figures is None:
         return None
     groups = {

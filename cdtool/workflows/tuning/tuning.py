@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +27,10 @@ from cdtool.tuning.objective import WORSE_AT_MOST, Goal, Objective
 from cdtool.tuning.recordings import TuningRecordings
 from cdtool.tuning.search import Scored, Searched, search
 from cdtool.tuning.tuned import (
-    Figures,
+    ChoiceResults,
     Rejection,
     TunedDetector,
-    apparent_figures,
+    apparent_results,
     pareto_of,
     pooled,
     sensitivities_of,
@@ -43,6 +43,7 @@ from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, re
 from cdtool.workflows.benchmark.determinants import how_logs_are_read
 from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
+from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import Runs
 from cdtool.workflows.signature.fitting import fitting, for_machine
 from cdtool.workflows.store.digest import code_version, digest_of
@@ -55,36 +56,88 @@ IMPACTS = ("real", "injected", "both")
 Watch = Callable[[str, int, str], None]
 
 
+def _unwatched(detector: str, count: int, best: str) -> None:
+    """Ignore a round of a search."""
+
+
 @dataclass(frozen=True)
 class TuningOptions:
     """How detectors are tuned.
 
-    `impacts`: which contacts if there are real and injected ones. `worse_at_most`: the share by which a group may get
-    worse than by default. `shortest_debounce` [s]. `seed` decides how recordings are dealt to the folds. `thresholds`:
-    the kinds that are tried; all if it is empty. The benchmark file's own is always the default to compare with.
+    Parameters
+    ----------
+    false_alarm_budget : str
+        As "1/100op" or "0.1/h", met on average, or "1/100op at 95%".
+    detectors : sequence of str, optional
+        Detectors in place of the file's.
+    thresholds : sequence of str, optional
+        The kinds of thresholds that are tried; all by default. That of the benchmark file is what they are compared
+        with.
+    objective : {"latency", "p95", "force"}
+        What is minimised: mean latency, its 95th percentile, or the mean force at the alarm.
+    impacts : {"real", "injected", "both"}, optional
+        The contacts to tune on; needed only if the benchmark file has real and injected ones.
+    worse_at_most : float
+        The share by which a group of contacts may get worse than by default.
+    shortest_debounce : float
+        The shortest debounce to try [s].
+    seed : int
+        Decides how the recordings are dealt to the folds.
+    journals : Path, optional
+        A folder for what is measured, from which an interrupted search goes on.
+    workers : Workers, optional
+        How many candidates are measured at a time; the result does not depend on it.
+    progress : callable, optional
+        Called while logs are read.
+    watch : callable, optional
+        Called after each round of a search with the detector, the number of candidates and the best one so far.
     """
 
-    budget: Budget
-    detectors: tuple[str, ...] = ()
-    goal: Goal = Goal.LATENCY
+    false_alarm_budget: str
+    _: KW_ONLY
+    detectors: Sequence[str] = ()
+    thresholds: Sequence[str] = ()
+    objective: str = Goal.LATENCY.value
     impacts: str | None = None
     worse_at_most: float = WORSE_AT_MOST
     shortest_debounce: float = SHORTEST_DEBOUNCE
     seed: int = 0
-    thresholds: tuple[str, ...] = ()
+    journals: Path | None = None
+    workers: Workers | None = None
+    progress: Progress | None = None
+    watch: Watch = _unwatched
 
     def __post_init__(self) -> None:
-        known = THRESHOLDS.usable_names()
-        for name in self.thresholds:
-            if name not in known:
-                raise UsageError(f"unknown threshold '{name}'", nearest(name, known))
+        Budget.parse(self.false_alarm_budget)
+        choices = {
+            "objective": (self.objective, [item.value for item in Goal]),
+            "impacts": (self.impacts or IMPACTS[0], IMPACTS),
+            **{f"threshold {name}": (name, THRESHOLDS.usable_names()) for name in self.thresholds},
+        }
+        for what, (given, known) in choices.items():
+            if given not in known:
+                words = f"unknown threshold '{given}'" if what.startswith("threshold ") else f"{what} is '{given}'"
+                raise UsageError(words, nearest(given, known))
+        for what, value in (("worse_at_most", self.worse_at_most), ("shortest_debounce", self.shortest_debounce)):
+            if not 0.0 <= value < float("inf"):
+                raise UsageError(f"{what} is {value:g}", "give 0 or more")
+
+    @property
+    def budget(self) -> Budget:
+        """Return the false-alarm budget."""
+        return Budget.parse(self.false_alarm_budget)
+
+    @property
+    def goal(self) -> Goal:
+        """Return what is minimised."""
+        return Goal(self.objective)
 
 
 @dataclass(frozen=True)
 class Tuning:
     """The tuned detectors, the best first; what was left out; and the inputs.
 
-    `unusable` maps detectors that cannot be tuned to the reason. `is_nested`: there are figures of recordings that
+    `unusable` maps detectors that cannot be tuned to the reason. `is_nested`: there are results of recordings that
     chose nothing. `groups` has the number of contacts by group.
     """
 
@@ -99,15 +152,7 @@ class Tuning:
     findings: tuple[RecordingFinding, ...]
 
 
-def tune(
-    file: str | Path | BenchmarkFile,
-    options: TuningOptions,
-    *,
-    journals: Path | None = None,
-    workers: Workers | None = None,
-    progress: Progress | None = None,
-    watch: Watch = lambda name, count, best: None,  # noqa: ARG005
-) -> Tuning:
+def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> Tuning:
     """Search gains, threshold and debounce of the detectors of a benchmark file at a false-alarm budget.
 
     Parameters
@@ -117,14 +162,6 @@ def tune(
         used.
     options : TuningOptions
         The budget, and what is searched for.
-    journals : Path, optional
-        A folder for what is measured, from which an interrupted search goes on.
-    workers : Workers, optional
-        How many candidates are measured at a time; the result does not depend on it.
-    progress : callable, optional
-        Called while logs are read.
-    watch : callable, optional
-        Called after each round of a search.
 
     Returns
     -------
@@ -140,13 +177,12 @@ def tune(
 
     Examples
     --------
-    >>> from cdtool.evaluation.false_alarm_budget import Budget
-    >>> options = TuningOptions(Budget.parse("1/20op"), ("momentum",))
-    >>> tune("sample_logs/gate/benchmark.toml", options)
+    >>> import cdtool
+    >>> cdtool.tune("sample_logs/gate/benchmark.toml", false_alarm_budget="1/20op", detectors=["momentum"])
     Traceback (most recent call last):
     cdtool.errors.UsageError: 10 impact-free runs for a false-alarm budget of 1/20op: 19 are needed to set the limit...
     """
-    workers = workers or Workers()
+    workers, progress = options.workers or Workers(), options.progress
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=options.detectors)
     setup = with_detectors(setup, options.detectors) if options.detectors else setup
     setup = _with_impacts(setup, options.impacts, workers, progress)
@@ -158,7 +194,7 @@ def tune(
         skipped = list(read.skipped)
         for name in setup.detectors:
             try:
-                tuned, left_out = _TuningOf(setup, options, read, name, workers).tuned(journals, watch)
+                tuned, left_out = _TuningOf(setup, options, read, name, workers).tuned(options.journals, options.watch)
             except CdtoolError as fault:
                 unusable[name] = fault.message
                 continue
@@ -181,6 +217,9 @@ def tune(
     )
 
 
+tune = by_keywords(TuningOptions, tune_detectors)
+
+
 def _counts(recordings: TuningRecordings) -> list[int]:
     return [int(count) for count in np.bincount(recordings.group_of, minlength=len(recordings.groups))]
 
@@ -189,18 +228,18 @@ def _with_impacts(
     setup: BenchmarkFile, impacts: str | None, workers: Workers, progress: Progress | None
 ) -> BenchmarkFile:
     """Return the benchmark with the contacts to tune on; raises UsageError if two kinds would be mixed unasked."""
-    if impacts is not None and impacts not in IMPACTS:
-        raise UsageError(f"--impacts is '{impacts}'", nearest(impacts, IMPACTS))
     real = [name for name in setup.impacts if name != HOLDOUT]
     if impacts is None and real and setup.inject is not None:
         raise UsageError(
             f"{setup.path} has real contacts ({', '.join(real)}) and injected ones",
-            "give --impacts real, --impacts injected, or --impacts both",
+            "choose with impacts: real, injected or both",
         )
     if impacts == "real":
         return replace(setup, inject=None)
     if impacts == "injected" and setup.inject is None:
-        raise UsageError(f"--impacts injected, but {setup.path} has no section [inject]", "add one: docs/injection.md")
+        raise UsageError(
+            f"impacts is 'injected', but {setup.path} has no section [inject]", "add one: docs/injection.md"
+        )
     setup = with_injected(setup, workers, progress)
     if impacts != "injected":
         return setup
@@ -341,7 +380,7 @@ class _TuningOf:
         if len(found.subsets) > 1 and not default_reason:
             default_nested = pooled(objective, measure.held_out([default] * (len(found.subsets) - 1)), seed)
         best, chosen, nested, rejected = _checked_choice(found, objective, measure, default_nested, seed)
-        apparent = apparent_figures(objective, found, best, seed)
+        apparent = apparent_results(objective, found, best, seed)
         assert apparent is not None, "the best candidate can be used"
         measured = found.measured[best.candidate.key]
         unusable: dict[str, str] = {}
@@ -358,7 +397,7 @@ class _TuningOf:
             factor=float(measured.factors[best.debounce, 0]),
             apparent=apparent,
             nested=nested,
-            default_apparent=None if default_reason else apparent_figures(objective, found, default, seed),
+            default_apparent=None if default_reason else apparent_results(objective, found, default, seed),
             default_nested=default_nested,
             default_reason=default_reason,
             sensitivities=sensitivities_of(found, best, debounces, gains),
@@ -373,9 +412,9 @@ class _TuningOf:
 
 
 def _checked_choice(
-    found: Searched, objective: Objective, measure: _MeasuresAll, default: Figures | None, seed: int
-) -> tuple[Scored, list[Scored], Figures | None, list[Rejection]]:
-    """Return the choice, those without each fold, their nested figures, and the kinds of rules that were rejected.
+    found: Searched, objective: Objective, measure: _MeasuresAll, default: ChoiceResults | None, seed: int
+) -> tuple[Scored, list[Scored], ChoiceResults | None, list[Rejection]]:
+    """Return the choice, those without each fold, their nested results, and the kinds of rules that were rejected.
 
     A kind that makes a group much worse than by default on recordings that chose nothing is left out of the search:
     either what was chosen without each fold, or the choice itself with limits that were set without the fold.

@@ -1,4 +1,4 @@
-"""`cdtool tune` on a few simulated recordings: choices, honest figures, files that can be used, and refusals."""
+"""`cdtool tune` on a few simulated recordings: choices, honest results, files that can be used, and refusals."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ import cdtool as api
 from cdtool import simulate_gate
 from cdtool.bounded_loading import parse_toml
 from cdtool.errors import UsageError
-from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.report.tuning_files import open_folder
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.limit import Limit
-from cdtool.tuning.objective import Goal
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.tuning import tuning as module
 from cdtool.workflows.tuning.tuned_files import tuning_summary
-from cdtool.workflows.tuning.tuning import TuningOptions, tune
+from cdtool.workflows.tuning.tuning import TuningOptions, tune_detectors
 from tests.command import cdtool as command
 
-BUDGET = Budget.parse("1/20op")
-OPTIONS = TuningOptions(BUDGET, ("momentum",), thresholds=("signature", "glr"))
-QUICK = TuningOptions(Budget.parse("1/5op"), ("momentum",), thresholds=("limit",))
+BUDGET = "1/20op"
+OPTIONS = TuningOptions(BUDGET, detectors=("momentum",), thresholds=("signature", "glr"))
+QUICK = TuningOptions("1/5op", detectors=("momentum",), thresholds=("limit",))
 ARGUMENTS = ("--detectors", "gm", "--thresholds", "signature,glr", "--false-alarm-budget", "1/20op")
+
+
+def tune(file, options, **more):
+    return tune_detectors(file, replace(options, **more))
 
 
 @pytest.fixture(scope="module")
@@ -76,9 +78,9 @@ def test_the_choice_is_faster_than_the_default_on_recordings_that_chose_nothing(
 
 
 def test_too_few_contacts_have_a_range_and_no_interval(done):
-    figures = done.detectors[0].honest.groups["stiff"]
-    assert "10" in figures.interval_ms.reason
-    assert figures.range_ms[0] <= figures.mean_ms <= figures.range_ms[1]
+    results = done.detectors[0].honest.groups["stiff"]
+    assert "10" in results.interval_ms.reason
+    assert results.range_ms[0] <= results.mean_ms <= results.range_ms[1]
     share = done.detectors[0].honest.alarm_share
     assert share.low <= done.detectors[0].honest.alarming / 25 <= share.high < 0.5
 
@@ -103,7 +105,7 @@ def test_a_search_that_is_complete_is_not_measured_again(quick, tmp_path, monkey
     monkeypatch.setattr(module.Measuring, "_measured", lambda own, item: measured.append(item) or usual(own, item))
     tune(quick, QUICK, journals=tmp_path)
     assert measured == []
-    tune(quick, replace(QUICK, budget=Budget.parse("1/6op")), journals=tmp_path)
+    tune(quick, replace(QUICK, false_alarm_budget="1/6op"), journals=tmp_path)
     assert measured
 
 
@@ -112,9 +114,9 @@ def test_another_seed_deals_the_recordings_otherwise(quick):
     assert one.detectors[0].default_nested != other.detectors[0].default_nested
 
 
-@pytest.mark.parametrize("goal", [Goal.P95, Goal.FORCE])
+@pytest.mark.parametrize("goal", ["p95", "force"])
 def test_other_objectives(quick, goal):
-    made = tune(quick, replace(QUICK, goal=goal))
+    made = tune(quick, replace(QUICK, objective=goal))
     tuned = made.detectors[0]
     assert tuned.honest.score <= tuned.default_nested.score + 0.1
     assert tuned.nested.groups["stiff"].force_n > 100.0
@@ -151,17 +153,17 @@ def test_files_state_what_was_chosen_and_why(written):
     folder, outcome = written
     text = (folder / "benchmark.toml").read_text(encoding="utf-8")
     assert text.startswith("# Tuned by cdtool tune from benchmark.toml for momentum at 1/20op.")
-    assert "# These figures are of recordings that chose nothing." in text
+    assert "# These results are of recordings that chose nothing." in text
     assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12}
     machine = (folder / "machine.toml").read_text(encoding="utf-8")
     assert "tuned at 1/20op; was 10.0" in machine and "mounted backward" in machine
-    assert "nested figures" in outcome.out and "neither chose the settings" in outcome.out
+    assert "nested results" in outcome.out and "neither chose the settings" in outcome.out
 
 
 def test_the_report_has_figures_and_no_script(written):
     page = (written[0] / "tuning.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 2 and "<script" not in page
-    for words in ("Nested figures", "tuned, nested", "How flat the optimum is", "What each choice saved", "evidence"):
+    for words in ("Nested results", "tuned, nested", "How flat the optimum is", "What each choice saved", "evidence"):
         assert words in page
 
 
@@ -193,7 +195,7 @@ def test_too_few_runs_are_refused_with_the_numbers_needed(tmp_path):
 def test_between_the_two_numbers_figures_are_apparent(gate):
     setup = read_benchmark_file(gate / "benchmark.toml")
     few = replace(setup, learn=setup.learn[:20], threshold="limit", rule=Limit())
-    made = tune(few, replace(QUICK, budget=BUDGET))
+    made = tune(few, replace(QUICK, false_alarm_budget=BUDGET))
     assert not made.is_nested and made.detectors[0].nested is None
     assert made.detectors[0].chosen_in_folds == ()
 
@@ -225,9 +227,9 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--objective", "speed"), "--objective is 'speed'"),
+        (("--objective", "speed"), "objective is 'speed'"),
         (("--thresholds", "glx"), "unknown threshold 'glx'"),
-        (("--impacts", "all"), "--impacts is 'all'"),
+        (("--impacts", "all"), "impacts is 'all'"),
         (("--impacts", "injected"), "has no section [inject]"),
         (("--false-alarm-budget", "often"), "false-alarm budget is 'often'"),
         (("--detectors", "gx"), "gx"),
