@@ -1,0 +1,56 @@
+"""Messages that are filled in column by column are those that the library would have encoded one by one."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.writer import Writer
+
+from cdtool.formats.mcap.write import Stream, _Filler, write_mcap
+from cdtool.messages.schemas import DEFINITIONS
+
+START = 1_700_000_000_000_000_000
+
+
+def stream_of(schema: str, count: int) -> Stream:
+    rng = np.random.default_rng(count)
+    definition = DEFINITIONS[schema]
+    time = np.sort(rng.random(count))
+    fields = {name: rng.normal(size=count) for name in definition.numbers}
+    fields |= {name: rng.normal(size=(count, 3)) for name in definition.arrays}
+    for values in fields.values():
+        values[0] = np.nan
+        values[-1] = np.inf
+    return Stream("/topic", schema, time, fields, ("hip", "knee", "größe") if "position" in definition.arrays else ())
+
+
+def encoded_one_by_one(stream: Stream) -> list[bytes]:
+    file = BytesIO()
+    writer = Writer(file)
+    schema = writer.register_msgdef(stream.schema, DEFINITIONS[stream.schema].text)
+    filler = _Filler(stream)
+    for index, stamp in enumerate((START + np.rint(stream.time * 1e9).astype(np.int64)).tolist()):
+        writer.write_message("/topic", schema, filler.message(index, stamp), stamp, stamp, index)
+    writer.finish()
+    return payloads(file.getvalue())
+
+
+def payloads(content: bytes) -> list[bytes]:
+    return [message.data for _, _, message in make_reader(BytesIO(content)).iter_messages()]
+
+
+@pytest.mark.parametrize("schema", DEFINITIONS)
+@pytest.mark.parametrize("count", [1, 2, 100])
+def test_the_bytes_are_those_of_the_library(tmp_path: Path, schema: str, count: int):
+    stream = stream_of(schema, count)
+    write_mcap(tmp_path / "log.mcap", [stream], start_ns=START)
+    assert payloads((tmp_path / "log.mcap").read_bytes()) == encoded_one_by_one(stream)
+
+
+def test_a_stream_without_samples_has_no_messages(tmp_path: Path):
+    write_mcap(tmp_path / "log.mcap", [Stream("/f", "std_msgs/msg/Float64", np.empty(0), {"data": np.empty(0)})])
+    assert payloads((tmp_path / "log.mcap").read_bytes()) == []
