@@ -74,7 +74,7 @@ class Whitening:
         as the order are divided by the remaining uncertainty, all VALID. At a start, as many samples as the order are
         START_UP. OTHER_RATE where the sample rate differs from that of the runs: learn from runs of the same rate.
         """
-        at_rate = _at_learned_rate(signal.time, self.period)
+        at_rate = at_learned_rate(signal.time, self.period)
         deviation = _deviation(self.signature, recording, signal)
         off = deviation.valid & ~at_rate[:, np.newaxis]
         deviation = replace(deviation, status=np.where(off, Status.OTHER_RATE, deviation.status).astype(np.uint8))
@@ -136,7 +136,7 @@ def _deviation(signature: FittedSignature, recording: Recording, signal: Signal)
     statistic, band = signature.evaluate(recording, signal)
     middle, reach = 0.5 * (band.upper + band.lower), 0.5 * (band.upper - band.lower)
     status = statistic.status.copy()
-    lost = _lost(signature, recording, signal)
+    lost = lost_in_deviation(signature, recording, signal)
     if lost is not None:
         status[lost & (status == Status.VALID)] = Status.GAP
     status[signature.changes_curve(recording, signal.time)] = Status.START_UP
@@ -144,7 +144,7 @@ def _deviation(signature: FittedSignature, recording: Recording, signal: Signal)
         return replace(statistic, values=(signal.values - middle) / reach, status=status)
 
 
-def _lost(signature: FittedSignature, recording: Recording, signal: Signal) -> BoolArray | None:
+def lost_in_deviation(signature: FittedSignature, recording: Recording, signal: Signal) -> BoolArray | None:
     """Return where the deviation is based on held values (n, J): a detector input, or the position along the stroke.
 
     A model that predicts each sample to a small fraction of the normal spread distinguishes a held value from a true
@@ -276,7 +276,7 @@ def _stationary_covariance(coefficients: FloatArray, least: float) -> FloatArray
     return scaled
 
 
-def _at_learned_rate(time: FloatArray, period: float) -> BoolArray:
+def at_learned_rate(time: FloatArray, period: float) -> BoolArray:
     """Return (n,) where the median of the steps so far, the last 101, lies within 20 % of `period` [s]. Causal.
 
     A median: lost samples and jitter do not move it.

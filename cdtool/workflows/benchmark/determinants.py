@@ -102,12 +102,13 @@ class Determinants:
     def _of_detector(self) -> dict[str, str]:
         setup = self.setup
         hold = max(HOLD, *(group.window for group in setup.impacts.values()))
-        common = [rule_to_dict(setup.rule), setup.activation, setup.watched, hold]
+        common = [setup.activation, setup.watched, hold]
         return {
             name: digest_of(
+                rule_to_dict(setup.rule_of(name)),
                 common,
                 setup.machine_file.detector(name),
-                [fitted_to_dict(setup.rule, item) for item in self.learned.thresholds.get(name, ())],
+                [fitted_to_dict(setup.rule_of(name), item) for item in self.learned.thresholds.get(name, ())],
                 self.learned.about.unusable.get(name),
                 self.factors.get(name),
             )
@@ -197,7 +198,7 @@ def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources], detectors
         code_version(),
         how_logs_are_read(setup),
         [[name, setup.machine_file.detector(name)] for name in detectors],
-        rule_to_dict(setup.rule),
+        [rule_to_dict(setup.rule_of(name)) for name in detectors],
         str(setup.budget),
         setup.activation,
         setup.watched,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.activation import Activation, ActivationSettings
+from cdtool.detection import WHOLE_MACHINE
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
@@ -19,6 +20,7 @@ from cdtool.operations import Operation
 from cdtool.remote.remote_path import location
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.thresholds.base import Threshold
+from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -133,9 +135,15 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     raised_by = Activation().changed(options.activation or {})  # refuses wrong settings before reading
     budget = Budget.parse(options.false_alarm_budget) if options.false_alarm_budget is not None else None
     check_joints(joints, machine_file.machine)
-    wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
-    _refuse_by_hand(wanted, budget)
     instance = machine_file.detector(options.detector)
+    rule = Signature() if options.rule is None else options.rule
+    wanted = for_machine(rule_for(instance, rule), machine_file.machine)
+    if not isinstance(rule, Signature) and wanted.name != rule.name:
+        raise UsageError(
+            f"{instance.name} has its own threshold {wanted.name}, {rule.name} cannot judge its signal",
+            f"leave the threshold out, or give {wanted.name}",
+        )
+    _refuse_by_hand(wanted, budget)
     paths = [location(log) for log in logs]
     part = _part(paths, options)
     workers = options.workers or Workers(options.jobs)
@@ -178,7 +186,7 @@ def learned_from_runs(
         detector=instance.name,
         gains=asdict(instance),
         unit=instance.unit(machine_file.machine),
-        joints=pairs[0][1].joints,
+        joints=WHOLE_MACHINE if pairs[0][1].channels else pairs[0][1].joints,
         rule=rule,
         origin=origin,
         activation=setting.activation,
