@@ -56,14 +56,15 @@ def write_tuning(tuning: Tuning, folder: Path) -> tuple[Path, ...]:
     """Write what was tuned into a folder, all texts or none; return the files. Raises OutputError, SignatureError."""
     from cdtool.report.html.tuning_page import tuning_html
 
+    learned = {tuned.detector: tuned_signature(tuning, tuned).signature for tuned in tuning.detectors}
     texts = {folder / MACHINE: machine_text(tuning, folder)}
-    texts |= {folder / name: benchmark_text(tuning, tuned, folder) for name, tuned in files_of(tuning)}
+    for name, tuned in files_of(tuning):
+        factor = learned[tuned.detector].current[0].safety_factor
+        texts[folder / name] = benchmark_text(tuning, tuned, factor, folder)
     texts[folder / PAGE] = tuning_html(tuning)
     texts[folder / JSON] = strict_json(tuning_summary(tuning)) + "\n"
-    signatures = {
-        folder / f"signature_{tuned.detector}.json": tuned_signature(tuning, tuned) for tuned in tuning.detectors
-    }
+    signatures = {folder / f"signature_{name}.json": signature for name, signature in learned.items()}
     write_texts(texts)
-    for path, learned in signatures.items():
-        write_signature(path, learned.signature)
+    for path, signature in signatures.items():
+        write_signature(path, signature)
     return (*texts, *signatures)

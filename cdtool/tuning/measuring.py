@@ -20,6 +20,7 @@ from cdtool.pipeline import Detection, judge, judge_log, run_detector, signal_of
 from cdtool.recording import Contact, FloatArray
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.tuning.candidate import Candidate, Measured
+from cdtool.tuning.held_out import MULTIPLIERS, HeldOut
 from cdtool.tuning.recordings import StruckLog, TuningRecordings
 
 Pair = tuple[Operation, Signal]
@@ -27,23 +28,6 @@ Pair = tuple[Operation, Signal]
 Learn = Callable[[Threshold, Sequence[Pair]], tuple[FittedThreshold, ...]]
 # The signals of so many gains are kept.
 _KEPT = 3
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """What a choice gives on a fold that neither chose it nor set its limit.
-
-    `latency` [s] and `force` [N] of the fold's contacts, NaN if missed; `assessable` of them; `alarming` of `free`
-    impact-free operations.
-    """
-
-    contacts: tuple[int, ...]
-    latency: tuple[float, ...]
-    force: tuple[float, ...]
-    assessable: tuple[bool, ...]
-    alarming: int
-    free: int
-    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -78,7 +62,7 @@ class Measuring:
             try:
                 return self._held_out(item)
             except CdtoolError as fault:
-                return HeldOut((), (), (), (), 0, 0, fault.message)
+                return HeldOut.unusable(fault.message)
         try:
             return self._measured(item)
         except CdtoolError as fault:
@@ -157,22 +141,24 @@ class Measuring:
         thresholds = self._learned(rule, free, (fold,))
         own = [monitored(i, thresholds) for i, run in enumerate(recordings.free) if run.fold == fold]
         latencies, forces, valid = [], [], []
+        factors = factor * MULTIPLIERS
         for number, log in enumerate(recordings.struck):
             if log.fold != fold:
                 continue
             detections = self._detections(log, struck[number], thresholds, activation)
             for contacts, curves, detection in zip(log.contacts, log.curves, detections, strict=True):
-                swept = sweep(detection, contacts, activation, log.window, np.array([factor]))
-                latencies += swept.latency[0].tolist()
-                forces += _forces(curves, swept.latency)[0].tolist()
+                swept = sweep(detection, contacts, activation, log.window, factors)
+                latencies.append(swept.latency)
+                forces.append(_forces(curves, swept.latency))
                 valid += _assessable(detection, contacts, log.window)
+        nothing = np.empty((len(factors), 0))
         return HeldOut(
-            tuple(np.flatnonzero(recordings.fold_of == fold).tolist()),
-            tuple(latencies),
-            tuple(forces),
-            tuple(valid),
-            sum(run.critical > factor for run in own if run.seconds > 0.0),
-            sum(run.seconds > 0.0 for run in own),
+            np.flatnonzero(recordings.fold_of == fold),
+            np.hstack([nothing, *latencies]),
+            np.hstack([nothing, *forces]),
+            np.array(valid, dtype=bool),
+            np.array([run.critical / factor for run in own if run.seconds > 0.0]),
+            sum(run.seconds for run in own),
         )
 
     def _learned(self, rule: Threshold, free: Sequence[Pair], without: Sequence[int]) -> tuple[FittedThreshold, ...]:

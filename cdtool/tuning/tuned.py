@@ -14,7 +14,7 @@ from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_share
 from cdtool.recording import FloatArray
 from cdtool.tuning.candidate import Candidate
-from cdtool.tuning.measuring import HeldOut
+from cdtool.tuning.held_out import Pooled
 from cdtool.tuning.objective import Goal, Objective
 from cdtool.tuning.search import Scored, Searched
 
@@ -142,6 +142,8 @@ class ParetoPoint:
 class TunedDetector:
     """A detector with the choice, its debounce and the safety factor that meets the budget.
 
+    `correction`: what the factor was multiplied by, because it was set on the runs that chose; 1 if nothing shows that.
+
     `apparent` results are those of the recordings that chose, each assessed without its fold; `nested` those of
     recordings that chose nothing, None if there are too few runs; `default` and `default_nested` those of what the
     benchmark file has, at the same budget, None if it cannot be used: `default_reason`. `chosen_in_folds` are the
@@ -155,6 +157,7 @@ class TunedDetector:
     choice: Candidate
     debounce: int | None
     factor: float
+    correction: float
     apparent: ChoiceResults
     nested: ChoiceResults | None
     default_apparent: ChoiceResults | None
@@ -206,18 +209,12 @@ def results_of(
     return ChoiceResults(found, *counts, objective.score(costs), costs)
 
 
-def pooled(objective: Objective, held_out: Sequence[HeldOut], seed: int) -> ChoiceResults | None:
+def held_out_results(objective: Objective, made: Pooled | None, seed: int) -> ChoiceResults | None:
     """Return the results of all folds together; None if one could not be assessed."""
-    if not held_out or any(item.reason for item in held_out):
+    if made is None:
         return None
-    count = len(objective.recordings.fold_of)
-    latency, force = np.full(count, np.nan), np.full(count, np.nan)
-    assessable = np.zeros(count, dtype=bool)
-    for item in held_out:
-        numbers = list(item.contacts)
-        latency[numbers], force[numbers], assessable[numbers] = item.latency, item.force, item.assessable
-    counts = (sum(item.alarming for item in held_out), sum(item.free for item in held_out))
-    return results_of(objective, latency, force, assessable, counts, seed)
+    counts = (made.alarming, made.free)
+    return results_of(objective, made.latency, made.force, made.assessable, counts, seed)
 
 
 def apparent_results(objective: Objective, searched: Searched, item: Scored, seed: int) -> ChoiceResults | None:

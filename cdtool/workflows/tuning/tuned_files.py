@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,8 +61,8 @@ def _detector_table(document: Any, tuned: TunedDetector) -> Any:
     return tables[name]
 
 
-def benchmark_text(tuning: Tuning, tuned: TunedDetector, folder: Path) -> str:
-    """Return the benchmark file for one tuned detector: its paths are relative to `folder`."""
+def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: Path) -> str:
+    """Return the benchmark file for one tuned detector and its safety factor: its paths are relative to `folder`."""
     import tomlkit
 
     setup = tuning.setup
@@ -70,10 +70,16 @@ def benchmark_text(tuning: Tuning, tuned: TunedDetector, folder: Path) -> str:
     _rebase(document, setup.path.parent, folder)
     document["machine"] = MACHINE
     document["detectors"] = [tuned.detector]
-    document["false_alarm_budget"] = str(tuning.options.budget)
+    document.pop("false_alarm_budget", None)
     if "signature" in document:
         document["signature"].pop("safety_factor", None)
     document["threshold"] = _threshold(tuned.choice.rule, setup.signature.sides)
+    limited = document["threshold"]
+    if tuned.choice.rule.name == "signature":
+        limited = document.setdefault("signature", tomlkit.table())
+    safety = tomlkit.item(factor)
+    safety.comment(factor_words(tuning, tuned))
+    limited["safety_factor"] = safety
     if tuned.debounce is not None:
         activation = document.setdefault("activation", tomlkit.table())
         item = tomlkit.item(tuned.debounce)
@@ -155,6 +161,14 @@ def _why(tuning: Tuning, tuned: TunedDetector) -> list[str]:
     return [*lines, *([f"# What each choice saved: {saved}."] if saved else [])]
 
 
+def factor_words(tuning: Tuning, tuned: TunedDetector) -> str:
+    """Return how the safety factor was set, in words."""
+    words = f"for {tuning.options.budget}, set on {len(tuning.runs.operations)} runs"
+    if tuned.correction > 1.0:
+        words += f", times {digits(float(f'{tuned.correction:.3g}'))} because they also chose"
+    return words
+
+
 def tuned_signature(tuning: Tuning, tuned: TunedDetector) -> Learned:
     """Return the signature file of a tuned detector, learned from all runs; raises SignatureError, UsageError."""
     setup, activation = tuning.setup, tuning.setup.activation
@@ -162,7 +176,11 @@ def tuned_signature(tuning: Tuning, tuned: TunedDetector) -> Learned:
         activation = activation.changed({"debounce": tuned.debounce})
     detector = tuned.choice.detector(setup.machine_file.detector(tuned.detector))
     setting = Setting(setup.watched, setup.operations, activation, tuning.options.budget, setup.split)
-    return learned_from_runs(tuning.runs, setup.machine_file, detector, tuned.choice.rule, setting)
+    learned = learned_from_runs(tuning.runs, setup.machine_file, detector, tuned.choice.rule, setting)
+    thresholds = tuple(
+        item.with_safety_factor(tuned.correction * item.safety_factor) for item in learned.signature.current
+    )
+    return replace(learned, signature=replace(learned.signature, current=thresholds, first=thresholds))
 
 
 def tuning_summary(tuning: Tuning) -> dict[str, Any]:
@@ -193,7 +211,12 @@ def tuning_summary(tuning: Tuning) -> dict[str, Any]:
 def _tuned_values(tuned: TunedDetector) -> dict[str, Any]:
     return {
         "detector": tuned.detector,
-        "chosen": {**_candidate(tuned.choice), "debounce": tuned.debounce, "safety_factor": tuned.factor},
+        "chosen": {
+            **_candidate(tuned.choice),
+            "debounce": tuned.debounce,
+            "safety_factor": tuned.factor,
+            "correction": tuned.correction,
+        },
         "default": _candidate(tuned.default),
         "nested": _results(tuned.nested),
         "apparent": _results(tuned.apparent),

@@ -23,7 +23,8 @@ from cdtool.thresholds.settings import with_context
 from cdtool.tuning.candidate import Candidate, Measured
 from cdtool.tuning.coordinate_search import movable_gains
 from cdtool.tuning.grid import SHORTEST_DEBOUNCE, debounces_to_try, rules_to_try
-from cdtool.tuning.measuring import Choice, HeldOut, Measuring, Pair
+from cdtool.tuning.held_out import HeldOut, Pooled, pooled
+from cdtool.tuning.measuring import Choice, Measuring, Pair
 from cdtool.tuning.objective import WORSE_AT_MOST, Goal, Objective
 from cdtool.tuning.recordings import TuningRecordings
 from cdtool.tuning.search import Scored, Searched, search
@@ -32,8 +33,8 @@ from cdtool.tuning.tuned import (
     Rejection,
     TunedDetector,
     apparent_results,
+    held_out_results,
     pareto_of,
-    pooled,
     sensitivities_of,
     settings_of,
     steps_of,
@@ -391,8 +392,10 @@ class _TuningOf:
         default_reason = found.measured[found.default.key].reason
         default_nested = None
         if len(found.subsets) > 1 and not default_reason:
-            default_nested = pooled(objective, measure.held_out([default] * (len(found.subsets) - 1)), seed)
-        best, chosen, nested, rejected = _checked_choice(found, objective, measure, default_nested, seed)
+            by_default = measure.pooled([default] * (len(found.subsets) - 1), corrects=False)
+            default_nested = held_out_results(objective, by_default, seed)
+        best, chosen, made, rejected = _checked_choice(found, objective, measure, default_nested, seed)
+        nested, correction = held_out_results(objective, made, seed), made.multiplier if made else 1.0
         apparent = apparent_results(objective, found, best, seed)
         assert apparent is not None, "the best candidate can be used"
         measured = found.measured[best.candidate.key]
@@ -407,7 +410,8 @@ class _TuningOf:
             default=found.default,
             choice=best.candidate,
             debounce=debounces[best.debounce] if best.debounce else given,
-            factor=float(measured.factors[best.debounce, 0]),
+            factor=float(measured.factors[best.debounce, 0]) * correction,
+            correction=correction,
             apparent=apparent,
             nested=nested,
             default_apparent=None if default_reason else apparent_results(objective, found, default, seed),
@@ -426,8 +430,8 @@ class _TuningOf:
 
 def _checked_choice(
     found: Searched, objective: Objective, measure: _MeasuresAll, default: ChoiceResults | None, seed: int
-) -> tuple[Scored, list[Scored], ChoiceResults | None, list[Rejection]]:
-    """Return the choice, those without each fold, their nested results, and the kinds of rules that were rejected.
+) -> tuple[Scored, list[Scored], Pooled | None, list[Rejection]]:
+    """Return the choice, those without each fold, what these give on it, and the kinds of rules that were rejected.
 
     A kind that makes a group much worse than by default on recordings that chose nothing is left out of the search:
     either what was chosen without each fold, or the choice itself with limits that were set without the fold.
@@ -437,11 +441,13 @@ def _checked_choice(
         without = [item.rule for item in rejected]
         best = found.subsets[0].best_without(without)
         chosen = [subset.best_without(without) for subset in found.subsets[1:]]
-        nested = pooled(objective, measure.held_out(chosen), seed)
+        is_default = best.candidate.key == found.default.key and best.debounce == found.default_debounce
+        nested = measure.pooled(chosen, corrects=not is_default)
         if default is None or nested is None or best.candidate.key == found.default.key:
             return best, chosen, nested, rejected
-        of_choice = pooled(objective, measure.held_out([best] * len(chosen)), seed)
-        checked = [item for item in (nested, of_choice) if item is not None]
+        of_choice = measure.pooled([best] * len(chosen), corrects=True)
+        results = [held_out_results(objective, made, seed) for made in (nested, of_choice)]
+        checked = [item for item in results if item is not None]
         ratios = np.max([item.costs / default.costs for item in checked], axis=0)
         if all(objective.is_acceptable(item.costs, default.costs) for item in checked):
             return best, chosen, nested, rejected
@@ -498,6 +504,11 @@ class _MeasuresAll:
         for item, made in zip(new, self._all(new), strict=True):
             self._held_out[self._key(item)] = made
         return [self._held_out[self._key(item)] for item in choices]
+
+    def pooled(self, chosen: Sequence[Scored], *, corrects: bool) -> Pooled | None:
+        """Return what the choices without each fold give on all folds together; None if one cannot be used."""
+        contacts = len(self.measuring.recordings.fold_of)
+        return pooled(self.measuring.budget, self.held_out(chosen), contacts, corrects=corrects)
 
     @staticmethod
     def _key(choice: Choice) -> tuple[str, int, int]:

@@ -6,6 +6,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import ANY
 
 import pytest
 
@@ -141,7 +142,7 @@ def test_the_files_can_be_used(written, gate):
     assert made.provenance["debounce_samples"] == chosen["debounce"] == 3
     signature = read_signature(folder / "signature_momentum.json")
     factor = signature.current[0].safety_factor
-    assert made.calibration[0].safety_factor == pytest.approx(factor)
+    assert made.provenance["threshold_rule"]["safety_factor"] == factor
     # The factor of the search has five folds, that of learning ten.
     assert chosen["safety_factor"] == pytest.approx(factor, rel=0.15)
     log = gate / "stiff" / "01.csv"
@@ -154,7 +155,7 @@ def test_files_state_what_was_chosen_and_why(written):
     text = (folder / "benchmark.toml").read_text(encoding="utf-8")
     assert text.startswith("# Tuned by cdtool tune from benchmark.toml for momentum at 1/20op.")
     assert "# These results are of recordings that chose nothing." in text
-    assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12}
+    assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12, "safety_factor": ANY}
     machine = (folder / "machine.toml").read_text(encoding="utf-8")
     assert "tuned at 1/20op; was 10.0" in machine and "mounted backward" in machine
     assert "nested results" in outcome.out and "neither chose the settings" in outcome.out
