@@ -36,7 +36,7 @@ def settled_from(speed: FloatArray, short: int, long: int, share: float, least: 
     """Return the first sample at which the motion is settled; the number of samples if it never is.
 
     u: mean of `speed` (n,) over `short` samples. Settled: u changed by at most `share` of its largest change over
-    `long` samples so far, and is above `least`, for `short` samples in succession.
+    `long` samples so far, and is above `least`, for `short` samples one after another.
     """
     total = 0.0
     largest = 0.0

@@ -1,4 +1,4 @@
-"""The rule of a detector that has its own: its signal can be judged by no other."""
+"""The rule of a detector that has its own, the only one that can assess its signal."""
 
 from __future__ import annotations
 

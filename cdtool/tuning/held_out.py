@@ -1,7 +1,7 @@
 """What choices give on recordings that neither chose them nor set their limits, and what that says about the limit.
 
 A limit that was set on the runs that also chose is too low: of many candidates, those are fast whose limit happened to
-be low on just these runs. How much too low is seen on the runs of each fold: choice and limit know nothing of them.
+be low on just these runs. How much too low is seen on the runs of each fold: they influenced neither choice nor limit.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def test_a_fold_that_cannot_be_assessed_leaves_nothing():
 
 
 def test_the_rate_after_the_choice_of_the_luckiest_limit_meets_the_budget():
-    """Of 40 candidates the one with the lowest limit is chosen: on other runs its rate is too high, corrected it is not."""
+    """Of 40 candidates the one with the lowest limit is chosen: its rate is too high, and is not once corrected."""
     rng = np.random.default_rng(5)
     budget, runs, candidates = Budget.parse("1/20op"), 60, 40
     plain, corrected = [], []

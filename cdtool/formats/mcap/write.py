@@ -193,7 +193,7 @@ def _layout(filler: _Filler) -> tuple[bytes, list[tuple[int, FloatArray]]]:
     slots = []
     for mark, values in columns:
         place = struct.pack("<d", mark)
-        assert template.count(place) == 1, "a number stands in one place of a message"
+        assert template.count(place) == 1, "each number is in one place of a message"
         slots.append((template.index(place), values))
     assert template.count(_STAMP) == filler.has_stamp, "a message has one stamp"
     return template, slots

@@ -140,7 +140,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     wanted = for_machine(rule_for(instance, rule), machine_file.machine)
     if not isinstance(rule, Signature) and wanted.name != rule.name:
         raise UsageError(
-            f"{instance.name} has its own threshold {wanted.name}, {rule.name} cannot judge its signal",
+            f"{instance.name} has its own threshold {wanted.name}, {rule.name} cannot assess its signal",
             f"leave the threshold out, or give {wanted.name}",
         )
     _refuse_by_hand(wanted, budget)
