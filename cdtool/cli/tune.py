@@ -66,6 +66,7 @@ def tune(
 
     Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
     """
+    from cdtool.evaluation.results import Skipped
     from cdtool.report.tuning_files import open_folder, write_tuning
     from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
     from cdtool.workflows.execution.workers import Workers
@@ -86,18 +87,19 @@ def tune(
         watch=_watch,
     )
     setup = read_benchmark_file(file, detectors=names)
-    searches = open_folder(output, setup.inputs, force=force)
+    searches = open_folder(output, setup.inputs, setup.detectors, force=force)
     with progress("reading") as advance:
         done = tune_detectors(setup, replace(options, journals=searches, progress=advance))
     written = write_tuning(done, output)
-    print_skipped(done.skipped, done.findings)
+    left_out = [*done.skipped, *(Skipped(name, f"not tuned: {reason}") for name, reason in done.unusable.items())]
+    print_skipped(left_out, done.findings)
     if as_json:
         print_json(tuning_summary(done))
     else:
         _show(done)
         for path in written:
             typer.echo(f"written: {plain(path)}")
-    leave(done.skipped)
+    leave(left_out)
 
 
 def _watch(detector: str, count: int, best: str) -> None:
@@ -159,11 +161,8 @@ def _show(done: Tuning) -> None:
 
 
 def _meaning(done: Tuning) -> str:
+    from cdtool.report.html.tuning_page import apparent_words
+
     if done.is_nested:
         return "nested: each result is of recordings that neither chose the settings nor set the limit. "
-    from cdtool.workflows.tuning.recordings_to_tune import to_check
-
-    return (
-        f"apparent: of the recordings that chose the settings; {to_check(done.options.budget):.0f} impact-free runs "
-        "are needed to check them on others. "
-    )
+    return f"apparent: of the recordings that chose the settings. {' '.join(apparent_words(done))} "

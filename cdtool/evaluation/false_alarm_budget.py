@@ -65,7 +65,9 @@ class Budget:
 
     def __str__(self) -> str:
         short = "op" if self.per == "operation" else "h"
-        rate = f"1/{digits(1.0 / self.rate)}{short}" if self.rate < 1.0 else f"{digits(self.rate)}/{short}"
+        inverse = 1.0 / self.rate
+        is_whole = self.rate < 1.0 and abs(inverse - round(inverse)) < 1e-9 * inverse
+        rate = f"1/{digits(round(inverse))}{short}" if is_whole else f"{self.rate:.15g}/{short}"
         return rate if self.confidence is None else f"{rate} at {digits(100.0 * self.confidence)}%"
 
     @property

@@ -10,13 +10,16 @@ from cdtool.files import write_texts
 from cdtool.foreign_files import Kind, refuse_inputs, refuse_other_kind
 from cdtool.plain_text import plain
 from cdtool.remote.remote_path import is_remote
-from cdtool.signature_store import write_signature
+from cdtool.signature_store import SIGNATURE, write_signature
 from cdtool.strict_json import strict_json
 from cdtool.workflows.tuning.tuned_files import (
+    LABELS,
+    LABELS_MARK,
     MACHINE,
     MARK,
     benchmark_text,
     files_of,
+    labels_text,
     machine_text,
     tuned_signature,
     tuning_summary,
@@ -31,7 +34,12 @@ _KINDS = {
 }
 
 
-def open_folder(folder: Path, inputs: Iterable[Path], *, force: bool = False) -> Path:
+def signature_name(detector: str) -> str:
+    """Return the name of a detector's signature file."""
+    return f"signature_{detector}.json"
+
+
+def open_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] = (), *, force: bool = False) -> Path:
     """Create the output folder and return that of the searches in it.
 
     Raises UsageError for a folder at a URL, a file of that name, an input in it that would be replaced, or a file that
@@ -41,10 +49,14 @@ def open_folder(folder: Path, inputs: Iterable[Path], *, force: bool = False) ->
         raise UsageError(f"--output is '{plain(folder)}'", "give a folder of this machine: the search is kept there")
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"{plain(folder)}: exists and is not a folder", "choose another name")
-    fixed = [folder / name for name in (MACHINE, "benchmark.toml", PAGE, JSON)]
-    refuse_inputs(fixed, inputs)
-    for target in fixed:
-        refuse_other_kind(target, _KINDS[target.suffix], force=force)
+    kinds = {folder / name: _KINDS[Path(name).suffix] for name in (MACHINE, "benchmark.toml", PAGE, JSON)}
+    kinds[folder / LABELS] = Kind(LABELS_MARK.encode(), "file of cdtool tune")
+    for name in detectors:
+        kinds[folder / f"benchmark_{name}.toml"] = _KINDS[".toml"]
+        kinds[folder / signature_name(name)] = SIGNATURE
+    refuse_inputs(kinds, inputs)
+    for target, kind in kinds.items():
+        refuse_other_kind(target, kind, force=force)
     try:
         (folder / SEARCH).mkdir(parents=True, exist_ok=True)
     except OSError as fault:
@@ -63,7 +75,9 @@ def write_tuning(tuning: Tuning, folder: Path) -> tuple[Path, ...]:
         texts[folder / name] = benchmark_text(tuning, tuned, factor, folder)
     texts[folder / PAGE] = tuning_html(tuning)
     texts[folder / JSON] = strict_json(tuning_summary(tuning)) + "\n"
-    signatures = {folder / f"signature_{name}.json": signature for name, signature in learned.items()}
+    if (labels := labels_text(tuning, folder)) is not None:
+        texts[folder / LABELS] = labels
+    signatures = {folder / signature_name(name): signature for name, signature in learned.items()}
     write_texts(texts)
     for path, signature in signatures.items():
         write_signature(path, signature)

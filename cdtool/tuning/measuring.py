@@ -79,8 +79,10 @@ class Measuring:
         factors, alarming = np.empty(shape), np.zeros(shape, dtype=np.int64)
         for debounce, runs in enumerate(monitored):
             for subset in range(recordings.subsets):
-                made = factor_for(self.budget, self.detector.name, [runs[i] for i in recordings.free_in(subset)])
-                factors[debounce, subset], alarming[debounce, subset] = made.factor, made.alarms
+                own = [runs[i] for i in recordings.free_in(subset)]
+                factor = factor_for(self.budget, self.detector.name, own).factor
+                factors[debounce, subset] = factor
+                alarming[debounce, subset] = sum(run.critical > factor for run in own if run.seconds > 0.0)
         latency, force = (np.full((*shape, len(recordings.fold_of)), np.nan) for _ in range(2))
         assessable = np.zeros(len(recordings.fold_of), dtype=bool)
         begin = 0

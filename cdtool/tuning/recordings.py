@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.operations import Operation
 from cdtool.recording import BoolArray, Contact, FloatArray
@@ -56,6 +57,21 @@ class TuningRecordings:
     def subsets(self) -> int:
         """Return the number of subsets."""
         return 1 + self.folds if self.is_nested else 1
+
+    def why_not_nested(self, budget: Budget) -> str:
+        """Return why there can be no results of recordings that chose nothing; empty if there can be.
+
+        Two folds are left out at a time, and a choice without a fold needs contacts of every group.
+        """
+        if self.folds < 3:
+            return f"the recordings are in {self.folds} parts that stay together, 3 are needed"
+        fewest = min(len(self.free_in(fold + 1)) for fold in range(self.folds))
+        if budget.per == "operation" and fewest < budget.needed:
+            return f"without one of {self.folds} parts, {fewest} impact-free runs are left, {budget.needed:.0f} needed"
+        for number, group in enumerate(self.groups):
+            if len(set(self.fold_of[self.group_of == number].tolist())) < 2:
+                return f"the contacts of {group} are in one part: at least 2 logs are needed"
+        return ""
 
     @cached_property
     def groups(self) -> tuple[str, ...]:

@@ -148,7 +148,7 @@ class TunedDetector:
     recordings that chose nothing, None if there are too few runs; `default` and `default_nested` those of what the
     benchmark file has, at the same budget, None if it cannot be used: `default_reason`. `chosen_in_folds` are the
     choices without each fold, in words. `debounce` [samples] is None for the default of 9 ms. `tried_costs` are the
-    apparent costs (ms, or N) by group of everything that was tried.
+    apparent costs (ms, or N) by group of everything that was tried. `why_not_nested`: why there is no nested result.
     """
 
     detector: str
@@ -171,6 +171,7 @@ class TunedDetector:
     chosen_in_folds: tuple[str, ...]
     rejected: tuple[Rejection, ...] = ()
     tried_costs: tuple[tuple[float, ...], ...] = ()
+    why_not_nested: str = ""
 
     @property
     def honest(self) -> ChoiceResults:

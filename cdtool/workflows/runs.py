@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
+from glob import escape
 from pathlib import Path
 
 from cdtool.dynamics import Machine
@@ -20,7 +21,7 @@ from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, Recording
-from cdtool.remote.remote_path import joined, location
+from cdtool.remote.remote_path import is_remote, joined, location
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.log_checks.log_findings import log_warnings
@@ -53,7 +54,7 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
     """
     found: dict[Path, None] = {}
     for pattern in patterns:
-        matches = _matches(joined(base, pattern))
+        matches = _matches(base, pattern)
         of_runs = [] if matches else _runs_matching(pattern, base)
         if not matches and not (runs and of_runs):
             hint = 'to name runs of a file, set operations = "column:NAME"' if of_runs else "check the path"
@@ -62,14 +63,18 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
     return list(found)
 
 
-def _matches(path: Path) -> list[Path]:
-    return [path] if path.is_file() or is_bag_folder(path) else sorted(_glob(path))
+def _matches(base: Path, pattern: str) -> list[Path]:
+    """Return the log of that name below `base`, or those that match the pattern; the name of `base` is no pattern."""
+    path = joined(base, pattern)
+    if path.is_file() or is_bag_folder(path):
+        return [path]
+    return sorted(_glob(path if is_remote(path) else joined(Path(escape(str(base))), pattern)))
 
 
 def _runs_matching(pattern: str, base: Path) -> list[Path]:
     """Return FILE#IDS for each file that the part before a # names; a file name may contain the mark, too."""
     for place in (i for i, character in enumerate(pattern) if character == "#"):
-        if files := _matches(joined(base, pattern[:place])):
+        if files := _matches(base, pattern[:place]):
             return [location(f"{file}{pattern[place:]}") for file in files]
     return []
 

@@ -28,8 +28,8 @@ NESTED_NOTE = (
     "on the fifth that neither chose it nor set its limit. Apparent results are those of the recordings that chose."
 )
 APPARENT_NOTE = (
-    "There are too few impact-free runs to set a limit without a fifth of them: all results are apparent, of the "
-    "recordings that chose. Expect latencies 2 to 8 % longer and more false alarms on others."
+    "Apparent results are those of the recordings that chose. Expect latencies 2 to 8 % longer, and more false alarms, "
+    "on others."
 )
 
 
@@ -40,7 +40,7 @@ def tuning_html(tuning: Tuning) -> str:
         PageSection(
             "Detectors",
             (_detectors_table(tuning),),
-            note=NESTED_NOTE if tuning.is_nested else APPARENT_NOTE,
+            note=NESTED_NOTE if tuning.is_nested else " ".join((APPARENT_NOTE, *apparent_words(tuning))),
         )
     ]
     for tuned in tuning.detectors:
@@ -126,11 +126,20 @@ def debounce_words(tuned: TunedDetector) -> str:
     return "9 ms" if tuned.debounce is None else counted(tuned.debounce, "sample")
 
 
+def apparent_words(tuning: Tuning) -> list[str]:
+    """Return a sentence per detector without nested results: why there are none."""
+    return [
+        f"{visible(item.detector)}: no nested results: {visible(item.why_not_nested)}."
+        for item in tuning.detectors
+        if item.nested is None
+    ]
+
+
 def rejection_words(tuned: TunedDetector) -> list[str]:
     """Return why kinds of rules that were best are not chosen, a sentence each, without its full stop."""
     return [
-        f"Not chosen: {item.rule}, with which {visible(item.group)} is {100.0 * (item.ratio - 1.0):.0f} % worse than "
-        "by default on recordings that chose nothing"
+        f"Not chosen: {item.rule} as tuned: {visible(item.group)} is {100.0 * (item.ratio - 1.0):.0f} % worse with it "
+        "than by default on recordings that chose nothing"
         for item in tuned.rejected
     ]
 

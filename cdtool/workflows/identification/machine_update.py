@@ -81,7 +81,7 @@ def updated_text(text: str, changes: Sequence[MachineChange], origin: str) -> st
 
     document = tomlkit.parse(text)
     for change in changes:
-        table = _opened(document, change.section)
+        table = opened_table(document, change.section)
         value: Any = change.values[0] if len(set(change.values)) == 1 else list(change.values)
         before = table.get(change.key)
         item = tomlkit.item(int(value) if change.key in _WHOLE else value)
@@ -120,7 +120,7 @@ def _free_name(target: Path) -> Path:
     return next(name for name in names if not name.exists())
 
 
-def _opened(document: Any, section: str) -> Any:
+def opened_table(document: Any, section: str) -> Any:
     """Return a section of a TOML document; one on a single line in braces is spread first: it cannot hold comments."""
     import tomlkit
     from tomlkit.items import InlineTable
@@ -128,7 +128,7 @@ def _opened(document: Any, section: str) -> Any:
     table = document
     for name in section.split("."):
         if name not in table:
-            table[name] = tomlkit.table(is_super_table=name == "model")
+            table[name] = tomlkit.table(is_super_table=name in ("model", "detectors"))
         elif isinstance(table[name], InlineTable):
             content, comment = table[name].unwrap(), table[name].trivia.comment.strip("# ")
             table.remove(name)

@@ -144,6 +144,8 @@ def _fit_classes(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
             refused.append(fault)
             motion = members[0][0].motion.described
             skipped += [Skipped(item.name, f"runs {motion}: {fault.message}") for item, _ in members]
+    if not fitted and not refused:
+        raise SignatureError("no impact-free run to learn from", "add runs")
     if not fitted:
         raise refused[0]
     return Fitted(tuple(fitted), tuple(used), tuple(skipped))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cdtool.errors import UsageError
@@ -55,7 +55,8 @@ def read_recordings(
         skipped += [item for item in made if isinstance(item, Skipped)]
     if not struck:
         raise UsageError(f"{setup.path}: no contact to tune on", "add logs with contacts under [impacts], or [inject]")
-    recordings = in_folds(runs.operations, struck, setup.split, seed, is_nested=is_checkable(budget, runs.operations))
+    checkable = is_checkable(budget, runs.operations)
+    recordings = in_folds(runs.operations, struck, setup.split, seed, budget, is_nested=checkable)
     return ReadRecordings(runs, recordings, (*runs.skipped, *skipped), runs.findings)
 
 
@@ -99,7 +100,8 @@ def check_enough(budget: Budget, operations: Sequence[Operation]) -> None:
     sure = ""
     if budget.confidence is None:
         sure = f", {Budget(budget.rate, budget.per, 0.95).needed:.0f} to be 95 % sure of it"
-    raise UsageError(f"{many} for a false-alarm budget of {budget}: {needed}{sure}", "add runs, or choose a larger one")
+    hint = "add runs to [learn], or choose a larger budget"
+    raise UsageError(f"{many} for a false-alarm budget of {budget}: {needed}{sure}", hint)
 
 
 def to_check(budget: Budget) -> float:
@@ -116,7 +118,13 @@ def is_checkable(budget: Budget, operations: Sequence[Operation]) -> bool:
 
 
 def in_folds(
-    free: Sequence[Operation], struck: Sequence[StruckLog], split: Split, seed: int, *, is_nested: bool
+    free: Sequence[Operation],
+    struck: Sequence[StruckLog],
+    split: Split,
+    seed: int,
+    budget: Budget,
+    *,
+    is_nested: bool,
 ) -> TuningRecordings:
     """Return the recordings dealt to up to five folds, in an order that depends on their content and the seed only.
 
@@ -141,7 +149,7 @@ def in_folds(
         name = names.get(id(operation)) or operation.whole.digest or operation.whole.name
         return fold_of.setdefault(name, dealt % FOLDS)
 
-    runs = [FreeRun(item, fold(item, number if not names else len(fold_of))) for number, item in enumerate(ordered)]
+    runs = [FreeRun(item, fold(item, len(fold_of))) for item in ordered]
     by_group: dict[str, list[StruckLog]] = {}
     for log in struck:
         by_group.setdefault(log.group, []).append(log)
@@ -149,12 +157,13 @@ def in_folds(
     for members in by_group.values():
         for number, log in enumerate(sorted(members, key=lambda item: order(item.operations[0]))):
             placed.append((log, fold(log.operations[0], number if not names else len(fold_of))))
-    return TuningRecordings(
+    made = TuningRecordings(
         tuple(runs),
         tuple(_in_fold(log, number) for log, number in placed),
-        max(FOLDS if not names else 0, *(number + 1 for number in fold_of.values())),
-        is_nested,
+        max(number + 1 for number in fold_of.values()),
+        is_nested=True,
     )
+    return replace(made, is_nested=is_nested and not made.why_not_nested(budget))
 
 
 def _in_fold(log: StruckLog, fold: int) -> StruckLog:

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from dataclasses import asdict, fields, replace
-from pathlib import Path
+from glob import escape
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from cdtool.bounded_loading import read_text
 from cdtool.errors import ConfigurationError
 from cdtool.evaluation.limits import ALL
 from cdtool.plain_text import digits
-from cdtool.remote.remote_path import joined, relative_name
+from cdtool.remote.remote_path import is_remote, joined, location, relative_name
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.stored import rule_to_dict
 from cdtool.tuning.candidate import Candidate
 from cdtool.tuning.tuned import ChoiceResults, TunedDetector
 from cdtool.version import __version__
+from cdtool.workflows.identification.machine_update import opened_table
 from cdtool.workflows.signature.learning import Learned, Setting, learned_from_runs
 from cdtool.workflows.tuning.tuning import Tuning
 
 MARK = "# Tuned by cdtool tune"
-MACHINE, BENCHMARK = "machine.toml", "benchmark.toml"
+MACHINE, BENCHMARK, LABELS, LABELS_MARK = "machine.toml", "benchmark.toml", "labels.csv", "recording"
 # Settings of the threshold that are in other tables of a benchmark file.
 _ELSEWHERE = ("signature", "safety_factor", "limits")
 # Tables with logs, and tables of such tables.
@@ -50,15 +54,9 @@ def machine_text(tuning: Tuning, folder: Path) -> str:
 
 def _detector_table(document: Any, tuned: TunedDetector) -> Any:
     """Return the table of a detector's gains, under the name that the file uses."""
-    import tomlkit
-
-    if "detectors" not in document:
-        document["detectors"] = tomlkit.table(is_super_table=True)
-    tables = document["detectors"]
-    name = next((name for name in (tuned.detector, tuned.short_name) if name in tables), tuned.detector)
-    if name not in tables:
-        tables[name] = tomlkit.table()
-    return tables[name]
+    known = document.get("detectors", {})
+    name = next((name for name in (tuned.detector, tuned.short_name) if name in known), tuned.detector)
+    return opened_table(document, f"detectors.{name}")
 
 
 def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: Path) -> str:
@@ -73,6 +71,8 @@ def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: 
     document.pop("false_alarm_budget", None)
     if "signature" in document:
         document["signature"].pop("safety_factor", None)
+        if tuned.choice.rule.name != "signature":
+            document["signature"].pop("adaptive_level", None)  # other thresholds do not follow a run
     document["threshold"] = _threshold(tuned.choice.rule, setup.signature.sides)
     limited = document["threshold"]
     if tuned.choice.rule.name == "signature":
@@ -118,7 +118,9 @@ def _rebase(document: Any, base: Path, folder: Path) -> None:
     for name in _OF_TABLES:
         for table in document.get(name, {}).values():
             _rebase_logs(table, base, folder)
-    for name, key in (("onset", "labels"), ("force", "limits"), ("inject", "obstacle_file"), ("inject", "folder")):
+    if "labels" in document.get("onset", {}):
+        document["onset"]["labels"] = LABELS
+    for name, key in (("force", "limits"), ("inject", "obstacle_file"), ("inject", "folder")):
         if key in document.get(name, {}):
             document[name][key] = relative_name(joined(base, str(document[name][key])), folder)
     if "inject" in document and "folder" not in document["inject"]:
@@ -128,13 +130,43 @@ def _rebase(document: Any, base: Path, folder: Path) -> None:
 def _rebase_logs(table: Any, base: Path, folder: Path) -> None:
     def moved(entry: Any) -> Any:
         if isinstance(entry, dict):
-            entry["path"] = relative_name(joined(base, str(entry["path"])), folder)
+            entry["path"] = _moved(str(entry["path"]), base, folder)
             return entry
-        return relative_name(joined(base, str(entry)), folder)
+        return _moved(str(entry), base, folder)
 
     if "logs" in table:
         logs = table["logs"]
         table["logs"] = [moved(entry) for entry in logs] if isinstance(logs, list) else moved(logs)
+
+
+def _moved(pattern: str, base: Path, folder: Path) -> str:
+    """Return a pattern of files below `base` as one below `folder`; the folders between are no pattern."""
+    if is_remote(base) or is_remote(folder) or joined(base, pattern) == Path(pattern):
+        return relative_name(joined(base, pattern), folder)
+    between = relative_name(base, folder)
+    if any(mark in between for mark in "*?[") and not (base / pattern).is_file():
+        between = escape(between)
+    return PurePosixPath(between, pattern).as_posix()
+
+
+def labels_text(tuning: Tuning, folder: Path) -> str | None:
+    """Return the label file with its recordings named from `folder`; None without a label file."""
+    setup = tuning.setup
+    if setup.labels is None:
+        return None
+    base = setup.path.parent
+    text = read_text(location(setup.labels.source), ConfigurationError).removeprefix("\ufeff")
+    rows = list(csv.reader(io.StringIO(text, newline="")))
+    column = [name.strip() for name in rows[0]].index("recording")
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    for number, row in enumerate(rows):
+        if number and len(row) > column:
+            file, mark, run = row[column].strip().partition("#")
+            if "/" in file and joined(base, file).is_file():
+                row[column] = f"{relative_name(joined(base, file), folder)}{mark}{run}"
+        writer.writerow(row)
+    return out.getvalue()
 
 
 def _without_other_limits(document: Any, tuned: TunedDetector) -> None:
@@ -242,6 +274,7 @@ def _tuned_values(tuned: TunedDetector) -> dict[str, Any]:
         "candidates": tuned.candidates,
         "unusable": dict(tuned.unusable),
         "chosen_in_folds": list(tuned.chosen_in_folds),
+        "why_not_nested": tuned.why_not_nested,
         "rejected": [asdict(item) for item in tuned.rejected],
     }
 

@@ -11,11 +11,12 @@ import numpy as np
 
 from cdtool.activation import DEBOUNCE_TIME, Activation
 from cdtool.detectors import DETECTORS
-from cdtool.errors import CdtoolError, UsageError, nearest
+from cdtool.errors import CdtoolError, SignatureError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.kernel_warm_up import compile_loaded
 from cdtool.motion.applicable import HOLD
+from cdtool.operations import Operation
 from cdtool.pipeline import run_detector, signal_of_log
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
@@ -41,7 +42,13 @@ from cdtool.tuning.tuned import (
     tried_costs_of,
 )
 from cdtool.value_words import value_in_words
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file, with_detectors
+from cdtool.workflows.benchmark.benchmark_file import (
+    HOLDOUT,
+    BenchmarkFile,
+    read_benchmark_file,
+    refuse_limits_by_hand,
+    with_detectors,
+)
 from cdtool.workflows.benchmark.determinants import how_logs_are_read
 from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
@@ -50,10 +57,12 @@ from cdtool.workflows.runs import Runs
 from cdtool.workflows.signature.fitting import fitting, for_machine
 from cdtool.workflows.store.digest import code_version, digest_of
 from cdtool.workflows.tuning.journal import Journal
-from cdtool.workflows.tuning.recordings_to_tune import ReadRecordings, read_recordings
+from cdtool.workflows.tuning.recordings_to_tune import ReadRecordings, read_recordings, to_check
 
 # Which contacts a detector is tuned on.
 IMPACTS = ("real", "injected", "both")
+# A statistic may be assessable for less time than its signal.
+_SPARE = 1.1
 # Called after each round of a search: the detector, the candidates measured so far, and the best so far in words.
 Watch = Callable[[str, int, str], None]
 
@@ -187,10 +196,13 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
     workers, progress = options.workers or Workers(), options.progress
     setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=options.detectors)
     setup = with_detectors(setup, options.detectors) if options.detectors else setup
+    refuse_limits_by_hand(replace(setup, budget=options.budget))
     setup = _with_impacts(setup, options.impacts, workers, progress)
     with workers.ready():
         compile_loaded()
         read = read_recordings(setup, options.budget, options.seed, workers, progress)
+        if options.goal is Goal.FORCE and not np.isfinite(read.recordings.peak_of).any():
+            raise UsageError("objective is 'force', but no log has the force of its contact", "map the load cell")
         made: list[TunedDetector] = []
         unusable: dict[str, str] = {}
         skipped = list(read.skipped)
@@ -213,7 +225,7 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
         unusable,
         read.runs,
         groups,
-        read.recordings.is_nested,
+        all(item.nested is not None for item in made),
         tuple(dict.fromkeys((*skipped, *setup.not_injected))),
         read.findings,
     )
@@ -307,6 +319,7 @@ class _TuningOf:
         for log in recordings.struck:
             refused = setup.impacts[log.group].refused.get(self.name)
             if refused is not None:
+                skipped.append(Skipped(log.operations[0].whole.name, f"{self.name}: not tested: {refused}"))
                 continue
             try:
                 signals.append(signal_of_log(log.operations[0], machine, self._detector, setup.watched))
@@ -316,12 +329,33 @@ class _TuningOf:
         if not pairs or not struck:
             reason = skipped[0].reason if skipped else "injected contacts cannot test it"
             raise UsageError(f"{self.name} cannot be used on these logs: {reason}", "check the logs with cdtool info")
-        fitted = fitting(for_machine(setup.signature, machine))(pairs)
-        names = {item.recording for item in fitted.skipped}
-        skipped += fitted.skipped
+        try:
+            stray = fitting(for_machine(setup.signature, machine))(pairs).skipped
+        except SignatureError:  # other thresholds learn from fewer runs
+            stray = ()
+        names = {item.recording for item in stray}
+        skipped += stray
         usable = [number for number, run in enumerate(free) if run.operation.name not in names]
         made = replace(recordings, free=tuple(free[number] for number in usable), struck=tuple(struck))
-        return made, ([pairs[number] for number in usable], signals), skipped
+        kept = [pairs[number] for number in usable]
+        is_nested = made.is_nested and not made.why_not_nested(self.options.budget) and self._has_hours(made, kept)
+        return replace(made, is_nested=is_nested), (kept, signals), skipped
+
+    def _has_hours(self, recordings: TuningRecordings, pairs: Sequence[Pair]) -> bool:
+        """Return whether the runs without any fold are monitored long enough for a budget per hour."""
+        budget = self.options.budget
+        if budget.per == "operation":
+            return True
+        seconds = np.array([signal.period * float(signal.valid.any(axis=1).sum()) for _, signal in pairs])
+        fewest = min(float(seconds[recordings.free_in(fold + 1)].sum()) for fold in range(recordings.folds))
+        return fewest / 3600.0 >= _SPARE * budget.needed
+
+    def _why_not_nested(self, recordings: TuningRecordings, chosen: Sequence[HeldOut]) -> str:
+        """Return why there are no results of recordings that chose nothing."""
+        budget = self.options.budget
+        unit = "impact-free runs" if budget.per == "operation" else "monitored hours"
+        needed = f"{to_check(budget):.3g} {unit} are needed to check the limit"
+        return next((item.reason for item in chosen if item.reason), recordings.why_not_nested(budget) or needed)
 
     def _activations(self, period: float) -> tuple[list[int], tuple[Activation, ...]]:
         """Return the debounces to try [samples] and their activations, the benchmark file's first."""
@@ -365,9 +399,10 @@ class _TuningOf:
         if folder is None:
             return None
         recordings = measuring.recordings
-        free = [(run.operation.recording.digest, run.operation.number, run.fold) for run in recordings.free]
+        free = [(_part_of_log(run.operation), run.fold) for run in recordings.free]
         struck = [
-            (log.operations[0].whole.digest, log.group, log.fold, log.window, log.contacts) for log in recordings.struck
+            (list(map(_part_of_log, log.operations)), log.group, log.fold, log.window, log.contacts, log.curves)
+            for log in recordings.struck
         ]
         key = digest_of(
             code_version(),
@@ -396,6 +431,7 @@ class _TuningOf:
             default_nested = held_out_results(objective, by_default, seed)
         best, chosen, made, rejected = _checked_choice(found, objective, measure, default_nested, seed)
         nested, correction = held_out_results(objective, made, seed), made.multiplier if made else 1.0
+        why = "" if nested else self._why_not_nested(objective.recordings, measure.held_out(chosen))
         apparent = apparent_results(objective, found, best, seed)
         assert apparent is not None, "the best candidate can be used"
         measured = found.measured[best.candidate.key]
@@ -424,6 +460,7 @@ class _TuningOf:
             unusable=unusable,
             chosen_in_folds=tuple(in_words(item, words, gains) for item in chosen),
             rejected=tuple(rejected),
+            why_not_nested=why,
             tried_costs=tried_costs_of(objective, found),
         )
 
@@ -454,6 +491,12 @@ def _checked_choice(
         worst = int(np.nanargmax(ratios))
         group = objective.recordings.groups[worst]
         rejected.append(Rejection(best.candidate.rule.name, group, float(ratios[worst])))
+
+
+def _part_of_log(operation: Operation) -> tuple[str, int, float, float]:
+    """Return what identifies an operation: the log's content, and the part of it."""
+    part = operation.recording
+    return part.digest, operation.number, part.start, part.end
 
 
 def learned(rule: Threshold, pairs: Sequence[Pair]) -> tuple[FittedThreshold, ...]:

@@ -13,12 +13,14 @@ import pytest
 import cdtool as api
 from cdtool import simulate_gate
 from cdtool.bounded_loading import parse_toml
-from cdtool.errors import UsageError
-from cdtool.report.tuning_files import open_folder
+from cdtool.errors import ConfigurationError, UsageError
+from cdtool.log_section import LogSection, Mark
+from cdtool.report.tuning_files import open_folder, write_tuning
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.execution.workers import Workers
+from cdtool.workflows.log_groups import Split
 from cdtool.workflows.tuning import tuning as module
 from cdtool.workflows.tuning.tuned_files import tuning_summary
 from cdtool.workflows.tuning.tuning import TuningOptions, tune_detectors
@@ -239,3 +241,110 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
 def test_wrong_options_are_one_line(gate, tmp_path, arguments, words):
     done = command("tune", gate / "benchmark.toml", "--false-alarm-budget", "1/20op", "-o", tmp_path / "t", *arguments)
     assert done.status == 2 and words in done.err and done.err.count("\n") == 1
+
+
+def few_of(quick, group, count):
+    """The quick benchmark with so many logs in a group."""
+    kept = {**quick.impacts, group: replace(quick.impacts[group], logs=quick.impacts[group].logs[:count])}
+    return replace(quick, impacts=kept)
+
+
+def test_a_group_with_one_contact_has_no_nested_results_and_the_reason_is_stated(quick):
+    made = tune(few_of(quick, "stiff", 1), QUICK)
+    assert not made.is_nested
+    assert made.detectors[0].why_not_nested == "the contacts of stiff are in one part: at least 2 logs are needed"
+
+
+def test_two_days_leave_nothing_to_learn_from(quick, tmp_path):
+    for number, path in enumerate(quick.learn):
+        (tmp_path / f"2026-11-{3 + number % 2:02d}").mkdir(exist_ok=True)
+        shutil.copy(path, tmp_path / f"2026-11-{3 + number % 2:02d}" / path.name)
+    days = tuple(sorted(tmp_path.glob("2026*/*.csv")))
+    impacts = {}
+    for group in ("stiff", "soft"):
+        folder = tmp_path / "2026-11-03" / group
+        folder.mkdir()
+        for path in quick.impacts[group].logs:
+            shutil.copy(path, folder / path.name)
+        impacts[group] = replace(quick.impacts[group], logs=tuple(sorted(folder.iterdir())))
+    split = replace(quick, learn=days, impacts=impacts, split=Split.DAY)
+    made = tune(split, QUICK)
+    assert not made.is_nested and "in 2 parts that stay together" in made.detectors[0].why_not_nested
+
+
+def test_another_part_of_the_logs_is_measured_again(quick, tmp_path):
+    first = tune(quick, QUICK, journals=tmp_path)
+    section = LogSection(Mark(2.0, "s"))
+    parts = dict.fromkeys(quick.learn, section)
+    second = tune(replace(quick, learned_sections=parts), QUICK, journals=tmp_path)
+    assert second.detectors[0].factor != first.detectors[0].factor
+
+
+def test_a_budget_per_hour_has_no_more_alarming_runs_than_runs(quick):
+    made = tune(quick, replace(QUICK, false_alarm_budget="2000/h"))
+    assert made.detectors[0].apparent.alarming <= made.detectors[0].apparent.free == 12
+
+
+def test_limits_by_hand_are_refused(quick):
+    with pytest.raises(ConfigurationError, match="set by hand together with a false-alarm budget"):
+        tune(replace(quick, rule=Limit(limits=(400.0,))), QUICK)
+
+
+def test_the_force_is_not_minimised_where_none_is_known(quick, tmp_path):
+    text = "recording,start_s,end_s\n" + "".join(
+        f"{group}/{path.name},6.0,6.2\n" for group in ("stiff", "soft") for path in quick.impacts[group].logs
+    )
+    (quick.path.parent / "labels.csv").write_text(text, encoding="utf-8")
+    machine = "\n".join(
+        line
+        for line in quick.machine_file.path.read_text(encoding="utf-8").splitlines()
+        if not line.startswith("force")
+    )
+    (quick.path.parent / "no_cell.toml").write_text(machine, encoding="utf-8")
+    written = quick.path.read_text(encoding="utf-8").replace('"machine.toml"', '"no_cell.toml"')
+    written = written.replace("[onset]", '[onset]\nlabels = "labels.csv"')
+    (quick.path.parent / "labelled.toml").write_text(written, encoding="utf-8")
+    setup = read_benchmark_file(quick.path.parent / "labelled.toml")
+    setup = replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    with pytest.raises(UsageError, match="no log has the force of its contact"):
+        tune(setup, QUICK, objective="force")
+    made = tune(setup, QUICK)
+    folder = tmp_path / "a [b] c" / "out"
+    open_folder(folder, ())
+    write_tuning(made, folder)
+    again = read_benchmark_file(folder / "benchmark.toml")
+    assert again.labels is not None and len(again.labels.contacts) == 8
+
+
+def test_a_benchmark_below_a_folder_whose_name_looks_like_a_pattern(gate, tmp_path):
+    odd = tmp_path / "a [b] c"
+    shutil.copytree(gate, odd)
+    setup = read_benchmark_file(odd / "benchmark.toml")
+    setup = replace(setup, learn=setup.learn[:12], threshold="limit", rule=Limit())
+    made = tune(setup, QUICK)
+    open_folder(tmp_path / "out", ())
+    write_tuning(made, tmp_path / "out")
+    again = read_benchmark_file(tmp_path / "out" / "benchmark.toml")
+    assert {path.resolve() for path in again.learn} == {path.resolve() for path in odd.glob("free/*.csv")}
+
+
+def test_files_of_others_in_the_folder_are_not_replaced(tmp_path):
+    (tmp_path / "signature_momentum.json").write_text('{"my": 1}', encoding="utf-8")
+    with pytest.raises(UsageError, match="contains no signature"):
+        open_folder(tmp_path, (), ["momentum"])
+    mine = tmp_path / "benchmark_momentum.toml"
+    mine.write_text("machine = 'x'", encoding="utf-8")
+    with pytest.raises(UsageError, match="is read by this command"):
+        open_folder(tmp_path, (mine,), ["momentum"], force=True)
+
+
+def test_a_detector_that_cannot_be_tuned_is_reported(quick, gate, tmp_path):
+    machine = "\n".join(
+        line for line in quick.machine_file.path.read_text(encoding="utf-8").splitlines() if "acc_x" not in line
+    )
+    (gate / "no_acceleration.toml").write_text(machine, encoding="utf-8")
+    text = (gate / "benchmark.toml").read_text(encoding="utf-8").replace('"machine.toml"', '"no_acceleration.toml"')
+    (gate / "no_acceleration_benchmark.toml").write_text(text, encoding="utf-8")
+    arguments = ("--detectors", "gm,feekf", "--thresholds", "limit", "--false-alarm-budget", "1/2op")
+    done = command("tune", gate / "no_acceleration_benchmark.toml", *arguments, "-o", tmp_path / "t")
+    assert done.status == 3 and "friction_ekf: not tuned:" in done.err
