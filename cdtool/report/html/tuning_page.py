@@ -127,7 +127,7 @@ def debounce_words(tuned: TunedDetector) -> str:
 
 
 def apparent_words(tuning: Tuning) -> list[str]:
-    """Return a sentence per detector without nested results: why there are none."""
+    """Return a sentence per detector without nested results: the reason."""
     return [
         f"{visible(item.detector)}: no nested results: {visible(item.why_not_nested)}."
         for item in tuning.detectors
