@@ -344,9 +344,14 @@ def _told(known: Known, strike: Strike, done: Outcome, left: Snapshot) -> str:
 
 
 def snapshot(folder: Path) -> Snapshot:
-    """Every file, link and folder below a folder: its mode and its content."""
+    """Every file, link and folder below a folder: its mode and its content.
+
+    What a search has measured so far is meant to stay: the next run goes on from it.
+    """
     found: Snapshot = {}
     for path in sorted(folder.rglob("*")):
+        if "search" in path.relative_to(folder).parts:
+            continue
         status = path.lstat()
         content = b""
         if stat.S_ISLNK(status.st_mode):

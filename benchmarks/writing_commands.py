@@ -137,6 +137,7 @@ def cases(inputs: Path) -> list[Case]:
             ("inject", f"{inputs}/inject_b.toml", "-o", "{out}/injected"),
             ("simulate", "season", "--runs", "1", "-o", "{out}/logs"),
         ),
+        Case("tune", _tune(f"{inputs}/benchmark.toml", "trend"), _tune(f"{inputs}/benchmark.toml", "limit")),
         Case("coverage", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
         *(
             Case(f"simulate {kind}", ("simulate", kind, *some, "-o", "{out}/logs"))
@@ -166,6 +167,11 @@ def _plot(*words: str) -> tuple[str, ...]:
 
 def _identify(logs: Sequence[str], machine: Sequence[str]) -> tuple[str, ...]:
     return ("identify", *logs, *machine, "-o", "{out}/m.toml", "--force")
+
+
+def _tune(setup: str, threshold: str) -> tuple[str, ...]:
+    options = ("--thresholds", threshold, "--false-alarm-budget", "1/op", "--force", "-o", "{out}/tuned")
+    return ("tune", setup, "--detectors", "gm", *options)
 
 
 def _coverage(setup: str) -> tuple[str, ...]:

@@ -188,7 +188,36 @@ def set_factor(budget: Budget, detector: str, detections: Sequence[Detection], a
 
 
 def factor_for(budget: Budget, detector: str, runs: Sequence[MonitoredRun]) -> Calibrated:
-    """Return the smallest safety factor that meets the budget; as `set_factor`, from runs that were monitored."""
+    """Return the smallest safety factor that meets the budget, from runs that were monitored.
+
+    Parameters
+    ----------
+    budget : Budget
+        False alarms per operation or hour.
+    detector : str
+        Name of the detector, for messages.
+    runs : sequence of MonitoredRun
+        Impact-free operations; those that were nowhere assessable do not count.
+
+    Returns
+    -------
+    Calibrated
+        The factor, and the number of alarms with it on these runs.
+
+    Raises
+    ------
+    UsageError
+        The exposure is smaller than `budget.needed`, with what is missing.
+
+    Examples
+    --------
+    Of 19 runs, the largest critical factor sets a limit for one alarm in 20.
+
+    >>> runs = [MonitoredRun(float(i), 60.0, lambda factors: np.zeros(len(factors), dtype=np.int64)) for i in range(19)]
+    >>> made = factor_for(Budget.parse("1/20op"), "momentum", runs)
+    >>> round(made.factor, 3), made.alarms
+    (18.0, 0)
+    """
     runs = [item for item in runs if item.seconds > 0.0]
     hours = sum(item.seconds for item in runs) / 3600.0
     exposure = float(len(runs)) if budget.per == "operation" else hours

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from cdtool.detectors.base import Detector
 from cdtool.recording import BoolArray, FloatArray
 from cdtool.thresholds.base import Threshold
-from cdtool.thresholds.stored import rule_from_dict, rule_to_dict
+from cdtool.thresholds.stored import rule_to_dict
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,3 @@ class Measured:
 def _with_none(values: FloatArray) -> Any:
     """Return nested lists with None for NaN."""
     return np.where(np.isnan(values), None, values.astype(object)).tolist()  # type: ignore[call-overload]
-
-
-def candidate_from_key(key: str) -> Candidate:
-    """Return the candidate of a `key`."""
-    gains, rule = json.loads(key)
-    plain = tuple((name, tuple(value) if isinstance(value, list) else value) for name, value in gains)
-    return Candidate(plain, rule_from_dict(rule))

@@ -18,6 +18,7 @@ ELSEWHERE = {
     "cdtool/cli/streams.py": "opens the null device",
     "cdtool/workflows/execution/in_worker.py": "opens the null device",
     "cdtool/workflows/store/journal.py": "appends to a file that the next run takes over if this one is killed",
+    "cdtool/workflows/tuning/journal.py": "appends to a file that the next run goes on with if this one is killed",
     "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
     "cdtool/workflows/injecting.py": "writes into the folder that replaced_folder gives it",
     "cdtool/workflows/injection/injected_logs.py": "writes into that folder, or into the benchmark's own",

@@ -10,7 +10,7 @@ from cdtool.detectors.friction_ekf import FrictionEkf
 from cdtool.detectors.inertial_momentum import InertialMomentum
 from cdtool.detectors.momentum import Momentum
 from cdtool.thresholds.limit import Limit
-from cdtool.tuning.candidate import Candidate, candidate_from_key
+from cdtool.tuning.candidate import Candidate
 from cdtool.tuning.coordinate_search import EVALUATIONS, FARTHEST, CoordinateSearch, movable_gains
 
 START = Candidate.of(InertialMomentum(), Limit())
@@ -77,8 +77,3 @@ def test_what_belongs_to_sensors_or_decides_where_the_method_applies_is_not_sear
 
 def test_without_a_gain_nothing_is_asked_for():
     assert CoordinateSearch(START, 0.0, ()).ask() == []
-
-
-def test_a_candidate_is_restored_from_its_key():
-    start = Candidate.of(Momentum(bandwidth=(80.0, 60.0)), Limit(safety_factor=7.0))
-    assert candidate_from_key(start.key) == start

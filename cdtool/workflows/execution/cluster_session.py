@@ -149,8 +149,14 @@ class Session:
         return self.client.submit(work, *arguments, workers=[address], allow_other_workers=False, pure=False, retries=0)
 
     async def result(self, task: Any) -> Any:
-        """Return the result of a task, or raise its error; raises NoResultError if its worker has ended."""
-        found = await self.client.gather([task], errors="skip", asynchronous=True)
+        """Return the result of a task, or raise its error.
+
+        Raises NoResultError if its worker has ended, WorkerError if the scheduler has.
+        """
+        try:
+            found = await self.client.gather([task], errors="skip", asynchronous=True)
+        except OSError as lost:  # of the connection to the scheduler: an error of the task is asked for below
+            raise self.lost(lost) from lost
         if found:
             return found[0]
         fault = await task.exception(asynchronous=True)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from cdtool.errors import OutputError
 from cdtool.tuning.candidate import Candidate, Measured
 
 
@@ -17,15 +20,16 @@ class Journal:
     def __init__(self, path: Path, key: str) -> None:
         self.path, self._key = path, key
         self.known = self._read()
-        if not self.known:
-            path.write_text(json.dumps({"search": key}) + "\n", encoding="utf-8")
+        # A line that was cut off would spoil the next one: what is known is written again.
+        lines = [json.dumps({"search": key}), *(_line(*item) for item in self.known.items())]
+        with _explained(path), path.open("w", encoding="utf-8") as file:
+            file.writelines(f"{line}\n" for line in lines)
 
     def add(self, candidate: Candidate, measured: Measured) -> None:
         """Append a measurement."""
         self.known[candidate.key] = measured
-        line = json.dumps([candidate.key, measured.to_dict()], separators=(",", ":"))
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
+        with _explained(self.path), self.path.open("a", encoding="utf-8") as file:
+            file.write(f"{_line(candidate.key, measured)}\n")
 
     def _read(self) -> dict[str, Measured]:
         """Return the measurements of an earlier run; the last line may be cut off."""
@@ -41,9 +45,18 @@ class Journal:
                     found[key] = Measured.from_dict(values)
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             pass
-        if found:
-            # A line that was cut off would spoil the next one.
-            lines = [json.dumps({"search": self._key})]
-            lines += [json.dumps([key, item.to_dict()], separators=(",", ":")) for key, item in found.items()]
-            self.path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return found
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Raise OutputError for a file that cannot be written."""
+    try:
+        yield
+    except OSError as fault:
+        words = f"{path}: cannot be written: {fault.strerror or fault}"
+        raise OutputError(words, "free space, or choose another --output") from fault
+
+
+def _line(key: str, measured: Measured) -> str:
+    return json.dumps([key, measured.to_dict()], separators=(",", ":"))
