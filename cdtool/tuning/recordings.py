@@ -28,7 +28,7 @@ class StruckLog:
     """A log with contacts: its operations with the contacts of each, the group, and the number of its fold.
 
     A contact may be detected up to `window` [s] after its onset. `curves` has the force over each contact of each
-    operation, None where it is unknown. `is_injected`: the contacts were computed.
+    operation, None where it is unknown.
     """
 
     operations: tuple[Operation, ...]
@@ -37,7 +37,6 @@ class StruckLog:
     group: str
     window: float
     fold: int
-    is_injected: bool = False
 
 
 @dataclass(frozen=True)

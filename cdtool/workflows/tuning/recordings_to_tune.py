@@ -74,7 +74,7 @@ class _Reading:
         return found
 
     def _struck(self, group: str, log: LogToScore) -> list[StruckLog | Skipped]:
-        rules, own = self.setup.rules_of(group), self.setup.impacts[group]
+        rules = self.setup.rules_of(group)
         inside: list[tuple[Contact, ...]] = [
             tuple(contact for contact in contacts if not contact.in_progress)
             for contacts in contacts_by_operation(log.operations, log.contacts)
@@ -84,8 +84,7 @@ class _Reading:
         curves, _ = force_curves(log.recording, log.contacts, rules.mass_before_cell)
         number = {contact: index for index, contact in enumerate(log.contacts, 1)}
         of_contacts = tuple(tuple(curves.get(number[contact]) for contact in contacts) for contacts in inside)
-        injected = own.injected is not None
-        return [StruckLog(tuple(log.operations), tuple(inside), of_contacts, group, rules.window, 0, injected)]
+        return [StruckLog(tuple(log.operations), tuple(inside), of_contacts, group, rules.window, 0)]
 
 
 def check_enough(budget: Budget, operations: Sequence[Operation]) -> None:
@@ -159,12 +158,8 @@ def in_folds(
             placed.append((log, fold(log.operations[0], number if not names else len(fold_of))))
     made = TuningRecordings(
         tuple(runs),
-        tuple(_in_fold(log, number) for log, number in placed),
+        tuple(replace(log, fold=number) for log, number in placed),
         max(number + 1 for number in fold_of.values()),
         is_nested=True,
     )
     return replace(made, is_nested=is_nested and not made.why_not_nested(budget))
-
-
-def _in_fold(log: StruckLog, fold: int) -> StruckLog:
-    return StruckLog(log.operations, log.contacts, log.curves, log.group, log.window, fold, log.is_injected)
