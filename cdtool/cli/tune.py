@@ -155,6 +155,8 @@ def _show(done: Tuning) -> None:
         text = f"{tuned.short_name}: {settings or 'default settings'}"
         text += f"; at the edge of the search: {', '.join(edges)}" if edges else ""
         typer.echo(plain(text))
+        if tuned.default_reason:
+            typer.echo(plain(f"  The default cannot be used: {tuned.default_reason}"))
         for words in rejection_words(tuned):
             typer.echo(plain(f"  {words}"))
     typer.echo(_meaning(done) + injected_words(done))
