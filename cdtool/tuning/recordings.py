@@ -28,7 +28,7 @@ class StruckLog:
     """A log with contacts: its operations with the contacts of each, the group, and the number of its fold.
 
     A contact may be detected up to `window` [s] after its onset. `curves` has the force over each contact of each
-    operation, None where it is unknown.
+    operation, None where it is unknown. `made_from`: source of the impact-free log that injected contacts are in.
     """
 
     operations: tuple[Operation, ...]
@@ -37,6 +37,7 @@ class StruckLog:
     group: str
     window: float
     fold: int
+    made_from: str = ""
 
 
 @dataclass(frozen=True)

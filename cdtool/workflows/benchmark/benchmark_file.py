@@ -55,7 +55,8 @@ class ImpactGroup:
     """One group of logs with impacts: an alarm belongs to a contact up to `window` [s] after its onset.
 
     A group of injected contacts has its own `machine_file`, exact `labels`, and detectors that it cannot test, each
-    with the reason (`refused`). `injected` states how the contacts were made, for provenance.
+    with the reason (`refused`). `injected` states how the contacts were made, for provenance; `made_from` has the
+    impact-free log of each of its logs.
     """
 
     logs: tuple[Path, ...]
@@ -65,6 +66,7 @@ class ImpactGroup:
     labels: Labels | None = None
     refused: Mapping[str, str] = field(default_factory=dict)
     injected: Mapping[str, Any] | None = None
+    made_from: Mapping[Path, Path] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from cdtool.workflows.injection.injected_logs import (
     read_injected,
     write_injected,
 )
+from cdtool.workflows.runs import shown_path
 from cdtool.workflows.store.digest import code_version, digest_of
 
 _DIGEST = "digest.txt"
@@ -78,14 +79,17 @@ def with_groups(setup: BenchmarkFile, section: InjectSection, injected: Injected
     model = model_of(section, setup.machine_file)
     machine_file = read_machine_file(injected.machine_path)
     labels = injected.labels(setup.path.parent)
+    log_of = {shown_path(log, setup.path.parent): log for log in section.logs}
     groups = {}
     for name, (obstacle, assumption) in section.groups(assumptions_of(model)).items():
         cases = [case for case in injected.cases if case.group == name]
-        logs = tuple(injected.folder / case.file for case in cases)
-        if logs:
+        made_from = {injected.folder / case.file: log_of[case.log] for case in cases}
+        if made_from:
             refused = _refused(setup, section, assumption.controller)
             stated = _stated(obstacle, assumption, cases)
-            groups[name] = ImpactGroup(logs, setup.window, None, machine_file, labels, refused, stated)
+            groups[name] = ImpactGroup(
+                tuple(made_from), setup.window, None, machine_file, labels, refused, stated, made_from
+            )
     real = {name: group for name, group in setup.impacts.items() if name != HOLDOUT}
     holdout = {HOLDOUT: setup.impacts[HOLDOUT]} if HOLDOUT in setup.impacts else {}
     return replace(setup, impacts={**real, **groups, **holdout}, inject=None, not_injected=injected.skipped)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -70,10 +70,10 @@ class _Reading:
         group, path = item
         found: list[StruckLog | Skipped] = []
         for log in logs_to_score(self.setup, group, path):
-            found += [log] if isinstance(log, Skipped) else [*self._struck(group, log)]
+            found += [log] if isinstance(log, Skipped) else [*self._struck(group, path, log)]
         return found
 
-    def _struck(self, group: str, log: LogToScore) -> list[StruckLog | Skipped]:
+    def _struck(self, group: str, path: Path, log: LogToScore) -> list[StruckLog | Skipped]:
         rules = self.setup.rules_of(group)
         inside: list[tuple[Contact, ...]] = [
             tuple(contact for contact in contacts if not contact.in_progress)
@@ -84,7 +84,9 @@ class _Reading:
         curves, _ = force_curves(log.recording, log.contacts, rules.mass_before_cell)
         number = {contact: index for index, contact in enumerate(log.contacts, 1)}
         of_contacts = tuple(tuple(curves.get(number[contact]) for contact in contacts) for contacts in inside)
-        return [StruckLog(tuple(log.operations), tuple(inside), of_contacts, group, rules.window, 0)]
+        made_from = self.setup.impacts[group].made_from.get(path)
+        source = "" if made_from is None else str(made_from)
+        return [StruckLog(tuple(log.operations), tuple(inside), of_contacts, group, rules.window, 0, source)]
 
 
 def check_enough(budget: Budget, operations: Sequence[Operation]) -> None:
@@ -128,7 +130,8 @@ def in_folds(
     """Return the recordings dealt to up to five folds, in an order that depends on their content and the seed only.
 
     Contacts of each group are dealt evenly. What stays together by `split` is in one fold, and so are parts of one
-    recording. Raises UsageError as `split_names`.
+    recording, and injected contacts with the impact-free log that they were put into. Raises UsageError as
+    `split_names`.
     """
 
     def order(operation: Operation) -> tuple[str, int, str]:
@@ -136,11 +139,12 @@ def in_folds(
         return own, operation.number, operation.name
 
     ordered = sorted(free, key=order)
+    learned = {item.whole.source: item for item in ordered}
+    origin_of = {id(log): _origin(log, learned) for log in struck}
     names: dict[int, str] = {}
     if split is not Split.RECORDING:
-        first = [item.operations[0] for item in struck]
         split_names(split, ordered)
-        both = [*ordered, *first]
+        both = [*ordered, *origin_of.values()]
         names = dict(zip(map(id, both), split_names(split, both), strict=True))
     fold_of: dict[str, int] = {}
 
@@ -155,7 +159,7 @@ def in_folds(
     placed = []
     for members in by_group.values():
         for number, log in enumerate(sorted(members, key=lambda item: order(item.operations[0]))):
-            placed.append((log, fold(log.operations[0], number if not names else len(fold_of))))
+            placed.append((log, fold(origin_of[id(log)], number if not names else len(fold_of))))
     made = TuningRecordings(
         tuple(runs),
         tuple(replace(log, fold=number) for log, number in placed),
@@ -163,3 +167,12 @@ def in_folds(
         is_nested=True,
     )
     return replace(made, is_nested=is_nested and not made.why_not_nested(budget))
+
+
+def _origin(log: StruckLog, learned: Mapping[str, Operation]) -> Operation:
+    """Return the operation whose fold a log is in: the impact-free one its contacts were put into, or its own."""
+    first = log.operations[0]
+    if not log.made_from or log.made_from in learned:
+        return learned.get(log.made_from, first)
+    # The log is not learned from: what was put into it stays together, under its name.
+    return replace(first, recording=replace(first.whole, source=log.made_from, name=log.made_from, digest=""), log=None)

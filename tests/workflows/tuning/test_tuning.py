@@ -19,9 +19,11 @@ from cdtool.report.tuning_files import open_folder, write_tuning
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.log_groups import Split
 from cdtool.workflows.tuning import tuning as module
+from cdtool.workflows.tuning.recordings_to_tune import read_recordings
 from cdtool.workflows.tuning.tuned_files import tuning_summary
 from cdtool.workflows.tuning.tuning import TuningOptions, tune_detectors
 from tests.command import cdtool as command
@@ -223,6 +225,10 @@ def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
         tune(both, QUICK)
     made = tune(both, replace(QUICK, impacts="injected"))
     assert set(made.groups) == {"injected_hard"}
+    injected = with_injected(replace(both, impacts={}), Workers(1))
+    read = read_recordings(injected, QUICK.budget, 0, Workers(1)).recordings
+    fold_of = {run.operation.recording.source: run.fold for run in read.free}
+    assert [log.fold for log in read.struck] == [fold_of[log.made_from] for log in read.struck]
     real = tune(both, replace(QUICK, impacts="real"))
     assert set(real.groups) == {"stiff", "soft"}
 
