@@ -1,7 +1,7 @@
 """What `cdtool tune` finds on the simulated gate, checked on fresh recordings, and how long it takes.
 
     python benchmarks/tuning.py                                           # seeds 801 to 805, 200 free runs, 30 + 30
-    python benchmarks/tuning.py --seeds 1 --free 60 --impacts 6 --fresh 40 --budget 1/20op
+    python benchmarks/tuning.py --seeds 801 --free 60 --impacts 6 --fresh 40 --budget 1/20op
 
 Each seed: free runs and impacts to tune FEEKF and IGM on, and others, of another seed, to check the better of the two:
 its latencies, and its alarms in fresh impact-free runs. Everything goes through the files, by the functions of
@@ -25,7 +25,7 @@ from cdtool.report.tuning_files import open_folder, write_tuning
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, ImpactGroup, read_benchmark_file
 from cdtool.workflows.execution.workers import Workers
 
-FIRST_SEED, FRESH = 801, 100_000
+SEEDS, FRESH = (801, 802, 803, 804, 805), 100_000
 DETECTORS = ("friction_ekf", "inertial_momentum")
 # At 1/100 with 200 free runs: mean latencies [ms], alarms of 1000 fresh runs, seconds per detector, nested over fresh.
 MOST = {"stiff": 16.0, "soft": 62.0}
@@ -100,7 +100,7 @@ def faults_of(found: list[Checked]) -> list[str]:
 def main(arguments: list[str]) -> int:
     """Print a row per seed, and 1 if anything is not as it should be."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     parser.add_argument("--free", type=int, default=200, help="impact-free runs to tune on")
     parser.add_argument("--impacts", type=int, default=30, help="impacts of each kind, to tune on and to check on")
     parser.add_argument("--fresh", type=int, default=200, help="impact-free runs to check on")
@@ -108,7 +108,7 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     print(environment())
     found = []
-    for seed in range(FIRST_SEED, FIRST_SEED + options.seeds):
+    for seed in options.seeds:
         with tempfile.TemporaryDirectory() as folder:
             found.append(check(Path(folder), seed, options.free, options.impacts, options.fresh, options.budget))
         item = found[-1]

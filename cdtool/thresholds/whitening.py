@@ -19,6 +19,7 @@ from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.thresholds.fitted_signature import FittedSignature
+from cdtool.thresholds.recent import Recent
 from cdtool.thresholds.sections import filtered, section_bounds, sections
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.statistic_limit import common_period
@@ -32,6 +33,9 @@ _DOUBLINGS = 24
 PERIOD_TOLERANCE = 0.2
 # The median of this many steps decides; while there are fewer than the second number, the rate is taken to be right.
 _STEPS, _ENOUGH = 101, 20
+
+# Two orders, each learned without one of five folds or from all runs.
+_RECENT = Recent(12)
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,16 @@ class Whitening:
 
     @classmethod
     def learned(cls, rule: Signature, order: int, pairs: Sequence[tuple[Recording, Signal]]) -> Self:
-        """Learn from runs of one class; raises SignatureError as the signature does, and if nothing varies."""
+        """Learn from runs of one class; raises SignatureError as the signature does, and if nothing varies.
+
+        Rules that differ in their statistic only, tried one after the other on the same signals, share one model.
+        """
+        return _RECENT.value(
+            (cls, rule, order), [item for pair in pairs for item in pair], lambda: cls._of(rule, order, pairs)
+        )
+
+    @classmethod
+    def _of(cls, rule: Signature, order: int, pairs: Sequence[tuple[Recording, Signal]]) -> Self:
         # Both sides and one spread: mean and spread are the middle and half the width of its band. A band that follows
         # its run would leave other innovations than those that were learned.
         signature = replace(rule, sides="two", safety_factor=1.0, adaptive_level=0.0).fit(pairs)
@@ -242,21 +255,50 @@ def burg(parts: Sequence[FloatArray], order: int) -> tuple[FloatArray, float]:
     Burg's recursion with forward and backward errors summed over all sections; sections of at most `order` samples are
     left out. The model is stable by construction. The standard deviation is NaN if no section is long enough.
     """
-    forward = [part for part in parts if len(part) > order]
-    backward = forward
-    polynomial = np.ones(1)
-    for _ in range(order):
-        ahead, behind = [part[1:] for part in forward], [part[:-1] for part in backward]
-        crossed = sum(float(f @ b) for f, b in zip(ahead, behind, strict=True))
-        energy = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
+    long = [part for part in parts if len(part) > order]
+    if not long:
+        return np.zeros(order), math.nan
+    ends = np.cumsum([len(part) for part in long])
+    coefficients = np.empty(order)
+    return coefficients, _burg(np.concatenate(long), np.concatenate(long), ends, coefficients)
+
+
+@kernel("float64(float64[::1], float64[::1], int64[::1], float64[::1])")
+def _burg(forward: FloatArray, backward: FloatArray, ends: npt.NDArray[np.int64], coefficients: FloatArray) -> float:
+    """Fill the coefficients (order,), and return the standard deviation of the forward errors that are left.
+
+    `forward` and `backward`: the sections one after the other, overwritten by their errors; `ends`: one past the last
+    sample of each.
+    """
+    order = len(coefficients)
+    before = np.empty(order)
+    power, number = 0.0, 0
+    for p in range(1, order + 1):
+        # The error of order p - 1 at sample k and, backward, at the sample before.
+        crossed = energy = 0.0
+        begin = 0
+        for end in ends:
+            for k in range(begin + p, end):
+                f, b = forward[k], backward[k - 1]
+                crossed += f * b
+                energy += f * f + b * b
+            begin = end
         reflection = -2.0 * crossed / energy if energy > 0.0 else 0.0
-        forward = [f + reflection * b for f, b in zip(ahead, behind, strict=True)]
-        backward = [b + reflection * f for f, b in zip(ahead, behind, strict=True)]
-        longer = np.append(polynomial, 0.0)
-        polynomial = longer + reflection * longer[::-1]
-    number = sum(len(part) for part in forward)
-    power = sum(float(part @ part) for part in forward)
-    return -polynomial[1:], float(np.sqrt(power / number)) if number else float("nan")
+        for i in range(p - 1):
+            before[i] = coefficients[i]
+        for i in range(p - 1):
+            coefficients[i] = before[i] + reflection * before[p - 2 - i]
+        coefficients[p - 1] = -reflection
+        power, number, begin = 0.0, 0, 0
+        for end in ends:
+            for k in range(end - 1, begin + p - 1, -1):
+                f, b = forward[k], backward[k - 1]
+                forward[k] = f + reflection * b
+                backward[k] = b + reflection * f
+                power += forward[k] * forward[k]
+                number += 1
+            begin = end
+    return math.sqrt(power / number)
 
 
 def _stationary_covariance(coefficients: FloatArray, least: float) -> FloatArray:
