@@ -54,8 +54,8 @@ class Fused:
     Not in the thesis. It estimates no contact force: its signal has several columns, and its own threshold
     (`own_threshold`) whitens them together and looks for the shapes of contacts; see `MatchedBanks`.
 
-    * Axes: the deceleration -a of each, and the force d max(|v|, v_min) in the direction of motion, with d from
-      `FrictionEkf` with these gains. Without an accelerometer: torque and -v.
+    * Axes: the deceleration -a of each, the force d max(|v|, v_min) in the direction of motion, with d from
+      `FrictionEkf` with these gains, torque and -v. Without an accelerometer: torque and -v.
     * Robots, whose joints are coupled: torque, -v and -a of each joint.
     * Needs: speed, and torque or acceleration. Channels that a log does not have are left out; what is learned applies
       to logs with the same ones. Without acceleration, stiff contacts are seen later.
@@ -75,8 +75,8 @@ class Fused:
     >>> steady = Series(time, np.zeros(2001), "m/s2")
     >>> run = Recording("run", "", ("axis",), {"torque": torque, "speed": speed, "acceleration": steady})
     >>> signal = Fused().signal(run, axis)
-    >>> signal.channels
-    (('acceleration', 'axis'), ('force', 'axis'))
+    >>> [channel for channel, _ in signal.channels]
+    ['acceleration', 'force', 'torque', 'speed']
     >>> signal.values[[999, 2000], 1].round().tolist()
     [30.0, 90.0]
     """
@@ -133,7 +133,7 @@ class Fused:
         )
 
     def _axes(self, recording: Recording, machine: Machine) -> list[_Column]:
-        """Return -a and the estimated force of each axis; without one of the two, what there is."""
+        """Return -a, the estimated force, torque and -v of each axis; without one of them, what there is."""
         decelerations = _columns(recording, "acceleration", -1.0)
         if not decelerations:
             return _robot(recording)
@@ -154,7 +154,8 @@ class Fused:
             _Column("force", joint, force[:, j], estimated.status[:, j], lost[:, j])
             for j, joint in enumerate(recording.joints)
         ]
-        return [*decelerations, *forces]
+        slow = [*_columns(recording, "torque", 1.0), *_columns(recording, "speed", -1.0)]
+        return [*decelerations, *forces, *slow]
 
 
 def _notes(recording: Recording, columns: Sequence[_Column]) -> tuple[str, ...]:

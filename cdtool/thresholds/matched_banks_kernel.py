@@ -182,6 +182,7 @@ def evidence_of(
     fit = np.empty(widest)
     evidence = np.empty(widest)
     recent = np.empty(n + 1)
+    inverse = np.empty(usual.shape[1])
     for g in range(groups.shape[1]):
         length, stride, memory = groups[LENGTH, g], groups[STRIDE, g], groups[MEMORY, g]
         opens = start + groups[MASK, g]
@@ -207,6 +208,9 @@ def evidence_of(
         # Evaluations so far, and how many of them lie within a template and within its memory of its own size.
         done = 0
         recent[0] = 0.0
+        counted, share = 0, 1.0 / prior
+        for at in range(usual.shape[1]):
+            inverse[at] = 1.0 / (usual[g if mode == 1 else 0, at] * usual[g if mode == 1 else 0, at])
         own, past = (length + stride - 1) // stride, window // stride
         k = opens
         while k < n:
@@ -218,9 +222,9 @@ def evidence_of(
             if memory > 0:
                 newest = k + 1 - length
                 oldest = max(newest - memory, start)
-                share = 1.0 / (newest - oldest)
+                per_sample = 1.0 / (newest - oldest)
                 for c in range(channels):
-                    drift = share * (total[c, newest] - total[c, oldest])
+                    drift = per_sample * (total[c, newest] - total[c, oldest])
                     for i in range(count):
                         evidence[i] -= gain[first + i, c] * drift
             if count == 2:
@@ -229,18 +233,29 @@ def evidence_of(
                 square = _non_negative(evidence, gram, free, first, count, fit)
             else:
                 square = evidence[0] * evidence[0] / gram[first, 0] if evidence[0] > 0.0 or free[first] else 0.0
-            value = math.sqrt(max(0.0, square))
-            if mode == 1:
-                value /= usual[g, place[k]]
-                recent[done + 1] = recent[done] + value * value
+            square = max(0.0, square)
+            value = math.nan
+            if mode == 0:
+                value = math.sqrt(square)
+            else:
+                square *= inverse[place[k]]
+                recent[done + 1] = recent[done] + square
                 until = max(done + 1 - own, 0)
                 since = max(until - past, 0)
-                size = (prior + stride * (recent[until] - recent[since])) / (prior + stride * (until - since))
+                if until - since != counted:
+                    counted = until - since
+                    share = 1.0 / (prior + stride * counted)
+                size = (prior + stride * (recent[until] - recent[since])) * share
                 if size > limit:
-                    value *= math.sqrt(limit / size)
-                value = (value - centre) / spread
+                    square *= limit / size
                 done += 1
             for held in range(k, min(k + stride, n)):
+                # The root is needed only where this is the largest so far.
+                needed = result[row, held] * spread + centre
+                if mode == 1 and needed > 0.0 and square <= needed * needed:
+                    continue
+                if math.isnan(value):
+                    value = (math.sqrt(square) - centre) / spread
                 if not result[row, held] >= value:
                     result[row, held] = value
             k += stride

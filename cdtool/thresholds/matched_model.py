@@ -253,10 +253,14 @@ class MatchedModel(SendsFields):
     def _by_bank(self, recording: Recording, signal: Signal, deviation: Deviation) -> FloatArray:
         result = np.empty((len(self.banks) + 1, len(signal.time)))
         result[:-1] = self._evidence(deviation, 1, by_bank=True)
-        statistic, met = exceedance(self.signature, recording, signal)
-        early = np.where(statistic.status == Status.VALID, met, -np.inf).max(axis=1)
-        early[deviation.start + int(self.design.groups[MASK].min()) :] = -np.inf
-        result[-1] = np.where(np.isfinite(early), early, np.nan)
+        early = slice(0, deviation.start + int(self.design.groups[MASK].min()))
+        statistic, met = exceedance(self.signature, recording, signal.part(early))
+        met = np.where(statistic.status == Status.VALID, met, -np.inf)
+        start = np.full(len(signal.time), -np.inf)
+        for bank in self.banks:
+            for column in bank.columns if bank.at_start else ():
+                np.maximum(start[early], met[:, column], out=start[early])
+        result[-1] = np.where(np.isfinite(start), start, np.nan)
         return result
 
     def standardised(self, recording: Recording, signal: Signal) -> tuple[FloatArray, StatusArray]:
@@ -267,11 +271,15 @@ class MatchedModel(SendsFields):
         result = self._by_bank(recording, signal, self.deviation(recording, signal))
         result -= self.of_banks[0][:, np.newaxis]
         result /= self.of_banks[1][:, np.newaxis]
-        nowhere = (signal.status != Status.VALID).all(axis=1)
-        status = np.where(nowhere, signal.status.max(axis=1), np.uint8(Status.VALID)).astype(np.uint8)
-        missing = (signal.status == Status.GAP).any(axis=1) | (
-            (signal.status == Status.VALID) & ~np.isfinite(signal.values)
-        ).any(axis=1)
+        nowhere, missing = np.ones(len(signal.time), dtype=bool), np.zeros(len(signal.time), dtype=bool)
+        highest = np.zeros(len(signal.time), dtype=np.uint8)
+        for c in range(signal.values.shape[1]):
+            own = signal.status[:, c]
+            valid = own == Status.VALID
+            nowhere &= ~valid
+            missing |= (own == Status.GAP) | (valid & ~np.isfinite(signal.values[:, c]))
+            np.maximum(highest, own, out=highest)
+        status = np.where(nowhere, highest, np.uint8(Status.VALID)).astype(np.uint8)
         status[missing] = Status.GAP
         lost = lost_in_deviation(self.signature, recording, signal)
         if lost is not None:
@@ -361,6 +369,7 @@ def _bank_to_dict(bank: Bank) -> dict[str, Any]:
         "columns": list(bank.columns),
         "order": bank.order,
         "memory": bank.memory,
+        "at_start": bank.at_start,
         "templates": templates,
     }
 
@@ -375,7 +384,7 @@ def _bank_from_dict(values: Mapping[str, Any]) -> Bank:
         for item in values["templates"]
     )
     columns = tuple(int(column) for column in values["columns"])
-    return Bank(columns, int(values["order"]), templates, float(values["memory"]))
+    return Bank(columns, int(values["order"]), templates, float(values["memory"]), bool(values["at_start"]))
 
 
 def settling(recording: Recording, clock: FloatArray, motion: MotionClass, period: float) -> Settling:

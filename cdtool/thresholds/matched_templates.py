@@ -49,13 +49,15 @@ class Template:
 class Bank:
     """Columns that one vector autoregression of `order` whitens, and their templates.
 
-    `memory` [s]: over how long the mean innovation before a long template is taken.
+    `memory` [s]: over how long the mean innovation before a long template is taken. `at_start`: whether its columns
+    decide before the motion is settled.
     """
 
     columns: tuple[int, ...]
     order: int
     templates: tuple[Template, ...]
     memory: float
+    at_start: bool = True
 
 
 def _milliseconds(*values: float) -> tuple[float, ...]:
@@ -71,6 +73,7 @@ _AXIS = (
 _SHORT = _milliseconds(1, 2, 3, 4, 6, 8, 11, 15, 20, 27)
 _LONG_SQUARE = _milliseconds(40, 57, 80, 110, 135)
 _LONG_LINEAR = _milliseconds(60, 85, 120, 170, 230, 280)
+_SLOW = ((_milliseconds(57, 80, 110), 2.0), (_milliseconds(85, 120, 170), 1.0))
 # How much larger than usual the recent size of a template may be, of an axis and of joints.
 _SLACK, _JOINT_SLACK = 1.15, 0.85
 _WITH_FAST = _milliseconds(40, 60, 80)
@@ -80,20 +83,40 @@ def banks_of(kinds: Sequence[str], joints: Sequence[str], two_sided: bool, order
     """Return the banks for columns of that channel and joint; `kinds` is empty for columns of unknown meaning."""
     if not kinds:
         return tuple(_sums(j, two_sided, order or 4) for j in range(len(joints)))
-    if "force" in kinds or (len(set(joints)) == 1 and "acceleration" in kinds):
-        banks = []
-        for j, kind in enumerate(kinds):
-            if kind == "acceleration":
-                templates = tuple(
-                    Template(length, (Component(0, power, two_sided),), _SLACK)
-                    for lengths, power in _AXIS
-                    for length in lengths
-                )
-                banks.append(Bank((j,), order or 4, templates, 1.5))
-            else:
-                banks.append(_sums(j, two_sided, order or 4))
-        return tuple(banks)
+    if "force" in kinds:
+        of_joints = [_axis_banks(kinds, joints, name, two_sided, order) for name in dict.fromkeys(joints)]
+        return tuple(bank for banks in of_joints for bank in banks)
+    if len(set(joints)) == 1 and "acceleration" in kinds:
+        return tuple(_axis_bank(j, kind, two_sided, order or 4) for j, kind in enumerate(kinds))
     return (_joint_bank(kinds, joints, two_sided, order or 20),)
+
+
+def _axis_banks(
+    kinds: Sequence[str], joints: Sequence[str], name: str, two_sided: bool, order: int | None
+) -> list[Bank]:
+    """Return a bank each for deceleration and force of an axis, and one of its torque and speed."""
+    own = [j for j, joint in enumerate(joints) if joint == name]
+    banks = [_axis_bank(j, kinds[j], two_sided, order or 4) for j in own if kinds[j] in ("acceleration", "force")]
+    slow = [j for j in own if kinds[j] in ("torque", "speed")]
+    if "speed" in [kinds[j] for j in slow]:
+        at = next(i for i, j in enumerate(slow) if kinds[j] == "speed")
+        templates = tuple(
+            Template(length, (Component(at, power, two_sided),), _SLACK)
+            for lengths, power in _SLOW
+            for length in lengths
+        )
+        # Before the motion is settled, another speed would look like a contact.
+        banks.append(Bank(tuple(slow), order or 20, templates, 0.5, at_start=False))
+    return banks
+
+
+def _axis_bank(column: int, kind: str, two_sided: bool, order: int) -> Bank:
+    if kind != "acceleration":
+        return _sums(column, two_sided, order)
+    templates = tuple(
+        Template(length, (Component(0, power, two_sided),), _SLACK) for lengths, power in _AXIS for length in lengths
+    )
+    return Bank((column,), order, templates, 1.5)
 
 
 def _sums(column: int, two_sided: bool, order: int) -> Bank:

@@ -17,6 +17,9 @@ from cdtool.operations import operations_of
 from cdtool.pipeline import detect_operation, run_detector
 from cdtool.recording import Recording, Series
 from cdtool.signature_store import read_signature, write_signature
+from cdtool.simulation.changed_machine import ChangedMachine
+from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
+from cdtool.simulation.gate_recordings import as_recording
 from cdtool.thresholds.glr import Glr
 from cdtool.thresholds.matched_banks import FittedMatchedBanks, MatchedBanks
 from cdtool.thresholds.sequential import FittedSequential
@@ -38,7 +41,7 @@ def seen(recording: Recording, *channels: str) -> Recording:
 @pytest.mark.parametrize(
     ("missing", "columns"),
     [
-        ((), ["acceleration", "force"]),
+        ((), ["acceleration", "force", "torque", "speed"]),
         (("acceleration",), ["torque", "speed"]),
         (("torque",), ["acceleration", "speed"]),
     ],
@@ -82,14 +85,15 @@ def test_the_force_of_an_axis_is_the_estimated_friction_times_the_speed(gate, si
     np.testing.assert_array_equal(signal.status[:, 1], friction.status[:, 0])
 
 
-def test_a_missing_acceleration_is_a_gap_of_its_column_only(gate, simulated):
+def test_a_missing_acceleration_is_lost_in_its_column_and_in_the_force(gate, simulated):
     run = seen(simulated("none", 3))
     values = run["acceleration"].values.copy()
     values[5000:5010] = np.nan
     holed = replace(run, channels={**run.channels, "acceleration": run["acceleration"].with_values(values, "m/s2")})
     signal = Fused().signal(holed, gate)
     assert (signal.status[5000:5010, 0] == Status.GAP).all()
-    assert signal.lost is not None and signal.lost[5000:5010].all()
+    assert signal.lost is not None and signal.lost[5000:5010].all(axis=0).tolist() == [True, True, False, False]
+    assert not signal.lost[:, 2:].any()
 
 
 def test_a_watched_joint_leaves_all_columns_and_an_unknown_one_is_refused(gate, simulated):
@@ -123,6 +127,29 @@ def test_it_sees_contacts_and_judges_the_whole_machine(gate, simulated, threshol
     assert detection.verdict.outcome == "alarm"
     assert -0.005 < detection.verdict.alarms[0].time - onset < within
     assert detection.statistic.joints == WHOLE_MACHINE and detection.exceedance().shape == detection.band.upper.shape
+
+
+def test_a_slower_start_is_no_contact(gate, thresholds):
+    """The speed column would see it; the motion is not assessable once it is settled at another speed."""
+    slower = ChangedMachine(speed=0.9).gate(GateParameters())
+    for seed in (31, 32, 33):
+        recording = as_recording(simulate_gate_run(slower, np.random.default_rng(seed), "none"), "slower", slower)
+        verdict = detect_operation(operations_of(recording)[0], gate, Fused(), thresholds, AT_3).verdict
+        assert verdict.outcome == "not_assessable" and not verdict.alarms
+
+
+def test_a_very_soft_contact_is_seen_in_torque_and_speed_first(gate, thresholds):
+    soft = GateParameters(bumper_stiffness=8e3)
+    for seed in (41, 42, 43):
+        recording = as_recording(simulate_gate_run(soft, np.random.default_rng(seed), "soft"), "very soft", soft)
+        onset = float(recording["force"].time[np.flatnonzero(recording["force"].values[:, 0] > 20.0)[0]])
+        operation = operations_of(recording)[0]
+        limited = [item.with_safety_factor(4.0) for item in thresholds]
+        (alarm, *_) = detect_operation(operation, gate, Fused(), limited, AT_3).verdict.alarms
+        signal = run_detector(operation, gate, Fused())
+        evidence = thresholds[0].explained(recording.without_ground_truth(), signal, alarm.time)
+        assert 0.0 < alarm.time - onset < 0.16
+        assert evidence is not None and "gate speed" in evidence.columns
 
 
 def test_without_an_accelerometer_it_is_slower_and_still_sees_them(gate, simulated):

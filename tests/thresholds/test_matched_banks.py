@@ -248,6 +248,13 @@ def test_it_says_which_template_and_column_decided(fitted, runs):
 def test_the_banks_of_an_axis_are_separate_and_those_of_joints_are_one():
     axis = banks_of(("acceleration", "force"), ("x", "x"), False, None)
     assert [(bank.columns, bank.order) for bank in axis] == [((0,), 4), ((1,), 4)]
+    # Two axes with all channels: the speed decides slowly, and not before the motion is settled.
+    kinds = ("acceleration", "acceleration", "force", "force", "torque", "torque", "speed", "speed")
+    banks = banks_of(kinds, ("x", "y") * 4, False, None)
+    assert [bank.columns for bank in banks] == [(0,), (2,), (4, 6), (1,), (3,), (5, 7)]
+    assert [bank.at_start for bank in banks] == [True, True, False] * 2
+    assert {part.column for item in banks[-1].templates for part in item.components} == {1}
+    assert min(item.length for item in banks[-1].templates) > 0.05
     kinds = ("torque", "torque", "speed", "speed", "acceleration", "acceleration")
     (arm,) = banks_of(kinds, ("a", "b") * 3, False, None)
     assert arm.columns == tuple(range(6)) and arm.order == 20
