@@ -47,4 +47,4 @@ def test_the_values_used_last_are_kept():
     recent, runs = Recent(2), signals(1)
     for key in ("a", "b", "a", "c"):
         recent.value(key, runs, lambda: key)  # noqa: B023  called at once
-    assert [recent.value(key, runs, lambda: "anew") for key in ("a", "c", "b")] == ["a", "c", "anew"]
+    assert [recent.value(key, runs, lambda: "other") for key in ("a", "c", "b")] == ["a", "c", "other"]
