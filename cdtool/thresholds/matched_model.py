@@ -168,7 +168,7 @@ class MatchedModel(SendsFields):
         spread = np.sqrt(np.where(known, (maxima - centre) ** 2, 0.0).sum(axis=0) / number)
         # A template that ran in less than half of the runs has no known size: it never decides.
         rare = number < 0.5 * len(maxima)
-        spread = np.where((spread > 0.0) & ~rare, spread, math.inf)
+        spread = np.where((spread > 0.0) & ~rare, spread * self.design.reserve, math.inf)
         return replace(self, learned=np.array([centre, spread, self.learned[2], self.learned[3]]))
 
     @property
@@ -362,6 +362,7 @@ def _bank_to_dict(bank: Bank) -> dict[str, Any]:
             "length": item.length,
             "components": [[part.column, part.power, part.free] for part in item.components],
             "slack": item.slack,
+            "reserve": item.reserve,
         }
         for item in bank.templates
     ]
@@ -380,6 +381,7 @@ def _bank_from_dict(values: Mapping[str, Any]) -> Bank:
             float(item["length"]),
             tuple(Component(int(a), float(b), bool(c)) for a, b, c in item["components"]),
             float(item["slack"]),
+            float(item["reserve"]),
         )
         for item in values["templates"]
     )

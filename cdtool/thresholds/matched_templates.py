@@ -37,12 +37,14 @@ class Component:
 class Template:
     """Components that grow together over `length` [s]; of power 0: a plain sum of innovations.
 
-    `slack`: how much larger than usual its recent size may be before it is divided by it.
+    `slack`: how much larger than usual its recent size may be before it is divided by it. `reserve`: its standardised
+    evidence is divided by it.
     """
 
     length: float
     components: tuple[Component, ...]
     slack: float
+    reserve: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ _SLOW = ((_milliseconds(57, 80, 110), 2.0), (_milliseconds(85, 120, 170), 1.0))
 # How much larger than usual the recent size of a template may be, of an axis and of joints.
 _SLACK, _JOINT_SLACK = 1.15, 0.85
 _WITH_FAST = _milliseconds(40, 60, 80)
+# With less friction joints swing more, slowly: templates from this length on [s] keep a reserve for it.
+_SWINGING, _RESERVE = 0.080, 1.2
 
 
 def banks_of(kinds: Sequence[str], joints: Sequence[str], two_sided: bool, order: int | None) -> tuple[Bank, ...]:
@@ -133,7 +137,8 @@ def _joint_bank(kinds: Sequence[str], joints: Sequence[str], two_sided: bool, or
     templates: list[Template] = []
 
     def add(length: float, components: Iterable[Component]) -> None:
-        templates.append(Template(length, tuple(components), _JOINT_SLACK))
+        reserve = _RESERVE if length >= _SWINGING else 1.0
+        templates.append(Template(length, tuple(components), _JOINT_SLACK, reserve))
 
     sudden, power = (fast, 2.0) if fast else (list(slow.values()), 3.0)
     for length in _SHORT:
@@ -162,6 +167,7 @@ class Design:
     free: np.ndarray
     prior: FloatArray
     slack: FloatArray
+    reserve: FloatArray
 
     @property
     def arguments(self) -> tuple[np.ndarray, ...]:
@@ -190,6 +196,7 @@ def designed(
     free: list[bool] = []
     prior: list[float] = []
     slack: list[float] = []
+    reserve: list[float] = []
     first_column = 0
     known: set[tuple[int, int, tuple[Component, ...]]] = set()
     for number, (bank, (model, root)) in enumerate(zip(banks, models, strict=True)):
@@ -225,6 +232,7 @@ def designed(
             )
             prior.append(max(1.0, (_PRIOR + _PRIOR_LENGTHS * template.length) / period))
             slack.append(template.slack)
+            reserve.append(template.reserve)
         first_column += len(bank.columns)
     gram = _gram(groups, responses)
     return Design(
@@ -238,6 +246,7 @@ def designed(
         np.array(free, dtype=np.uint8),
         np.array(prior),
         np.array(slack),
+        np.array(reserve),
     )
 
 

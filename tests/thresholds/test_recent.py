@@ -15,7 +15,7 @@ def signals(count: int) -> list[Signal]:
     return [Signal(np.zeros(2), np.zeros((2, 1)), np.zeros((2, 1), dtype=np.uint8), "N") for _ in range(count)]
 
 
-def test_another_key_other_runs_or_another_order_are_learned_anew():
+def test_another_key_other_runs_or_another_order_are_learned_again():
     recent, runs = Recent(9), signals(3)
     made = iter(range(9))
 
@@ -26,7 +26,7 @@ def test_another_key_other_runs_or_another_order_are_learned_anew():
     assert [recent.value(key, items, learn) for key, items in asked] == [0, 1, 2, 3, 4, 0]
 
 
-def test_runs_that_are_gone_are_not_taken_for_new_ones_with_their_identity():
+def test_runs_that_are_gone_are_not_mistaken_for_new_ones_with_their_identity():
     recent = Recent(1000)
     for number in range(200):
         runs = signals(1)
