@@ -4,8 +4,8 @@
 
 The pulses in DATA_EMPS_PULSES.mat were added to the command. Taken out of the torque channel they are forces from
 outside, of known size and time, on a real machine: 5 V, 176 N, for 0.5 s. They rise in one sample, as a hard contact
-does, but they do not stop the axis. The start of a pulse opposes a backward stroke, its end a forward one. Signatures are
-learned from the four strokes of each direction in DATA_EMPS.mat, which are far too few: force = True.
+does, but they do not stop the axis. The start of a pulse opposes a backward stroke, its end a forward one.
+Signatures are learned from the four strokes of each direction in DATA_EMPS.mat, which are too few: force = True.
 """
 
 from __future__ import annotations
