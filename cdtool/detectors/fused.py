@@ -81,9 +81,10 @@ class Fused:
     [30.0, 90.0]
     """
 
-    sigma_acceleration: Gain = gain(0.1, "m/s2", "axis: noise of the accelerometer, structure included")
+    # No gain is searched: they shape one of several banks, and learning takes seconds.
+    sigma_acceleration: Gain = gain(0.1, "m/s2", "axis: noise of the accelerometer, structure included", searched=False)
     sigma_speed: Gain = gain(3.5e-3, "m/s", "axis: noise of the speed (standard deviation)", searched=False)
-    friction_drift: Gain = gain(220.0, "N s/m per sqrt(s)", "axis: how fast the friction may change")
+    friction_drift: Gain = gain(220.0, "N s/m per sqrt(s)", "axis: how fast the friction may change", searched=False)
     minimum_speed: Gain = gain(0.03, "m/s", "axis: below it the friction is not estimated", searched=False)
 
     name: ClassVar[str] = "fused"

@@ -494,24 +494,26 @@ def fit_autoregression(sections: Sequence[FloatArray], order: int) -> tuple[Floa
     """
     columns = len(sections[0])
     size = order * columns
-    inner, cross, outer = np.zeros((size, size)), np.zeros((size, columns)), np.zeros((columns, columns))
-    number = 0
+    # Products of each sample with the one j before it, summed, and what the ends of the sections add to them.
+    lagged, number = np.zeros((order + 1, columns, columns)), 0
+    begins, ends = [], []
     for section in sections:
         if number > _MOST_SAMPLES:
             break
-        part = section.T
-        if len(part) <= order:
+        long = section.shape[1]
+        if long <= order:
             continue
-        past = np.concatenate([part[order - i - 1 : len(part) - i - 1] for i in range(order)], axis=1)
-        now = part[order:]
-        inner += past.T @ past
-        cross += past.T @ now
-        outer += now.T @ now
-        number += len(now)
+        for lag in range(order + 1):
+            lagged[lag] += section[:, order:] @ section[:, order - lag : long - lag].T
+        begins.append(section[:, order - 1 :: -1].T[:order].ravel())
+        ends.append(section[:, : long - order - 1 : -1].T.ravel())
+        number += long - order
     if number <= size:
         raise NothingValidError(
             f"{number} samples in sections of more than {order}: too few for the model", "add runs, or a smaller order"
         )
+    products = _all_products(lagged, np.array(begins), np.array(ends))
+    outer, cross, inner = products[:columns, :columns], products[columns:, :columns], products[columns:, columns:]
     inner, cross, outer = inner / number + _RIDGE * np.eye(size), cross / number, outer / number
     solution = np.linalg.solve(inner, cross)
     covariance = outer - solution.T @ cross - cross.T @ solution + solution.T @ inner @ solution
@@ -521,6 +523,26 @@ def fit_autoregression(sections: Sequence[FloatArray], order: int) -> tuple[Floa
     root = (axes / np.sqrt(sizes)) @ axes.T
     model = np.ascontiguousarray(solution.reshape(order, columns, columns).transpose(0, 2, 1))
     return model, np.ascontiguousarray(root)
+
+
+def _all_products(lagged: FloatArray, begins: FloatArray, ends: FloatArray) -> FloatArray:
+    """Return the sums over k of y_{k-i} y_{k-j}' in blocks (i, j) from 0 to p, of those with i = 0: `lagged`.
+
+    S(i+1, j+1) is S(i, j), one sample earlier: with the first sample of each section more, and the last one less.
+    `begins` and `ends` (sections, p C): the first p samples of each section, and the last p, each the latest first.
+    """
+    blocks, columns = len(lagged), lagged.shape[1]
+    edge = begins.T @ begins - ends.T @ ends
+    products = np.empty((blocks * columns, blocks * columns))
+    for i in range(blocks):
+        rows = slice(i * columns, (i + 1) * columns)
+        products[rows, :columns] = lagged[i].T
+        if i == 0:
+            products[rows] = np.hstack(list(lagged))
+        else:
+            before = slice((i - 1) * columns, i * columns)
+            products[rows, columns:] = products[before, :-columns] + edge[before]
+    return products
 
 
 def usual_sizes(model: MatchedModel, pairs: Sequence[tuple[Recording, Signal]], factor: float) -> FloatArray:

@@ -284,3 +284,17 @@ def test_a_recording_without_motion_has_no_limit(fitted, runs):
     at_rest = Recording("rest", "rest", ("axis",), {"speed": still, "position": Series(TIME, np.zeros(N), "m")})
     statistic, _ = fitted.evaluate(at_rest, own)
     assert (statistic.status == Status.NO_LIMIT).all()
+
+
+@pytest.mark.parametrize(("columns", "order", "lengths"), [(2, 3, (50, 7, 3, 40)), (3, 1, (20, 5)), (1, 4, (30,))])
+def test_an_autoregression_is_the_least_squares_fit_to_all_sections(columns, order, lengths):
+    rng = np.random.default_rng(columns)
+    sections = [rng.normal(size=(columns, length)) for length in lengths]
+    rows, now = [], []
+    for section in sections:
+        for k in range(order, section.shape[1]):
+            rows.append(np.concatenate([section[:, k - i] for i in range(1, order + 1)]))
+            now.append(section[:, k])
+    expected = np.linalg.lstsq(np.array(rows), np.array(now), rcond=None)[0]
+    model, _ = fit_autoregression(sections, order)
+    np.testing.assert_allclose(model, expected.reshape(order, columns, columns).transpose(0, 2, 1), atol=1e-5)
