@@ -63,7 +63,7 @@ def check(folder: Path, seed: int, free: int, impacts: int, fresh: int, budget: 
     tuned, target = min(made, key=lambda item: item[0].honest.score)
     setup = read_benchmark_file(target / "benchmark.toml")
     groups = {
-        name: ImpactGroup(tuple(sorted((folder / "fresh" / name).iterdir())), 1.0)
+        name: ImpactGroup(tuple(sorted((folder / "fresh" / name).iterdir())), 1.0, is_impact_free=name == HOLDOUT)
         for name in ("stiff", "soft", HOLDOUT)
     }
     results = benchmark(replace(setup, impacts=groups), jobs=2).results

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cdtool.evaluation.statistics.interval import Interval
     from cdtool.evaluation.summary import Summary
     from cdtool.report.few_contacts import LatencyColumn
+    from cdtool.report.table import Cell
 
 _SHOWN = 10
 _HEADINGS = {
@@ -28,6 +29,13 @@ _HEADINGS = {
     "range": "range\nms",
     "P95": "P95\nms",
 }
+# Shorter headings of changed conditions, and what precedes the value of the unchanged machine in a cell.
+_CONDITION_HEADINGS = {
+    "alarming impact-free runs": "alarming",
+    "contacts not assessable": "n.a.",
+    "samples not assessable": "samples\nn.a.",
+}
+_UNCHANGED = "; unchanged "
 
 
 def show_table(evaluated: Evaluated) -> None:
@@ -45,6 +53,8 @@ def show_table(evaluated: Evaluated) -> None:
     table(columns, [_row(item, shown) for item in evaluated.summaries])
     if evaluated.kinds:
         _show_kinds(evaluated.kinds)
+    if evaluated.conditions:
+        _show_conditions(evaluated)
     provenance = evaluated.results.provenance
     # Mean and spread are those of the detected contacts.
     *most, last = (name for name in shown if name in ("median", "range", "P95"))
@@ -82,6 +92,29 @@ def _show_kinds(kinds: Sequence[Summary]) -> None:
     columns = [("group/kind", "left"), ("detector", "left")]
     columns += [(name, "right") for name in (*(_HEADINGS[name] for name in shown), "n", "missed", "n.a.")]
     table(columns, [_row(item, shown)[:-2] for item in kinds])
+
+
+def _show_conditions(evaluated: Evaluated) -> None:
+    """Print one row per changed condition and detector, each value with that of the unchanged machine in brackets."""
+    from cdtool.report.tables.conditions import conditions_table
+
+    found = conditions_table(evaluated)
+    columns = [
+        (_CONDITION_HEADINGS.get(column.heading, column.heading), "right" if column.numeric else "left")
+        for column in found.columns
+    ]
+    rows = [[_with_unchanged(cell) for cell in row] for row in found.rows]
+    table([columns[1], columns[0], *columns[2:]], [[row[1], row[0], *row[2:]] for row in rows])
+    say(
+        "changed conditions, in brackets the unchanged machine; alarming: impact-free operations with a false alarm; "
+        "ms: mean latency, or the median where fewer than ten contacts were detected; n.a.: not assessable"
+    )
+
+
+def _with_unchanged(cell: Cell) -> str:
+    """Return the text of a cell and, in brackets, the value of the unchanged machine."""
+    before = next((detail.removeprefix(_UNCHANGED) for detail in cell.details if detail.startswith(_UNCHANGED)), "")
+    return f"{cell.text} ({before})" if before else cell.text
 
 
 def show_conclusion(evaluated: Evaluated) -> None:

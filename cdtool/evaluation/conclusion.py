@@ -239,7 +239,8 @@ def limits_words(results: Results) -> str:
 def _profiles(results: Results) -> dict[str, str]:
     """The name of the profile of each group that has one: of the provenance, which a file may hold anything in."""
     listed = results.provenance.get("force_profiles")
-    found = dict(zip(values_of(results.forces, "group"), values_of(results.forces, "profile"), strict=True))
+    profiles = zip(values_of(results.forces, "group"), values_of(results.forces, "profile"), strict=True)
+    found = {group: profile for group, profile in profiles if group in results.groups}
     if isinstance(listed, Mapping):
         named = {str(group): item for group, item in listed.items() if isinstance(item, Mapping)}
         found |= {group: str(item.get("name", "")) for group, item in named.items() if group in results.groups}

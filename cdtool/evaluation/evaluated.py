@@ -9,17 +9,22 @@ from cdtool.evaluation.comparison import Comparison, compare_detectors
 from cdtool.evaluation.conclusion import conclude
 from cdtool.evaluation.limits import LimitRule, check_limits
 from cdtool.evaluation.results import Results
-from cdtool.evaluation.summary import Summary, at_worst, summarise, summarise_kinds
+from cdtool.evaluation.summary import Summary, at_worst, summarise, summarise_conditions, summarise_kinds
 
 
 @dataclass(frozen=True)
 class Evaluated:
-    """What reports show: they compute nothing themselves. `kinds` are summaries of one kind of contacts each."""
+    """What reports show: they compute nothing themselves.
+
+    `kinds` are summaries of one kind of contacts each, `conditions` those of groups of changed conditions, which count
+    in no other part.
+    """
 
     results: Results
     summaries: tuple[Summary, ...]
     comparisons: tuple[Comparison, ...]
     kinds: tuple[Summary, ...] = ()
+    conditions: tuple[Summary, ...] = ()
 
 
 def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
@@ -35,7 +40,8 @@ def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     Returns
     -------
     Evaluated
-        The results with limits and conclusion, the summaries, also by kind, and the comparisons of detectors.
+        The results with limits and conclusion, the summaries, also by kind and of changed conditions, and the
+        comparisons of detectors.
 
     Raises
     ------
@@ -47,10 +53,11 @@ def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     `cdtool.benchmark` and `cdtool.score` return evaluated results.
     """
     summaries, kinds = tuple(summarise(results)), tuple(summarise_kinds(results))
+    conditions = tuple(summarise_conditions(results))
     if limits:
-        lost = any(item.onset_holes or item.force_holes for item in summaries)
+        lost = any(item.onset_holes or item.force_holes for item in (*summaries, *conditions))
         largest = at_worst(results) if lost else None
-        worst = [*summarise(largest), *summarise_kinds(largest)] if largest else ()
-        results = replace(results, limits=check_limits(limits, summaries, worst, kinds))
+        worst = [*summarise(largest), *summarise_kinds(largest), *summarise_conditions(largest)] if largest else ()
+        results = replace(results, limits=check_limits(limits, summaries, worst, (*kinds, *conditions)))
     results = replace(results, conclusion=conclude(results, summaries))
-    return Evaluated(results, summaries, tuple(compare_detectors(results)), kinds)
+    return Evaluated(results, summaries, tuple(compare_detectors(results)), kinds, conditions)

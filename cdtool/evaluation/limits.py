@@ -83,11 +83,11 @@ def check_limits(
     rules: Sequence[LimitRule],
     summaries: Sequence[Summary],
     at_worst: Sequence[Summary] = (),
-    kinds: Sequence[Summary] = (),
+    named_only: Sequence[Summary] = (),
 ) -> tuple[LimitResult, ...]:
     """Check every rule against the metrics that it names; raises ConfigurationError if they do not exist.
 
-    A rule is about `kinds`, summaries of one kind of contacts, only if it names one.
+    A rule is about `named_only`, summaries of one kind of contacts or of a changed condition, only if it names one.
 
     `at_worst` are the same summaries with the worst values that missing load-cell samples allow: a limit that is
     met only without them is not assessable.
@@ -99,7 +99,7 @@ def check_limits(
     for rule in rules:
         named = [
             item for item in summaries if rule.detector in (ALL, item.detector) and rule.group in (ALL, item.group)
-        ] or [item for item in kinds if rule.detector in (ALL, item.detector) and rule.group == item.group]
+        ] or [item for item in named_only if rule.detector in (ALL, item.detector) and rule.group == item.group]
         if not named and (unscored := _unscored_kind(rule, summaries)):
             found += unscored
             continue

@@ -79,7 +79,7 @@ def recording_outcomes(results: Results) -> Iterator[RecordingOutcome]:
     """
     contacts = grouped(results.contacts, "group", "detector")
     true_contacts = _by_log(results.recordings, "contacts")
-    logs: dict[str, dict[str, None]] = {group: {} for group in results.groups}
+    logs: dict[str, dict[str, None]] = {group: {} for group in results.every_group}
     for group, name in (*true_contacts, *_by_log(results.contacts, "contact")):
         logs.setdefault(group, {})[name] = None
     alarms: dict[Pair, dict[str, list[FalseAlarmResult]]] = {}

@@ -147,6 +147,16 @@ class ExposureResult:
 
 
 @frozen
+class ConditionResult:
+    """One group of recordings of the machine under a changed condition: it is scored, and counts nowhere else."""
+
+    group: str = meant("name of the group in all rows: CONDITION/GROUP")
+    condition: str = meant("name of the changed condition")
+    counterpart: str = meant("group of the unchanged machine that it is compared with")
+    impact_free: bool = meant("whether its recordings have no contacts")
+
+
+@frozen
 class ForceStepResult:
     """One step of a force profile, compared with one contact or one test point."""
 
@@ -285,7 +295,7 @@ class Results:
 
     provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the figures")
     detectors: tuple[str, ...] = meant("full names")
-    groups: tuple[str, ...] = meant("groups of impacts, then the impact-free hold-out")
+    groups: tuple[str, ...] = meant("groups of the unchanged machine: of impacts, then the impact-free hold-out")
     contacts: Sequence[ContactResult] = meant("one row per contact and detector")
     false_alarms: Sequence[FalseAlarmResult] = meant("one row an alarm without a contact")
     exposure: tuple[ExposureResult, ...] = meant("one row per group and detector")
@@ -295,12 +305,18 @@ class Results:
     sweep: tuple[SweepResult, ...] = meant("latency against false alarms with all limits moved", default=())
     calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
+    conditions: tuple[ConditionResult, ...] = meant("groups of the machine under changed conditions", default=())
     skipped: Sequence[Skipped] = meant("what was left out", default=())
     findings: Sequence[RecordingFinding] = meant("findings about recordings that were used", default=())
     conclusion: ConclusionResult = field(
         default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
+
+    @property
+    def every_group(self) -> tuple[str, ...]:
+        """The groups of the unchanged machine, then those of changed conditions."""
+        return (*self.groups, *(item.group for item in self.conditions))
 
     @property
     def losses(self) -> Sequence[RecordingFinding]:

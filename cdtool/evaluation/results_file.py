@@ -289,12 +289,13 @@ def build(kind: type[Row], values: Any, where: str) -> Row:
 
 def _refuse_unlisted(results: Results) -> None:
     """Raise ValueError for a row of a detector or group that the results do not list."""
+    known = {"detectors": results.detectors, "groups": results.every_group}
     kinds = tuple(kind_group(group, " ")[:-1] for group in results.groups)  # STIFF/ in STIFF/KIND
     for table in _TABLES:
         for i, row in enumerate(getattr(results, table)):
             for name, listed in (("detector", "detectors"), ("group", "groups")):
                 value = getattr(row, name, None)
-                if value is not None and value not in getattr(results, listed):
+                if value is not None and value not in known[listed]:
                     if table == "limits" and name == "group" and value.startswith(kinds):
                         continue
                     where = f"results.{table}[{i}].{name}"

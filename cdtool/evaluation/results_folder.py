@@ -39,6 +39,8 @@ _PARTS: Mapping[str, tuple[str, ...]] = {
 }
 # Tables that also have columns of the recording.
 _OF_RECORDING = ("contacts", "false_alarms", "recordings")
+# Tables that a results.parquet of an earlier version does not have.
+_LATER = ("conditions",)
 # Tables of which there may be many rows, held as columns.
 _MANY = (*_PARTS, "skipped", "findings")
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
@@ -199,7 +201,11 @@ def read_tables(folder: Path) -> Results:
         if head.pop("kind") != KIND or head["schema_version"] != SCHEMA_VERSION:
             raise ValueError(f"this version of cdtool reads schema_version {SCHEMA_VERSION}")
         known = build(Results, {**head, **{name: [] for name in tables()}}, "results")
-        rows = {name: _read(folder / name, kind) for name, kind in tables().items()}
+        # A table that earlier versions did not write is empty.
+        rows = {
+            name: _read(folder / name, kind) if (folder / name).exists() or name not in _LATER else Rows(kind)
+            for name, kind in tables().items()
+        }
     except (ContentError, ValueError, KeyError, TypeError, AttributeError, OSError, ArrowException) as fault:
         reason = " ".join(str(fault).split())[:200]
         raise RecordingError(f"{folder}: damaged, or not a results.parquet: {reason}", _NEXT_STEP) from fault

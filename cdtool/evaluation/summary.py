@@ -34,6 +34,7 @@ class Summary:
     `clipped` of the detected contacts have a negative latency, counted as 0. `in_progress` contacts are not among
     `contacts`: they had begun when the recording did. `onset_holes` of the contacts may have begun where load-cell
     samples are missing: their latencies may be up to `later_ms` longer. In `force_holes` the peak may be unseen.
+    `alarming` of the operations have a false alarm.
     """
 
     detector: str
@@ -67,6 +68,7 @@ class Summary:
     onset_holes: int = 0
     later_ms: float = 0.0
     force_holes: int = 0
+    alarming: int = 0
 
     @property
     def watched(self) -> bool:
@@ -156,24 +158,38 @@ COUNTED_ALWAYS = frozenset(
 
 def summarise(results: Results) -> list[Summary]:
     """Return one Summary for each detector and group, in the order of the benchmark file; hold-out last."""
+    return _summaries(results, results.groups)
+
+
+def summarise_conditions(results: Results) -> list[Summary]:
+    """Return one Summary for each detector and group of a changed condition, in the order of the benchmark file."""
+    return _summaries(results, [item.group for item in results.conditions])
+
+
+def _summaries(results: Results, groups: Sequence[str]) -> list[Summary]:
     contacts = grouped(results.contacts, "detector", "group")
     forces = {group: _failed(items) for (group,), items in grouped(results.forces, "group").items()}
     false_alarms = Counter(
         zip(values_of(results.false_alarms, "detector"), values_of(results.false_alarms, "group"), strict=True)
     )
+    columns = (values_of(results.false_alarms, name) for name in ("detector", "group", "recording"))
+    alarming = Counter((detector, group) for detector, group, _ in set(zip(*columns, strict=True)))
     exposures = {(item.detector, item.group): item for item in results.exposure}
     clusters = campaigns(results)
     return [
-        _summary(
-            detector,
-            group,
-            contacts.get((detector, group), ()),
-            false_alarms[detector, group],
-            exposures.get((detector, group)),
-            clusters,
-            forces.get(group, math.nan),
+        replace(
+            _summary(
+                detector,
+                group,
+                contacts.get((detector, group), ()),
+                false_alarms[detector, group],
+                exposures.get((detector, group)),
+                clusters,
+                forces.get(group, math.nan),
+            ),
+            alarming=alarming[detector, group],
         )
-        for group in results.groups
+        for group in groups
         for detector in results.detectors
     ]
 

@@ -107,6 +107,20 @@ class PlotsLeftOut(TemplateFact):
 
 
 @frozen
+class ConditionsNotTunedOn(Fact):
+    """Changed conditions of the machine whose recordings tuning does not use."""
+
+    count: int
+
+    def sentence(self) -> str:
+        """Return how many, and where their results are."""
+        return (
+            f"{counted(self.count, 'changed condition')}: not used for tuning: the tuned benchmark files have them, "
+            "and cdtool benchmark scores them"
+        )
+
+
+@frozen
 class LimitsUnchecked(TemplateFact):
     """Limits that are set for detectors that were not run."""
 

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, groupby, islice
 
+from cdtool.evaluation.changed_conditions import ConditionRow, condition_rows
 from cdtool.evaluation.conclusion import ForceCheck, force_checks, force_missed, nothing_assessed
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.recording_outcomes import RecordingOutcome, recording_outcomes
@@ -19,6 +20,7 @@ from cdtool.evaluation.results import DAMAGED, ContactResult, LimitResult, Recor
 from cdtool.evaluation.summary import Summary, later_ms
 from cdtool.plain_text import counted
 from cdtool.report.number_text import number, spoken
+from cdtool.report.tables.conditions import condition_words
 from cdtool.report.tables.results import required, value_of
 
 # A CI system keeps every case in memory and in its database: of more cases than this a suite has those that did not
@@ -46,7 +48,7 @@ class Suite:
 
 
 def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
-    """Yield limits, force profiles, what was left out or damaged, recordings by detector and group, and kinds."""
+    """Yield limits, force profiles, what was left out, recordings by detector and group, conditions, and kinds."""
     results = evaluated.results
     if results.limits:
         yield Suite("limits", _bounded(map(_limit, results.limits)))
@@ -63,6 +65,8 @@ def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
     for pair, items in groupby(recording_outcomes(results), key=lambda item: (item.detector, item.group)):
         none = False
         yield Suite(".".join(pair), _bounded(_recording(item, pair in silent, pair in forbidden) for item in items))
+    if conditions := condition_rows(evaluated):
+        yield Suite("changed conditions", _bounded(map(_condition, conditions)))
     if evaluated.kinds:
         yield Suite("kinds", _bounded(map(_kind, evaluated.kinds)))
     if none:
@@ -133,6 +137,11 @@ def _kind(item: Summary) -> Case:
     words += f", {item.not_assessable} not assessable" if item.not_assessable else ""
     latency = f"; median latency {number(item.median_ms)} ms" if item.assessable else ""
     return Case(f"{item.detector}.{item.group}", lines=(words + latency,))
+
+
+def _condition(item: ConditionRow) -> Case:
+    """Return the results of a detector under a changed condition; limits on it are cases of their own."""
+    return Case(f"{item.detector}.{item.condition}", lines=(condition_words(item),))
 
 
 def _contact(item: ContactResult) -> str:

@@ -111,7 +111,10 @@ class Gathering:
         # The log of each trace that is kept, made or not, and the number of the operation in it.
         self._places: dict[int, tuple[_Place, int]] = {}
         self._place = _Place(0, "", Path())
-        self._choice = TraceChoice(sum(len(item.logs) for item in setup.impacts.values()))
+        self._choice = TraceChoice(
+            sum(len(setup.impacts[group].logs) for group in setup.groups),
+            frozenset(item.group for item in setup.conditions),
+        )
         # Time that all logs took [s].
         self.reading = self.detecting = 0.0
 
@@ -277,6 +280,7 @@ class Gathering:
             provenance={**provenance, "load_cell_sha256": self._beside} if self._beside else provenance,
             detectors=self.names,
             groups=self.setup.groups,
+            conditions=self.setup.conditions,
             recordings=self.recordings,
             contacts=self.contacts,
             false_alarms=self.false_alarms,

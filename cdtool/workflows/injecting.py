@@ -22,7 +22,7 @@ from cdtool.workflows.injection.injected_logs import CONTACTS, InjectedLogs, wri
 from cdtool.workflows.written_files import require_free_folder
 
 # Tables of the benchmark file that name logs of its own.
-_OF_LOGS = ("inject", "impacts", "learn", "holdout", "limits", "campaigns", "points", "onset", "machine")
+_OF_LOGS = ("inject", "impacts", "conditions", "learn", "holdout", "limits", "campaigns", "points", "onset", "machine")
 # Keys of [learn] beside its logs and the parts of them.
 _OF_LEARNING = ("until", "guard_s")
 

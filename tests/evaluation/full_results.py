@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from cdtool.evaluation.results import (
     CalibrationResult,
+    ConditionResult,
     ContactResult,
     ExposureResult,
     FalseAlarmResult,
@@ -55,5 +56,6 @@ FULL = replace(
     sweep=(SweepResult("momentum", "stiff", 5.5, 0, 9, 0.5, 3, 1, 1, 30.0, None),),
     calibration=(CalibrationResult("momentum", "1/1000op", 6.0, 3000, 5.0, 1),),
     limits=(LimitResult("momentum.*.missed", "momentum", "stiff", "missed", 1.0, None, 0.0, "violated", "1 is more"),),
+    conditions=(ConditionResult("winter/stiff", "winter", "stiff", False),),
     findings=(RecordingFinding("a.csv", "time: 1 gap", "loss", "sample_gaps", "time"),),
 )

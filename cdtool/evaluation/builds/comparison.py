@@ -145,7 +145,7 @@ def compare_builds(
     check_significance(significance)
     if not 0.0 < relevant_change <= 1.0:
         raise UsageError(f"relevant change is {relevant_change:g}", "give a share above 0 and up to 1, such as 0.1")
-    groups = [group for group in old.groups if group in new.groups]
+    groups = [group for group in old.every_group if group in new.every_group]
     detectors = [name for name in old.detectors if name in new.detectors]
     builds = (Build(old), Build(new))
     both = builds[0].held & builds[1].held
@@ -190,9 +190,9 @@ def _verdict(rows: Sequence[BuildRow]) -> Outcome:
 def _alone(one: Results, other: Results, builds: Sequence[Build]) -> list[str]:
     """What only the first holds: whole detectors, whole groups, then a detector in a group."""
     words = [f"detector {name}" for name in one.detectors if name not in other.detectors]
-    words += [f"group {name}" for name in one.groups if name not in other.groups]
-    known = ((group, name) for group in one.groups for name in one.detectors)
-    shared = [(group, name) for group, name in known if group in other.groups and name in other.detectors]
+    words += [f"group {name}" for name in one.every_group if name not in other.every_group]
+    known = ((group, name) for group in one.every_group for name in one.detectors)
+    shared = [(group, name) for group, name in known if group in other.every_group and name in other.detectors]
     held = builds[0].held - builds[1].held
     return words + [f"{name} in {group}" for group, name in shared if (name, group) in held]
 

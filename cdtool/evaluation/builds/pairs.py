@@ -38,7 +38,7 @@ def pair_recordings(old: Results, new: Results) -> dict[str, Pairing]:
     no difference would be the detector's.
     """
     onsets = (_onsets(old), _onsets(new))
-    shared = [group for group in old.groups if group in new.groups]
+    shared = [group for group in old.every_group if group in new.every_group]
     before, after = (grouped(results.recordings, "group") for results in (old, new))
     return {group: _pair(group, before.get((group,), ()), after.get((group,), ()), *onsets) for group in shared}
 

@@ -14,12 +14,13 @@ MOST_KEPT = MOST_STRIKING + MOST_SLOW + MOST_SAMPLED
 class TraceChoice:
     """Selection of at most `MOST_KEPT` operations, and one of each group, from operations in order.
 
-    `work` is the number of logs. The choice becomes stricter with each operation: one that is not kept when it is
-    offered is not kept later, and one that a choice after only some of these operations does not keep is not kept
-    either.
+    `work` is the number of logs, without those of `examples`: groups of which only one operation each is kept. The
+    choice becomes stricter with each operation: one that is not kept when it is offered is not kept later, and one that
+    a choice after only some of these operations does not keep is not kept either.
     """
 
     work: int
+    examples: frozenset[str] = frozenset()
     left_out: int = 0
     _striking: dict[int, str] = field(default_factory=dict)
     _sampled: set[int] = field(default_factory=set)
@@ -38,6 +39,8 @@ class TraceChoice:
         is_first = group not in self._first or panels > self._first[group][0]
         if is_first:
             self._first[group] = panels, number
+        if group in self.examples:
+            return number if is_first else None
         return number if self._taken_up(number, log, striking, slowest) or is_first else None
 
     def _taken_up(self, number: int, log: int, striking: str, slowest: float) -> bool:

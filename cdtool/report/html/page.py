@@ -18,7 +18,7 @@ from cdtool.report.writers.base import Report
 _REASONS = 10
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
-    *("not_met", "met", "results", "kinds", "injected", "comparisons", "force", "points", "forces"),
+    *("not_met", "met", "results", "kinds", "conditions", "injected", "comparisons", "force", "points", "forces"),
     *("recordings", "cases"),
     *("not_assessable", "skipped", "damaged", "findings", "calibration"),
 )

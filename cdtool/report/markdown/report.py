@@ -46,6 +46,8 @@ def to_markdown(report: Report, most: int = 60_000) -> str:
         results.append(_section(table, tail="\n\n".join(own)))
     if "kinds" in model.tables:
         results.append(_section(model.tables["kinds"]))
+    if "conditions" in model.tables:
+        results.append(_section(model.tables["conditions"], escape(model.notes["conditions"], None)))
     if model.notes["differences"]:
         lead = escape(model.notes["differences"], None)
         differences = model.tables.get("differences")

@@ -99,7 +99,7 @@ def _kinds(
     results: Results, traced: Collection[Log], logs: frozenset[Log]
 ) -> Iterator[tuple[str, Sequence[_Case], int]]:
     """Yield each kind of case in words, its listed cases, and how many there are."""
-    pairs = max(len(results.groups) * len(results.detectors), 1)
+    pairs = max(len(results.every_group) * len(results.detectors), 1)
     most = max(_MOST_OF_KIND // pairs, _FEWEST_OF_PAIR)
     failed = grouped(results.forces, "verdict").get(("fail",), ())
     worst = _worst(failed, ("group",), "peak_n", most * max(len(results.detectors), 1), traced)

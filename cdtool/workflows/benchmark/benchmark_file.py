@@ -17,7 +17,7 @@ from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
 from cdtool.evaluation.limits import ALL, LimitRule, read_limits
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import ConditionResult, Skipped
 from cdtool.evaluation.summary import kind_group
 from cdtool.evaluation.truth.labels import Labels
 from cdtool.evaluation.truth.onset_rule import LONGEST_HOLD, SAMPLE, OnsetRule
@@ -56,7 +56,8 @@ class ImpactGroup:
 
     A group of injected contacts has its own `machine_file`, exact `labels`, and detectors that it cannot test, each
     with the reason (`refused`). `injected` states how the contacts were made, for provenance; `made_from` has the
-    impact-free log of each of its logs.
+    impact-free log of each of its logs. A group that `is_impact_free` has no contacts: each alarm is a false one. A
+    group of a changed `condition` of the machine is compared with its `counterpart`, the group of the unchanged machine.
     """
 
     logs: tuple[Path, ...]
@@ -67,11 +68,16 @@ class ImpactGroup:
     refused: Mapping[str, str] = field(default_factory=dict)
     injected: Mapping[str, Any] | None = None
     made_from: Mapping[Path, Path] = field(default_factory=dict)
+    is_impact_free: bool = False
+    condition: str = ""
+    counterpart: str = ""
 
 
 @dataclass(frozen=True)
 class BenchmarkFile:
-    """A validated benchmark file with resolved globs; `impacts` are the scored groups, hold-out last.
+    """A validated benchmark file with resolved globs.
+
+    `impacts` are the scored groups: those of impacts, the hold-out, then those of changed conditions.
 
     `rule` is the threshold rule with its settings. `synchronisation` [s]: largest offset of the load cell's clock, or
     not known before the logs are audited if `measures_synchronisation`.
@@ -129,14 +135,16 @@ class BenchmarkFile:
             "onset": self.onset.described,
             **({"force": reduction} if reduction else {}),
             "separation_s": self.onset.separation,
-            "window_s": {name: group.window for name, group in self.impacts.items() if name != HOLDOUT},
+            "window_s": {name: self.impacts[name].window for name in self.groups_of_impacts},
             "operations": self.operations,
             "watched_joints": ", ".join(self.watched) or None,
             "label_file": self.labels.source if self.labels else None,
             **({"not_contacts": list(self.labels.not_contacts)} if self.labels and self.labels.not_contacts else {}),
             "synchronisation_s": "measured" if self.measures_synchronisation else self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
-            "force_profiles": {name: asdict(group.force) for name, group in self.impacts.items() if group.force},
+            "force_profiles": {
+                name: asdict(profile) for name in self.groups_of_impacts if (profile := self.impacts[name].force)
+            },
             "sections": self._in_words(self.sections),
         }
 
@@ -157,7 +165,7 @@ class BenchmarkFile:
         """Return the scored logs that are also learned from: each is scored with what the others gave."""
         if self.guard is None and not self.learned_sections:
             return ()
-        logs = [path for name, group in self.impacts.items() if name != HOLDOUT for path in group.logs]
+        logs = _scored(self.impacts)
         if self.has_runs:
             return tuple(log for log in logs if any(_may_share_a_run(log, other) for other in self.learn))
         learned = set(resolve_all(self.learn))
@@ -218,8 +226,30 @@ class BenchmarkFile:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Return the impact groups, then the hold-out."""
-        return tuple(self.impacts)
+        """Return the impact groups, then the hold-out, without those of changed conditions."""
+        return tuple(name for name, group in self.impacts.items() if not group.condition)
+
+    @property
+    def groups_of_impacts(self) -> tuple[str, ...]:
+        """Return the groups of impacts of the unchanged machine."""
+        return tuple(name for name in self.groups if not self.impacts[name].is_impact_free)
+
+    @property
+    def conditions(self) -> tuple[ConditionResult, ...]:
+        """Return the groups of changed conditions."""
+        return tuple(
+            ConditionResult(name, group.condition, group.counterpart, group.is_impact_free)
+            for name, group in self.impacts.items()
+            if group.condition
+        )
+
+    def is_impact_free(self, group: str) -> bool:
+        """Return whether the logs of a group are free of impacts; of a log in no group it is not known."""
+        return group in self.impacts and self.impacts[group].is_impact_free
+
+    def is_condition(self, group: str) -> bool:
+        """Return whether the logs of a group are of a changed condition."""
+        return group in self.impacts and bool(self.impacts[group].condition)
 
 
 def read_benchmark_file(
@@ -258,11 +288,11 @@ def read_benchmark_file(
     mass_before_cell = _mass_before_cell(force)
     window = root.number("window_s", 1.0, above=0.0)
     impacts, sections = _groups(root, found, window, force)
-    inject = _read_inject(root, found, operations, tuple(impacts))
-    learn = _under_scored_paths(learn, _scored(impacts, HOLDOUT))
+    inject = _read_inject(root, found, operations, impacts)
+    learn = _under_scored_paths(learn, _scored(impacts, impact_free=True))
     onset = root.table("onset")
     migrated = migrated_onset(onset)
-    labels = labels_of(onset, found, _scored(impacts, HOLDOUT), tuple(learn))
+    labels = labels_of(onset, found, _scored(impacts, impact_free=True), tuple(learn))
     benchmark = BenchmarkFile(
         path=file,
         machine_file=machine_file,
@@ -281,13 +311,18 @@ def read_benchmark_file(
         mass_before_cell=mass_before_cell,
         learn=tuple(learn),
         impacts=impacts,
-        campaigns=named_logs(root.table("campaigns"), found, _scored(impacts, HOLDOUT)),
+        campaigns=named_logs(root.table("campaigns"), found, _scored(impacts, impact_free=True)),
         points=named_logs(root.table("points"), found, _scored(impacts)),
         limits=read_limits(
             root.table("limits"),
             [*_names(machine_file, names), *((name, name) for name in also_known)],
             (*impacts, *(_injected_groups(inject, machine_file) if inject else ())),
-            [kind_group(group, kind) for group in impacts for kind in _kinds(machine_file, labels)],
+            [
+                kind_group(name, kind)
+                for name, group in impacts.items()
+                if not group.condition
+                for kind in _kinds(machine_file, labels)
+            ],
         ),
         digest=hashlib.sha256(read_bytes(file, ConfigurationError)).hexdigest(),
         window=window,
@@ -306,7 +341,9 @@ def read_benchmark_file(
     return benchmark
 
 
-def _read_inject(root: Table, found: LogsOf, operations: str, groups: tuple[str, ...]) -> InjectSection | None:
+def _read_inject(
+    root: Table, found: LogsOf, operations: str, groups: Mapping[str, ImpactGroup]
+) -> InjectSection | None:
     if "inject" not in root:
         return None
     if found.runs:
@@ -315,7 +352,7 @@ def _read_inject(root: Table, found: LogsOf, operations: str, groups: tuple[str,
         root.table("inject"),
         found,
         found.machine_file.machine.joints,
-        tuple(name for name in groups if name != HOLDOUT),
+        tuple(name for name, group in groups.items() if not group.is_impact_free and not group.condition),
     )
     for name in groups:
         if name.startswith(f"{INJECTED}_"):
@@ -392,7 +429,7 @@ def _guard(learn: Table) -> float | None:
 def _groups(
     root: Table, found: LogsOf, window: float, force: Table
 ) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
-    """Return the groups of impacts, then the hold-out, and the sections of their logs."""
+    """Return the groups of impacts, the hold-out and those of changed conditions, and the sections of their logs."""
     tables = root.table("impacts")
     if HOLDOUT in tables.values:
         raise tables.fault(
@@ -418,14 +455,51 @@ def _groups(
     if HOLDOUT in root:
         logs = found.sections(root.table(HOLDOUT))
         sections |= logs
-        groups[HOLDOUT] = ImpactGroup(tuple(logs), window)
+        groups[HOLDOUT] = ImpactGroup(tuple(logs), window, is_impact_free=True)
     if "limits" in force and not any(group.force for group in groups.values()):
         raise force.fault(
             "limits", "is given, but no profile is selected", f"set profile to one of {', '.join(profiles)}"
         )
     if not groups and "inject" not in root:
         raise root.fault("impacts", "is missing", "define groups of impact logs: [impacts.stiff] logs = [...]")
+    changed, of_changed = _conditions(root.table("conditions"), found, window, groups)
+    sections |= of_changed
+    groups |= changed
     return groups, {path: section for path, section in sections.items() if section}
+
+
+def _conditions(
+    tables: Table, found: LogsOf, window: float, groups: Mapping[str, ImpactGroup]
+) -> tuple[dict[str, ImpactGroup], dict[Path, LogSection]]:
+    """Return the groups of changed conditions of the machine, as CONDITION/GROUP, and the sections of their logs.
+
+    A group of impacts has the window and the force profile of the group of the unchanged machine with its name.
+    """
+    changed: dict[str, ImpactGroup] = {}
+    sections: dict[Path, LogSection] = {}
+    struck = [name for name in groups if name != HOLDOUT]
+    for condition in tables.values:
+        table = tables.table(condition)
+        named = {HOLDOUT: table.table(HOLDOUT)} if HOLDOUT in table else {}
+        impacts = table.table("impacts")
+        for name in impacts.values:
+            if name not in struck:
+                raise impacts.fault(name, "is not a group of [impacts]", nearest(name, struck))
+            named[name] = impacts.table(name)
+        table.finish()
+        if not condition.strip():
+            raise tables.fault(condition, "has no name", "give it a name")
+        if not named:
+            raise tables.fault(condition, "has no logs", "add holdout.logs, impacts.GROUP.logs or both")
+        for name, table_of_logs in named.items():
+            group = f"{condition}/{name}"
+            if group in (*groups, *changed) or condition in groups:
+                raise tables.fault(condition, "is the name of a group", "choose another name for the condition")
+            logs = found.sections(table_of_logs)
+            sections |= logs
+            unchanged = groups.get(name, ImpactGroup((), window, is_impact_free=True))
+            changed[group] = replace(unchanged, logs=tuple(logs), condition=condition, counterpart=name)
+    return changed, sections
 
 
 def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:
@@ -452,9 +526,9 @@ def _mass_before_cell(force: Table) -> float:
     return mass
 
 
-def _scored(groups: Mapping[str, ImpactGroup], *more: str) -> list[Path]:
-    """Return the logs of all groups of impacts, and of the hold-out if it is among `more`."""
-    return [path for name, group in groups.items() if name != HOLDOUT or name in more for path in group.logs]
+def _scored(groups: Mapping[str, ImpactGroup], *, impact_free: bool = False) -> list[Path]:
+    """Return the logs of all groups of impacts, and with `impact_free` those of the others."""
+    return [path for group in groups.values() if impact_free or not group.is_impact_free for path in group.logs]
 
 
 def _under_scored_paths(learn: Mapping[Path, LogSection], scored: Sequence[Path]) -> dict[Path, LogSection]:
@@ -481,9 +555,9 @@ def _refuse_overlap(benchmark: BenchmarkFile) -> None:
     scored: dict[Path, str] = {}
     logs = [(name, path) for name, group in benchmark.impacts.items() for path in group.logs]
     for (name, path), true in zip(logs, resolve_all(path for _, path in logs), strict=True):
-        if true in learned and (name == HOLDOUT or not _ends_early(benchmark, true)):
+        if true in learned and (benchmark.is_impact_free(name) or not _ends_early(benchmark, true)):
             hint = "use a recording either in [learn] or for scoring"
-            if name != HOLDOUT:
+            if not benchmark.is_impact_free(name):
                 hint += ', or learn from what is before its contact: [learn] until = "onset"'
             raise ConfigurationError(f"{benchmark.path}: {path} is both learned from and scored", hint)
         if true in scored:

@@ -20,7 +20,7 @@ from cdtool.motion.applicable import HOLD
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import FloatArray
 from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, ImpactGroup
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, ImpactGroup
 from cdtool.workflows.benchmark.learned import Learned
 from cdtool.workflows.runs import shown_path
 from cdtool.workflows.store.digest import code_version, combined, digest_of
@@ -83,7 +83,7 @@ class Determinants:
     def _groups(self) -> dict[str, str]:
         """Return the digest of the settings of each group."""
         return {
-            name: digest_of(name, name == HOLDOUT, group.window, group.force, group.labels, _own_channels(group))
+            name: digest_of(name, group.is_impact_free, group.window, group.force, group.labels, _own_channels(group))
             for name, group in self.setup.impacts.items()
         }
 

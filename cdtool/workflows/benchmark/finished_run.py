@@ -26,7 +26,8 @@ _AT_ONCE = 4096
 # What the logs add to the provenance.
 _FROM_LOGS = ("units", "load_cell_sha256")
 _HEAD = "head"
-_SUMMARIES, _KINDS, _COMPARISONS, _CONCLUSION = "summaries", "kinds", "comparisons", "conclusion"
+_SUMMARIES, _KINDS, _CONDITIONS = "summaries", "kinds", "conditions_summaries"
+_COMPARISONS, _CONCLUSION = "comparisons", "conclusion"
 _Summaries, _Comparisons = tuple[Summary, ...], tuple[Comparison, ...]
 
 
@@ -59,6 +60,7 @@ class FinishedRun:
             (_HEAD, json.dumps(head)),
             (_SUMMARIES, encoded(self.evaluated.summaries, _Summaries)),
             (_KINDS, encoded(self.evaluated.kinds, _Summaries)),
+            (_CONDITIONS, encoded(self.evaluated.conditions, _Summaries)),
             (_COMPARISONS, encoded(self.evaluated.comparisons, _Comparisons)),
             (_CONCLUSION, encoded(results.conclusion, ConclusionResult)),
         ]
@@ -100,6 +102,7 @@ class FinishedRun:
                 decoded(parts[_SUMMARIES], _Summaries),
                 decoded(parts[_COMPARISONS], _Comparisons),
                 decoded(parts[_KINDS], _Summaries),
+                decoded(parts[_CONDITIONS], _Summaries),
             )
             return cls(evaluated, decoded(head["traces"], tuple[TraceKey, ...]), head["failed"])
         except (KeyError, TypeError) as fault:

@@ -18,7 +18,7 @@ from cdtool.log_section import LogSection
 from cdtool.operations import RunCut
 from cdtool.plain_text import counted
 from cdtool.remote.remote_path import location
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.execution.workers import Workers, in_order
 from cdtool.workflows.runs import named_on_load_side, runs_of
@@ -79,7 +79,7 @@ def with_synchronisation(
         return setup, []
     from cdtool.workflows.log_checks.synchronisation import latency_findings
 
-    work = [(group, path) for group, item in setup.impacts.items() if group != HOLDOUT for path in item.logs]
+    work = [(group, path) for group, item in setup.impacts.items() if not item.is_impact_free for path in item.logs]
     audits = in_order(_LogAudit(setup), work, len(work), workers, of_lost=_not_audited)
     audited = [item for log in audits for item in log]
     found = _of_all(audited)

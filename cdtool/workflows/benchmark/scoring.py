@@ -30,7 +30,7 @@ from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import Contact, FloatArray, Recording
 from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.force_rows import force_rows
 from cdtool.workflows.benchmark.left_out import LeftOut
 from cdtool.workflows.contacts.impact_free import without_contacts
@@ -258,7 +258,7 @@ def _log_to_score(setup: BenchmarkFile, group: str, log: Path, load: _WholeLog |
     section = setup.sections.get(log, _WHOLE)
     recording = section.of(whole)
     operations = operations_of(recording, setup.operations)
-    if group == HOLDOUT:
+    if setup.is_impact_free(group):
         unwanted: Sequence[Contact] = unwanted_contacts(whole, rules)
         return LogToScore(recording, operations, (), section.contacts_of(whole, unwanted) if section else unwanted)
     contacts: Sequence[Contact] = true_contacts(whole, rules, path) if group else any_contacts(whole, rules)
@@ -291,7 +291,7 @@ def _score(
     scored.reading = perf_counter() - begin
     scored.source, scored.log, scored.truth = recording.source, recording, tuple(contacts)
     scored.findings += lost(recording)
-    if group == HOLDOUT:
+    if setup.is_impact_free(group):
         operations, touched = without_contacts(operations, unwanted)
         scored.skipped += touched
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
@@ -315,7 +315,9 @@ def _score(
         if unseen:
             text = f"{', '.join(unseen)}: no load-cell force to compare with {profile.name}"
             scored.skipped.append(Skipped(recording.name, text))
-    scored.judged = [_swept(item, setup, rules.window, factors) for item in matched.judged]
+    # The curve of latency against false alarms is that of the unchanged machine.
+    moved = {} if setup.is_condition(group) else factors
+    scored.judged = [_swept(item, setup, rules.window, moved) for item in matched.judged]
     scored.detecting = perf_counter() - begin - scored.reading
     return scored
 

@@ -16,7 +16,7 @@ from cdtool.injection.assumption import Assumption, ControllerReaction, assumpti
 from cdtool.injection.refusal import refusal
 from cdtool.machine_file import read_machine_file
 from cdtool.remote.remote_path import joined
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, ImpactGroup
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, ImpactGroup
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.injection.inject_section import InjectSection, NamedObstacle
 from cdtool.workflows.injection.injected_logs import (
@@ -90,9 +90,9 @@ def with_groups(setup: BenchmarkFile, section: InjectSection, injected: Injected
             groups[name] = ImpactGroup(
                 tuple(made_from), setup.window, None, machine_file, labels, refused, stated, made_from
             )
-    real = {name: group for name, group in setup.impacts.items() if name != HOLDOUT}
-    holdout = {HOLDOUT: setup.impacts[HOLDOUT]} if HOLDOUT in setup.impacts else {}
-    return replace(setup, impacts={**real, **groups, **holdout}, inject=None, not_injected=injected.skipped)
+    others = {name: group for name, group in setup.impacts.items() if group.is_impact_free or group.condition}
+    real = {name: group for name, group in setup.impacts.items() if name not in others}
+    return replace(setup, impacts={**real, **groups, **others}, inject=None, not_injected=injected.skipped)
 
 
 def _refused(setup: BenchmarkFile, section: InjectSection, reaction: ControllerReaction) -> dict[str, str]:

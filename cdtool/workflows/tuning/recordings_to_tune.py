@@ -11,11 +11,13 @@ from pathlib import Path
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.findings import Finding
+from cdtool.findings.scoring import ConditionsNotTunedOn
 from cdtool.operations import Operation
 from cdtool.plain_text import counted
 from cdtool.recording import Contact
 from cdtool.tuning.recordings import FreeRun, StruckLog, TuningRecordings
-from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
 from cdtool.workflows.contacts.matched_log import contacts_by_operation, force_curves
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
@@ -40,13 +42,15 @@ class ReadRecordings:
 def read_recordings(
     setup: BenchmarkFile, budget: Budget, seed: int, workers: Workers, progress: Progress | None = None
 ) -> ReadRecordings:
-    """Read the impact-free runs and the logs with contacts of a benchmark file; the hold-out is not touched.
+    """Read the impact-free runs and the logs with contacts of a benchmark file.
+
+    The hold-out and changed conditions of the machine are not touched: they show what was tuned as it is for others.
 
     Raises UsageError if there are too few runs for the budget, or no contacts.
     """
     runs = load_runs(setup.learn, setup.machine_file, setup.run_reading(workers))
     check_enough(budget, runs.operations)
-    listed = [(name, path) for name, group in setup.impacts.items() if name != HOLDOUT for path in group.logs]
+    listed = [(name, path) for name in setup.groups_of_impacts for path in setup.impacts[name].logs]
     read = in_order(_Reading(setup), listed, len(listed), workers, progress=progress, together=8)
     struck: list[StruckLog] = []
     skipped: list[Skipped] = []
@@ -57,7 +61,10 @@ def read_recordings(
         raise UsageError(f"{setup.path}: no contact to tune on", "add logs with contacts under [impacts], or [inject]")
     checkable = is_checkable(budget, runs.operations)
     recordings = in_folds(runs.operations, struck, setup.split, seed, budget, is_nested=checkable)
-    return ReadRecordings(runs, recordings, (*runs.skipped, *skipped), runs.findings)
+    changed = len({item.condition for item in setup.conditions})
+    unused = [Finding(ConditionsNotTunedOn(changed), severity="note")] if changed else []
+    findings = (*runs.findings, *(RecordingFinding.of(str(setup.path), item) for item in unused))
+    return ReadRecordings(runs, recordings, (*runs.skipped, *skipped), findings)
 
 
 @dataclass(frozen=True)

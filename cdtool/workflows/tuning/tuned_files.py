@@ -115,9 +115,13 @@ def _rebase(document: Any, base: Path, folder: Path) -> None:
     for name in _WITH_LOGS:
         if name in document:
             _rebase_logs(document[name], base, folder)
-    for name in _OF_TABLES:
-        for table in document.get(name, {}).values():
+    of_conditions = document.get("conditions", {}).values()
+    impacts = [condition["impacts"] for condition in of_conditions if "impacts" in condition]
+    for tables in (*(document.get(name, {}) for name in _OF_TABLES), *impacts):
+        for table in tables.values():
             _rebase_logs(table, base, folder)
+    for condition in of_conditions:
+        _rebase_logs(condition.get("holdout", {}), base, folder)
     if "labels" in document.get("onset", {}):
         document["onset"]["labels"] = LABELS
     for name, key in (("force", "limits"), ("inject", "obstacle_file"), ("inject", "folder")):

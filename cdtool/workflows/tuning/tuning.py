@@ -43,7 +43,6 @@ from cdtool.tuning.tuned import (
 )
 from cdtool.value_words import value_in_words
 from cdtool.workflows.benchmark.benchmark_file import (
-    HOLDOUT,
     BenchmarkFile,
     read_benchmark_file,
     refuse_limits_by_hand,
@@ -242,7 +241,7 @@ def _with_impacts(
     setup: BenchmarkFile, impacts: str | None, workers: Workers, progress: Progress | None
 ) -> BenchmarkFile:
     """Return the benchmark with the contacts to tune on; raises UsageError if two kinds would be mixed unasked."""
-    real = [name for name in setup.impacts if name != HOLDOUT]
+    real = setup.groups_of_impacts
     if impacts is None and real and setup.inject is not None:
         raise UsageError(
             f"{setup.path} has real contacts ({', '.join(real)}) and injected ones",
@@ -257,8 +256,8 @@ def _with_impacts(
     setup = with_injected(setup, workers, progress)
     if impacts != "injected":
         return setup
-    kept = {name: group for name, group in setup.impacts.items() if group.injected is not None or name == HOLDOUT}
-    return replace(setup, impacts=kept)
+    left_out = [name for name in setup.groups_of_impacts if setup.impacts[name].injected is None]
+    return replace(setup, impacts={name: group for name, group in setup.impacts.items() if name not in left_out})
 
 
 @dataclass(frozen=True)

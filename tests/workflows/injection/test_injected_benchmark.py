@@ -305,3 +305,17 @@ def test_a_dry_run_counts_the_contacts_that_are_not_made_yet_and_writes_nothing(
     done = command(*words)
     assert "would be made first" not in done.out
     assert "injected/injected_stiff/" in done.out and "1 of 1 recording would be computed" in done.out
+
+
+def test_changed_conditions_are_scored_beside_injected_contacts_and_not_copied(gate: Path) -> None:
+    conditions = (
+        '[impacts.stiff]\nlogs = ["stiff/03.csv"]\n'
+        '[conditions.worn]\nholdout.logs = ["holdout/04.csv"]\nimpacts.stiff.logs = ["soft/03.csv"]\n'
+    )
+    path = write(gate, INJECT + conditions)
+    results = cdtool.benchmark(path).results
+    assert results.groups == ("stiff", "injected_stiff")
+    assert [item.group for item in results.conditions] == ["worn/holdout", "worn/stiff"]
+    assert {row.group for row in results.recordings} == set(results.every_group)
+    cdtool.inject(path, gate / "out")
+    assert read_benchmark_file(gate / "out" / "benchmark.toml").conditions == ()

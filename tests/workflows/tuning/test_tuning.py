@@ -211,6 +211,14 @@ def test_without_contacts_there_is_nothing_to_tune_on(gate):
         tune(replace(setup, impacts={}), OPTIONS)
 
 
+def test_changed_conditions_are_not_tuned_on(quick):
+    winter = replace(quick.impacts["stiff"], condition="winter", counterpart="stiff")
+    made = tune(replace(quick, impacts={**quick.impacts, "winter/stiff": winter}), QUICK)
+    assert set(made.groups) == {"stiff", "soft"}
+    (note,) = [item for item in made.findings if item.kind == "conditions_not_tuned_on"]
+    assert note.severity == "note" and note.reason.startswith("1 changed condition: not used for tuning")
+
+
 def test_real_and_injected_contacts_are_not_mixed_unasked(gate, tmp_path):
     model = "[model.drive]\nstiffness = 8e4\n[model.controller]\nperiod = 0.001\nspeed_gain = 4300\n"
     machine = (gate / "machine.toml").read_text(encoding="utf-8")

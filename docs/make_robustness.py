@@ -1,0 +1,593 @@
+"""Write docs/robustness.md: how every detector with every threshold performs when a simulated machine has changed.
+
+    python docs/make_robustness.py                       # simulate and score everything: about 20 minutes on two cores
+    python docs/make_robustness.py --page                # only write the page again, from docs/robustness.json
+    python docs/make_robustness.py --machines gate --seeds 1 --runs 4 --impacts 2 -o try
+
+Each seed of a machine: runs to learn from and recordings of the machine as it is, and of each change; a benchmark file
+with [conditions] for each threshold. Results of all seeds are added up in robustness.json, from which the page is made:
+every sentence about the results follows from them by a rule in this file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from cdtool import benchmark, simulate_arm, simulate_gate
+from cdtool.detectors import DETECTORS
+from cdtool.evaluation.changed_conditions import OnMachine, condition_rows
+from cdtool.evaluation.statistics.rates import binomial_share
+from cdtool.plain_text import counted
+from cdtool.simulation.changed_machine import ChangedMachine
+from cdtool.thresholds import THRESHOLDS
+
+DOCS = Path(__file__).resolve().parent
+PAGE, RESULTS, COMMAND = "robustness.md", "robustness.json", "python docs/make_robustness.py"
+FIRST_SEED = 701
+LEARNED_RUNS = 30
+GROUPS = ("stiff", "soft")
+UNCHANGED = "as learned"
+CHANGES = {
+    "friction +20 %": ChangedMachine(friction=1.2),
+    "friction -20 %": ChangedMachine(friction=0.8),
+    "speed +20 %": ChangedMachine(speed=1.2),
+    "speed +10 %": ChangedMachine(speed=1.1),
+    "speed -10 %": ChangedMachine(speed=0.9),
+    "speed -20 %": ChangedMachine(speed=0.8),
+    "mass +10 %": ChangedMachine(mass=1.1),
+    "current +0.1 A": ChangedMachine(current_offset=0.1),
+    "acceleration +0.05 m/s²": ChangedMachine(acceleration_offset=0.05),
+    "motor +10 K": ChangedMachine(warming=10.0),
+}
+STATES = (UNCHANGED, *CHANGES)
+SIMULATORS: Mapping[str, Callable[..., int]] = {"gate": simulate_gate, "arm": partial(simulate_arm, trial=1)}
+TITLES = {"gate": "Sliding gate", "arm": "Arm, hit on its first link"}
+# The signature with options that help, as lines of [signature], and the threshold that a detector brings.
+FOLLOWING, OWN = "signature, adaptive_level", "its own"
+OPTIONS = {FOLLOWING: "adaptive_level = 6"}
+# The largest shares of alarming runs, and of runs, contacts and further samples that are not assessable, with which a
+# combination of a detector and a threshold tolerates a change.
+MOST_ALARMING, MOST_NOT_ASSESSABLE = 0.05, 0.1
+# A threshold that is so many times slower as learned, in stiff or soft contacts, is not named as one that helps.
+MOST_SLOWER = 2.0
+PAIRS = {
+    "friction ±20 %": ("friction +20 %", "friction -20 %"),
+    "speed ±10 %": ("speed +10 %", "speed -10 %"),
+    "speed ±20 %": ("speed +20 %", "speed -20 %"),
+}
+SPEEDS = (*PAIRS["speed ±10 %"], *PAIRS["speed ±20 %"])
+_MOST_NAMED = 4
+
+CONDITION = """
+[conditions."{change}"]
+holdout.logs = ["{folder}/holdout/*.csv"]
+impacts.stiff.logs = ["{folder}/stiff/*.csv"]
+impacts.soft.logs = ["{folder}/soft/*.csv"]
+"""
+
+
+@dataclass
+class Cell:
+    """A detector with a threshold in one state of a machine: counts, and the sum of the latencies [ms] by group.
+
+    `alarming` of `assessable` impact-free runs alarm, of `runs`. Of `contacts` some are missed or not assessable.
+    `unassessed` is the sum over the seeds of the share of the samples that were not assessable.
+    """
+
+    alarming: int = 0
+    assessable: int = 0
+    runs: int = 0
+    contacts: int = 0
+    missed: int = 0
+    not_assessable: int = 0
+    seeds: int = 0
+    unassessed: float = 0.0
+    detected: dict[str, int] = field(default_factory=lambda: dict.fromkeys(GROUPS, 0))
+    latency_sum: dict[str, float] = field(default_factory=lambda: dict.fromkeys(GROUPS, 0.0))
+
+    def add(self, seen: OnMachine) -> None:
+        """Add the results of a benchmark."""
+        alarming, assessable = seen.alarming
+        self.alarming += alarming
+        self.assessable += assessable
+        self.runs += seen.free.operations if seen.free else 0
+        not_assessable, contacts = seen.not_assessable
+        self.contacts += contacts
+        self.not_assessable += not_assessable
+        self.missed += seen.missed[0]
+        self.seeds += 1
+        # A detector that fails on every log has no sample.
+        self.unassessed += 1.0 if math.isnan(seen.not_assessable_share) else seen.not_assessable_share
+        for group, summary in seen.struck.items():
+            if summary.detected:
+                self.detected[group] += summary.detected
+                self.latency_sum[group] += summary.detected * summary.mean_ms
+
+    def to_list(self) -> list[float]:
+        """Return the values as they are in robustness.json."""
+        counts = [self.alarming, self.assessable, self.runs, self.contacts, self.missed, self.not_assessable]
+        counts += [self.seeds, *self.detected.values()]
+        return [*counts, *(round(total, 1) for total in self.latency_sum.values()), round(self.unassessed, 3)]
+
+    @classmethod
+    def of_list(cls, values: Sequence[float]) -> Cell:
+        """Return the cell of these values."""
+        *counts, stiff, soft, stiff_sum, soft_sum, unassessed = values
+        detected = dict(zip(GROUPS, (int(stiff), int(soft)), strict=True))
+        latencies = dict(zip(GROUPS, (stiff_sum, soft_sum), strict=True))
+        alarming, assessable, runs, contacts, missed, not_assessable, seeds = map(int, counts)
+        return cls(alarming, assessable, runs, contacts, missed, not_assessable, seeds, unassessed, detected, latencies)
+
+    def mean(self, group: str) -> float:
+        """Return the mean latency [ms] of the detected contacts; NaN without any."""
+        return self.latency_sum[group] / self.detected[group] if self.detected[group] else math.nan
+
+    @property
+    def typical(self) -> float:
+        """Return the geometric mean of the mean latencies [ms]; infinite where a group has none."""
+        means = [self.mean(group) for group in GROUPS]
+        return math.inf if any(map(math.isnan, means)) else math.exp(sum(map(math.log, means)) / len(means))
+
+    @property
+    def alarming_share(self) -> float:
+        """Return the share of the assessable runs that alarm; NaN without any."""
+        return self.alarming / self.assessable if self.assessable else math.nan
+
+    def is_assessable(self, unchanged: Cell) -> bool:
+        """Whether nearly all runs and contacts could be assessed, and hardly fewer samples than of another cell."""
+        return (
+            self.runs - self.assessable <= MOST_NOT_ASSESSABLE * self.runs
+            and self.not_assessable <= MOST_NOT_ASSESSABLE * self.contacts
+            and self.unassessed / self.seeds <= unchanged.unassessed / unchanged.seeds + MOST_NOT_ASSESSABLE
+        )
+
+
+def tolerates(states: Mapping[str, Cell], state: str) -> bool:
+    """Return whether, as learned and in a state, hardly a run alarms, no contact is missed, and all is assessable."""
+    unchanged = states[UNCHANGED]
+    return all(
+        cell is not None and cell.is_assessable(unchanged) and not cell.missed and cell.alarming_share <= MOST_ALARMING
+        for cell in (unchanged, states.get(state))
+    )
+
+
+# By detector, threshold and state of the machine.
+Cells = dict[str, dict[str, dict[str, Cell]]]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """The results of a machine, and of how many seeds, runs and impacts of a kind they are."""
+
+    cells: Cells
+    seeds: int
+    runs: int
+    impacts: int
+
+    @property
+    def all_runs(self) -> int:
+        """Return the number of impact-free runs of each cell."""
+        return self.seeds * self.runs
+
+    @property
+    def all_contacts(self) -> int:
+        """Return the number of contacts of each cell."""
+        return self.seeds * self.impacts * len(GROUPS)
+
+
+def threshold_names() -> tuple[str, ...]:
+    """Return the thresholds for all detectors: without those of one detector, and those that need a list of others."""
+    own = {getattr(DETECTORS.load(name), "own_threshold", "") for name in DETECTORS.names()}
+    names = [name for name in THRESHOLDS.names() if name not in own and name != "combined"]
+    return ("signature", *OPTIONS, *(name for name in names if name != "signature"))
+
+
+def benchmark_text(simulated: str, threshold: str, changes: Sequence[str]) -> str:
+    """Return the benchmark file of a simulator with a threshold, and the changed machine as its conditions."""
+    text = simulated
+    if threshold in OPTIONS:
+        text = text if "[signature]" in text else f"{text}\n[signature]\n"
+        text = text.replace("[signature]\n", f"[signature]\n{OPTIONS[threshold]}\n")
+    elif threshold != OWN:
+        text = text.replace("\n[learn]", f'threshold = "{threshold}"\n\n[learn]')
+    return text + "".join(CONDITION.format(change=name, folder=f"changed_{i}") for i, name in enumerate(changes, 1))
+
+
+def simulate(
+    folder: Path, machine: str, seed: int, changes: Mapping[str, ChangedMachine], counts: tuple[int, int]
+) -> None:
+    """Write the machine as it is, and in a folder each as it has changed; `counts` are runs and impacts of a kind."""
+    runs, impacts = counts
+    numbers = {"holdout": runs, **dict.fromkeys(GROUPS, impacts)}
+    SIMULATORS[machine](folder, {"free": LEARNED_RUNS, **numbers}, seed=seed)
+    for number, changed in enumerate(changes.values(), 1):
+        SIMULATORS[machine](folder / f"changed_{number}", numbers, seed=seed + 1000 * number, changed=changed)
+
+
+def score(
+    folder: Path, threshold: str, changes: Sequence[str], detectors: Sequence[str]
+) -> Iterator[tuple[str, str, OnMachine]]:
+    """Yield the results of each detector with a threshold, in each state of the machine."""
+    file = folder / "benchmark_of_threshold.toml"
+    simulated = (folder / "benchmark.toml").read_text(encoding="utf-8")
+    file.write_text(benchmark_text(simulated, threshold, changes), encoding="utf-8")
+    seen = set()
+    for row in condition_rows(benchmark(file, detectors=detectors, jobs=2).evaluated):
+        if row.unchanged.free is None or not row.unchanged.struck:
+            continue  # nothing could be learned for it
+        if row.detector not in seen:
+            seen.add(row.detector)
+            yield row.detector, UNCHANGED, row.unchanged
+        yield row.detector, row.condition, row.changed
+
+
+def usable(folder: Path) -> list[str]:
+    """Return the detectors that can assess the recordings of a machine."""
+    results = benchmark(folder / "benchmark.toml", detectors=["all"], jobs=2).results
+    known = {item.detector for item in results.exposure if item.not_assessable < item.operations}
+    return [name for name in DETECTORS.names() if name in known]
+
+
+def simulated_cells(
+    machine: str,
+    seeds: int,
+    counts: tuple[int, int],
+    *,
+    changes: Mapping[str, ChangedMachine] = CHANGES,
+    detectors: Sequence[str] = (),
+    thresholds: Sequence[str] = (),
+) -> Cells:
+    """Simulate and score a machine; by default every detector with every threshold under every change."""
+    cells: Cells = {}
+    every = list(detectors)
+    for seed in range(FIRST_SEED, FIRST_SEED + seeds):
+        with tempfile.TemporaryDirectory() as made:
+            folder = Path(made)
+            simulate(folder, machine, seed, changes, counts)
+            every = every or usable(folder)
+            own = [name for name in every if getattr(DETECTORS.load(name), "own_threshold", "")]
+            others = [name for name in every if name not in own]
+            work = [(name, others) for name in threshold_names() if others and name in (thresholds or (name,))]
+            for threshold, names in (*work, *([(OWN, own)] if own else [])):
+                for detector, state, seen in score(folder, threshold, tuple(changes), names):
+                    of_threshold = cells.setdefault(detector, {}).setdefault(threshold, {})
+                    of_threshold.setdefault(state, Cell()).add(seen)
+                print(machine, seed, threshold, file=sys.stderr, flush=True)
+    return {name: cells[name] for name in DETECTORS.names() if name in cells}
+
+
+def to_json(machines: Mapping[str, Simulated]) -> str:
+    """Return robustness.json: a line per detector and threshold, with a list of values for each state."""
+    lines = []
+    for machine, simulated in machines.items():
+        for detector, rules in simulated.cells.items():
+            for threshold, states in rules.items():
+                values = [states[state].to_list() if state in states else None for state in STATES]
+                lines.append(json.dumps([machine, detector, threshold, values], separators=(",", ":")))
+    numbers = {name: [item.seeds, item.runs, item.impacts] for name, item in machines.items()}
+    head = json.dumps({"seeds_runs_impacts": numbers, "states": STATES, "groups": GROUPS}, ensure_ascii=False)
+    return f'{{"made": {head},\n"cells": [\n' + ",\n".join(lines) + "\n]}\n"
+
+
+def of_json(text: str) -> dict[str, Simulated]:
+    """Return the results of each machine in robustness.json."""
+    read: dict[str, Any] = json.loads(text)
+    machines: dict[str, Cells] = {}
+    for machine, detector, threshold, values in read["cells"]:
+        states = zip(read["made"]["states"], values, strict=True)
+        by_state = {state: Cell.of_list(row) for state, row in states if row is not None}
+        machines.setdefault(machine, {}).setdefault(detector, {})[threshold] = by_state
+    numbers = read["made"]["seeds_runs_impacts"]
+    return {name: Simulated(cells, *numbers[name]) for name, cells in machines.items()}
+
+
+HEAD = """# When the machine has changed
+
+A threshold is learned from a machine on some day. Later its friction is higher because it is cold, its speed is set to
+another value, a sensor drifts. This page shows how every registered detector then performs with every threshold: which
+runs without a contact alarm, how late contacts are detected, what is missed and what cannot be assessed. All of it is
+written by a command:
+
+```sh
+{commands}
+python docs/make_robustness.py --page   # only this page again, from robustness.json
+```
+
+* Machines: the simulated [sliding gate](simulators.md) and the simulated arm that is hit on its first link. {learned}
+  impact-free runs of the unchanged machine are learned from; all settings are the defaults.
+{numbers}
+* Changes: as `cdtool simulate gate --friction 1.2` makes them. Friction is that of the load; speed is the nominal one;
+  mass is that of the load (arm: both links); the offsets are added to the logged motor current and to the
+  accelerometers; a motor that is warmer by 10 K needs 1.1 % more current for a torque.
+{options}
+* Detectors that have a threshold of their own (`fused`) are shown with it. `combined` needs a list of other thresholds
+  and is left out.
+
+## In short
+
+A combination of a detector and a threshold **tolerates** a change if, before and after it, at most {alarming:.0f} % of
+the impact-free runs alarm, no contact is missed, and hardly anything is not assessable: at most {not_assessable:.0f} %
+of the runs and of the contacts, and of the samples at most {not_assessable:.0f} % more than before. The fastest one has
+the smallest geometric mean of the two mean latencies. Where many runs alarm, a latency means little: an alarm may be
+there by chance, and one that is active when a contact begins does not detect it.
+
+"""
+TAIL = """## Your own machine
+
+The same comparison on your recordings needs no simulator: list the logs of the changed machine in the benchmark file,
+and `cdtool benchmark` adds a table "Changed conditions" to every report, see
+[Benchmark file](benchmark-file.md#changed-conditions).
+
+```toml
+[conditions.winter]
+holdout.logs = ["winter/holdout/*.csv"]
+impacts.stiff.logs = ["winter/stiff/*.csv"]
+```
+
+Runs without impacts are enough to see the false alarms. To see which threshold tolerates the change, set `threshold` to
+another name, or `adaptive_level` in `[signature]`, and run it again.
+
+## What this page does not show
+
+* Everything is simulated. No change on this page was seen in real recordings: neither of the two real machines of
+  [Real recordings](real-recordings.md) was recorded under changed conditions.
+* In the simulators a change is pure: friction rises everywhere by the same share; noise, controller and obstacles stay
+  the same. A real winter changes several of these at once.
+* The thresholds have their default settings, not a common false-alarm budget:
+  [Thresholds compared](thresholds-compared.md) has that comparison for the unchanged machine.
+  [`cdtool tune`](tuning.md) at a budget sets other limits; other runs may then alarm.
+* {learned} runs are fewer than `fused` should learn from: 40, see [Fused](detectors/fused.md).
+* The numbers are those of few runs: {few} of {count} alarming has a 95 % interval of {low:.1f} to {high:.0f} %.
+"""
+LEGEND = """Upper table: share of the assessable impact-free runs that alarm [%]; * more than a tenth of the runs or of
+the contacts is not assessable, or of the samples a tenth more than as learned. Lower table: mean latency, stiff/soft
+[ms]; in brackets the missed contacts, of {contacts}; * more than a tenth of them is not assessable. “n.a.”: not
+assessable.
+"""
+
+
+def page_text(machines: Mapping[str, Simulated]) -> str:
+    """Return the page of these results."""
+    head = HEAD.format(
+        learned=LEARNED_RUNS,
+        commands="\n".join(
+            f"{COMMAND} --machines {machine} --seeds {item.seeds} --runs {item.runs} --impacts {item.impacts}"
+            for machine, item in machines.items()
+        ),
+        numbers="\n".join(_numbers(machine, simulated) for machine, simulated in machines.items()),
+        options="\n".join(
+            f"* `{name}` is the signature with `{option}`, see [Signature](signature.md)."
+            for name, option in OPTIONS.items()
+        ),
+        alarming=100 * MOST_ALARMING,
+        not_assessable=100 * MOST_NOT_ASSESSABLE,
+    )
+    parts = [head, *(f"{_in_short(machine, simulated.cells)}\n" for machine, simulated in machines.items())]
+    for machine, simulated in machines.items():
+        parts.append(f"## {TITLES[machine]}\n\n{LEGEND.format(contacts=simulated.all_contacts)}\n")
+        parts += [f"{_of_detector(machine, name, rules)}\n" for name, rules in simulated.cells.items()]
+    count = min(simulated.all_runs for simulated in machines.values())
+    few = round(MOST_ALARMING * count)
+    share = binomial_share(few, count)
+    return "".join(
+        [*parts, TAIL.format(learned=LEARNED_RUNS, few=few, count=count, low=100 * share.low, high=100 * share.high)]
+    )
+
+
+def _numbers(machine: str, simulated: Simulated) -> str:
+    impacts = f"{simulated.impacts} stiff and {simulated.impacts} soft impacts"
+    return (
+        f"* {TITLES[machine]}: {counted(simulated.seeds, 'seed')}; of each, in each state of the machine, "
+        f"{simulated.runs} impact-free runs, {impacts}:\n  {simulated.all_runs} runs and {simulated.all_contacts} "
+        "contacts for each number below."
+    )
+
+
+def _in_short(machine: str, cells: Cells) -> str:
+    """Return the table of the fastest combinations that tolerate each change, and what follows from all of them."""
+    every = _combinations(cells)
+    head = ("change", f"tolerate it, of {len(every)}", "fastest of them", "alarming [%]", "stiff/soft [ms]")
+    rows = []
+    for state in STATES:
+        good = {key: states for key, states in every.items() if tolerates(states, state)}
+        best = min(good, key=lambda key: good[key][state].typical, default=None)
+        shown = (_named(*best), *_in_words(good[best], state)) if best else ("–",) * 3
+        rows.append((state, str(len(good)), *shown))
+    lines = "".join(f"* {line}\n" for line in conclusions(cells))
+    return f"### {TITLES[machine]} in short\n\n{_table(head, rows)}\n{lines}"
+
+
+def _combinations(cells: Cells) -> dict[tuple[str, str], dict[str, Cell]]:
+    """Return the states of each combination of a detector and a threshold."""
+    return {(name, rule): states for name, rules in cells.items() for rule, states in rules.items()}
+
+
+def conclusions(cells: Cells) -> Iterator[str]:
+    """Yield the sentences that follow from the results of a machine, each by a rule."""
+    every = _combinations(cells)
+    count = {key: sum(tolerates(states, state) for state in CHANGES) for key, states in every.items()}
+    most = max(count.values())
+    best = sorted((key for key in count if count[key] == most), key=lambda key: every[key][UNCHANGED].typical)
+    named = ", ".join(f"{_named(*key)} ({_in_words(every[key], UNCHANGED)[1]} ms)" for key in best[:_MOST_NAMED])
+    more = f" and {len(best) - _MOST_NAMED} more" if len(best) > _MOST_NAMED else ""
+    which = "Every change is" if most == len(CHANGES) else f"Most changes, {most} of {len(CHANGES)}, are"
+    yield f"{which} tolerated by {named}{more}{', the fastest first' if len(best) > 1 else ''}."
+    lasting = [state for state in CHANGES if state not in SPEEDS]
+    steady = [key for key, states in every.items() if all(tolerates(states, state) for state in lasting)]
+    if steady:
+        fastest = min(steady, key=lambda key: every[key][UNCHANGED].typical)
+        yield (
+            f"Every change but that of the speed is tolerated by {counted(len(steady), 'combination')}; the fastest is "
+            f"{_named(*fastest)} ({_in_words(every[fastest], UNCHANGED)[1]} ms)."
+        )
+    for words, states in PAIRS.items():
+        counts = []
+        for rule in ("signature", FOLLOWING):
+            rows = [rules[rule] for rules in cells.values() if rule in rules]
+            counts.append(f"{sum(all(tolerates(row, state) for state in states) for row in rows)} of {len(rows)}")
+        yield (
+            f"{words}: tolerated by {counts[0]} detectors with `signature`, by {counts[1]} with its `adaptive_level`."
+        )
+    costs = _costs_of_following(cells)
+    if costs:
+        name, group, cost = max(costs, key=lambda item: item[2])
+        yield f"`adaptive_level` costs at most {100.0 * cost:.0f} % latency as learned (`{name}`, {group})."
+    lost = {state: sum(_is_hardly_assessable(states, state) for states in every.values()) for state in CHANGES}
+    unassessable = ", ".join(f"{state} ({number})" for state, number in lost.items() if number)
+    if unassessable:
+        yield f"Combinations that are assessable as learned and hardly any more afterwards: {unassessable}."
+    late = [key for key, states in every.items() if "speed +20 %" in states and _is_only_slowed(states["speed +20 %"])]
+    if late:
+        yield (
+            f"{counted(len(late), 'combination')} can assess no impact-free run at a speed that is 20 % too high and "
+            "detect contacts nevertheless, late: the contact slows the machine to the speed that was learned."
+        )
+
+
+def _costs_of_following(cells: Cells) -> list[tuple[str, str, float]]:
+    """Return by how much the latency as learned is longer with `adaptive_level`, as a share, by detector and group."""
+    pairs = [
+        (name, rules["signature"][UNCHANGED], rules[FOLLOWING][UNCHANGED])
+        for name, rules in cells.items()
+        if "signature" in rules and FOLLOWING in rules
+    ]
+    return [
+        (name, group, following.mean(group) / still.mean(group) - 1.0)
+        for name, still, following in pairs
+        for group in GROUPS
+        if still.detected[group] and following.detected[group]
+    ]
+
+
+def _is_hardly_assessable(states: Mapping[str, Cell], state: str) -> bool:
+    """Return whether a combination can assess nearly everything as learned, and clearly less in a state."""
+    unchanged = states[UNCHANGED]
+    return state in states and unchanged.is_assessable(unchanged) and not states[state].is_assessable(unchanged)
+
+
+def _is_only_slowed(cell: Cell) -> bool:
+    return not cell.assessable and any(cell.detected.values())
+
+
+def _of_detector(machine: str, name: str, rules: Mapping[str, Mapping[str, Cell]]) -> str:
+    """Return the part of the page about a detector: what helps, and the two tables."""
+    tables = [
+        [(f"`{rule}`", *(_in_words(states, state)[place] for state in STATES)) for rule, states in rules.items()]
+        for place in (0, 1)
+    ]
+    lines = "".join(f"* {line}\n" for line in helps(rules))
+    title = f"### {TITLES[machine]}: {name} (`{DETECTORS.load(name).short_name}`)"
+    return "\n".join([title, "", lines, *(_table(("threshold", *STATES), rows) for rows in tables)])
+
+
+def helps(rules: Mapping[str, Mapping[str, Cell]]) -> Iterator[str]:
+    """Yield a sentence about the changes that the first threshold tolerates, and one per change that it does not.
+
+    Named are the options of the signature with which it tolerates the change, and the fastest other threshold that
+    does, and that is not much slower as learned.
+    """
+    usual = next(iter(rules))
+    default = rules[usual]
+    if not tolerates(default, UNCHANGED):
+        yield f"As learned, with `{usual}`: {_why(default, UNCHANGED)}."
+    fine = [state for state in CHANGES if tolerates(default, state)]
+    if fine:
+        yield f"Tolerated with `{usual}`: {', '.join(fine)}."
+    for state in CHANGES:
+        if state in fine or state not in default:
+            continue
+        good = {
+            rule: states
+            for rule, states in rules.items()
+            if rule != usual and tolerates(states, state) and not _is_much_slower(states, default)
+        }
+        others = sorted((rule for rule in good if rule not in OPTIONS), key=lambda rule: good[rule][state].typical)
+        options = [
+            f"`{rule}` ({alarming} % alarm, {latency} ms)"
+            for rule in [*(rule for rule in OPTIONS if rule in good), *others[:1]]
+            for alarming, latency in [_in_words(good[rule], state)]
+        ]
+        helping = f"helps: {', '.join(options)}" if options else "no option helps"
+        yield f"{state}: {_why(default, state)}; {helping}."
+
+
+def _is_much_slower(states: Mapping[str, Cell], default: Mapping[str, Cell]) -> bool:
+    one, other = states[UNCHANGED], default[UNCHANGED]
+    return any(other.detected[group] and not one.mean(group) <= MOST_SLOWER * other.mean(group) for group in GROUPS)
+
+
+def _why(states: Mapping[str, Cell], state: str) -> str:
+    """Return why a state is not tolerated."""
+    cell, unchanged = states[state], states[UNCHANGED]
+    parts = []
+    if cell.alarming_share > MOST_ALARMING:
+        parts.append(f"{100.0 * cell.alarming_share:.0f} % of the assessable runs alarm")
+    if cell.missed:
+        parts.append(f"{cell.missed} of {cell.contacts} contacts are missed")
+    if not cell.is_assessable(unchanged):
+        counts = ((cell.runs - cell.assessable, cell.runs, "runs"), (cell.not_assessable, cell.contacts, "contacts"))
+        left_out = [f"{'all' if count == of else f'{count} of {of}'} {what}" for count, of, what in counts if count]
+        left_out.append(f"{100.0 * cell.unassessed / cell.seeds:.0f} % of the samples")
+        parts.append(f"not assessable: {', '.join(left_out)}")
+    return ", ".join(parts) or "as before, but not tolerated as learned"
+
+
+def _in_words(states: Mapping[str, Cell], state: str) -> tuple[str, str]:
+    """Return the share of alarming runs in per cent, and the mean latencies with the missed contacts."""
+    cell = states.get(state)
+    if cell is None:
+        return "–", "–"
+    alarming = "n.a."
+    if cell.assessable:
+        alarming = f"{100.0 * cell.alarming_share:.0f}{'' if cell.is_assessable(states[UNCHANGED]) else '*'}"
+    if cell.contacts == cell.not_assessable:
+        return alarming, "n.a."
+    means = "/".join(f"{cell.mean(group):.0f}" if cell.detected[group] else "–" for group in GROUPS)
+    missed = f" ({cell.missed})" if cell.missed else ""
+    mark = "" if cell.not_assessable <= MOST_NOT_ASSESSABLE * cell.contacts else "*"
+    return alarming, f"{means}{missed}{mark}"
+
+
+def _named(detector: str, rule: str) -> str:
+    return f"`{detector}`" if rule == OWN else f"`{detector}` with `{rule}`"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}", *(f"| {' | '.join(row)} |" for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def main(arguments: list[str]) -> int:
+    """Simulate, score and write both files, or only the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--page", action="store_true", help="write the page from robustness.json")
+    parser.add_argument(
+        "--machines", nargs="+", choices=list(SIMULATORS), default=list(SIMULATORS), help="those simulated again"
+    )
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--runs", type=int, default=20, help="impact-free runs of each seed and state of the machine")
+    parser.add_argument("--impacts", type=int, default=5, help="impacts of each kind, seed and state")
+    parser.add_argument("-o", "--output", type=Path, default=DOCS, help="folder of the two files")
+    options = parser.parse_args(arguments)
+    options.output.mkdir(parents=True, exist_ok=True)
+    results = options.output / RESULTS
+    machines = of_json(results.read_text(encoding="utf-8")) if results.exists() else {}
+    for name in [] if options.page else options.machines:
+        cells = simulated_cells(name, options.seeds, (options.runs, options.impacts))
+        machines[name] = Simulated(cells, options.seeds, options.runs, options.impacts)
+        results.write_text(to_json(machines), encoding="utf-8")
+    (options.output / PAGE).write_text(page_text(machines), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,152 @@
+"""docs/robustness.md: made by its script from robustness.json, whose cells are what the script computes."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from cdtool.detectors import DETECTORS
+from cdtool.simulation.changed_machine import ChangedMachine
+from cdtool.thresholds import THRESHOLDS
+from tests.project.pages import DOCS, docs_script
+
+script = docs_script("make_robustness")
+
+
+def cell(alarming: int = 0, stiff: float = 20.0, **more: Any):
+    """Return a cell of 40 runs and 20 contacts."""
+    counts = {"assessable": 40, "runs": 40, "contacts": 20, "seeds": 2, **more}
+    detected = 10 - more.get("missed", 0)
+    return script.Cell(
+        alarming,
+        **counts,
+        detected={"stiff": detected, "soft": 10},
+        latency_sum={"stiff": detected * stiff, "soft": 800.0},
+    )
+
+
+FINE = dict.fromkeys(script.STATES, cell())
+
+
+def test_the_page_is_that_of_its_results():
+    machines = script.of_json((DOCS / script.RESULTS).read_text(encoding="utf-8"))
+    made = script.page_text(machines)
+    assert (DOCS / script.PAGE).read_text(encoding="utf-8") == made, "run python docs/make_robustness.py --page"
+    assert set(machines) == set(script.SIMULATORS)
+    for cells in (simulated.cells for simulated in machines.values()):
+        assert set(cells) <= set(DETECTORS.names())
+        for rules in cells.values():
+            assert set(rules) <= {script.FOLLOWING, script.OWN, *THRESHOLDS.names()}
+            assert all(set(states) == set(script.STATES) for states in rules.values())
+
+
+def test_one_cell_is_computed():
+    changes = {"friction +20 %": ChangedMachine(friction=1.2)}
+    cells = script.simulated_cells("gate", 1, (1, 1), changes=changes, detectors=["momentum"], thresholds=["signature"])
+    assert list(cells) == ["momentum"] and list(cells["momentum"]) == ["signature"]
+    learned, changed = cells["momentum"]["signature"].values()
+    assert (learned.alarming, changed.alarming) == (0, 1)
+    assert all(item.runs == item.assessable == 1 and item.contacts == 2 for item in (learned, changed))
+    assert 40.0 < learned.mean("stiff") < 80.0 < learned.mean("soft") < 200.0
+
+
+def test_results_survive_in_the_file():
+    cells = {"momentum": {"signature": FINE, "cusum": {"as learned": cell(3)}}}
+    machines = {"gate": script.Simulated(cells, 2, 20, 5), "arm": script.Simulated(cells, 1, 10, 5)}
+    assert script.of_json(script.to_json(machines)) == machines
+
+
+def test_the_files_select_the_thresholds():
+    gate = 'machine = "machine.toml"\n\n[learn]\nlogs = ["free/*.csv"]\n'
+    arm = f'{gate}\n[signature]\nsides = "one"\n'
+    for name in script.threshold_names():
+        for simulated in (gate, arm):
+            read = tomllib.loads(script.benchmark_text(simulated, name, ["mass +10 %"]))
+            assert read["conditions"]["mass +10 %"]["impacts"]["soft"]["logs"] == ["changed_1/soft/*.csv"]
+            following = name == script.FOLLOWING
+            assert read.get("threshold") == (None if following else name)
+            assert read.get("signature", {}).get("adaptive_level") == (6 if following else None)
+    assert "conditions" not in tomllib.loads(script.benchmark_text(arm, script.OWN, []))
+
+
+@pytest.mark.parametrize(
+    ("changed", "tolerated"),
+    [
+        (cell(2), True),
+        (cell(3), False),
+        (cell(missed=1), False),
+        (cell(assessable=36), True),
+        (cell(assessable=35), False),
+        (cell(not_assessable=3), False),
+        (cell(unassessed=0.2), True),
+        (cell(unassessed=0.22), False),
+    ],
+)
+def test_what_is_tolerated(changed, tolerated):
+    assert script.tolerates({**FINE, "mass +10 %": changed}, "mass +10 %") is tolerated
+
+
+def test_nothing_is_tolerated_by_what_alarms_as_learned():
+    states = {**FINE, script.UNCHANGED: cell(20)}
+    assert not any(script.tolerates(states, state) for state in script.STATES)
+    assert (
+        next(script.helps({"signature": states})) == "As learned, with `signature`: 50 % of the assessable runs alarm."
+    )
+
+
+def test_it_is_stated_what_helps():
+    cold = {**FINE, "friction +20 %": cell(40)}
+    slow = dict.fromkeys(script.STATES, cell(stiff=41.0))
+    rules = {
+        "signature": cold,
+        script.FOLLOWING: FINE,
+        "glr": replace_all(FINE, 30.0),
+        "cusum": replace_all(FINE, 25.0),
+    }
+    fine, words = script.helps({**rules, "limit": slow})
+    assert fine.startswith("Tolerated with `signature`: friction -20 %")
+    assert words == (
+        "friction +20 %: 100 % of the assessable runs alarm; helps: `signature, adaptive_level` (0 % alarm, 20/80 ms), "
+        "`cusum` (0 % alarm, 25/80 ms)."
+    )
+    *_, words = script.helps({"signature": cold, "limit": slow})
+    assert words == "friction +20 %: 100 % of the assessable runs alarm; no option helps."
+
+
+def replace_all(states, stiff: float):
+    """Return cells with another latency."""
+    return {
+        state: replace(item, latency_sum={**item.latency_sum, "stiff": 10.0 * stiff}) for state, item in states.items()
+    }
+
+
+def test_the_conclusions_follow_from_the_cells():
+    cold = {**FINE, "friction +20 %": cell(40)}
+    blind = {**FINE, "speed +20 %": cell(assessable=0)}
+    cells = {
+        "momentum": {"signature": cold, script.FOLLOWING: replace_all(FINE, 22.0)},
+        "energy": {"signature": blind},
+    }
+    assert list(script.conclusions(cells)) == [
+        "Every change is tolerated by `momentum` with `signature, adaptive_level` (22/80 ms).",
+        "Every change but that of the speed is tolerated by 2 combinations; the fastest is `energy` with `signature` "
+        "(20/80 ms).",
+        "friction ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`.",
+        "speed ±10 %: tolerated by 2 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`.",
+        "speed ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`.",
+        "`adaptive_level` costs at most 10 % latency as learned (`momentum`, stiff).",
+        "Combinations that are assessable as learned and hardly any more afterwards: speed +20 % (1).",
+        "1 combination can assess no impact-free run at a speed that is 20 % too high and detect contacts "
+        "nevertheless, late: the contact slows the machine to the speed that was learned.",
+    ]
+
+
+def test_a_table_marks_what_is_hardly_assessable():
+    blind = {**FINE, "speed +20 %": cell(4, assessable=20, not_assessable=20), "speed -20 %": cell(missed=4)}
+    page = script.page_text({"gate": script.Simulated({"momentum": {"signature": blind}}, 2, 20, 5)})
+    assert "| `signature` | 0 | 0 | 0 | 20* | 0 | 0 | 0 | 0 | 0 | 0 | 0 |" in page
+    assert "| `signature` | 20/80 | 20/80 | 20/80 | n.a. | 20/80 | 20/80 | 20/80 (4) |" in page
+    assert "2 of 40 alarming has a 95 % interval of 0.6 to 17 %" in page
