@@ -35,6 +35,7 @@ def prepare(folder: Path, run: Run) -> None:
         '[learn]\nlogs = ["gate/free/*.csv"]\n[impacts.stiff]\nlogs = ["gate/stiff/*.csv"]\n',
         encoding="utf-8",
     )
+    run(["simulate", "season", "--runs", "33", "--runs-per-day", "3", "-o", str(folder / "season")])
     free = [str(gate / "free" / f"0{number}.csv") for number in (1, 2, 3)]
     machine = ("-m", str(gate / "machine.toml"))
     for name, logs in (("a", free[:2]), ("b", free)):
@@ -71,6 +72,8 @@ def cases(inputs: Path) -> list[Case]:
     free = [f"{gate}/free/0{number}.csv" for number in (1, 2, 3, 4)]
     stiff = [f"{gate}/stiff/0{number}.csv" for number in (1, 2)]
     a, b = f"{inputs}/a.json", f"{inputs}/b.json"
+    season = [f"{inputs}/season/free/{number:02d}.csv" for number in range(1, 34)]
+    weather = ("--conditions", f"{inputs}/season/conditions.csv", "--false-alarm-budget", "1/100op")
     every = [
         word
         for suffix in ("json", "html", "md", "xml", "csv", "png", "svg", "pdf")
@@ -96,6 +99,11 @@ def cases(inputs: Path) -> list[Case]:
             "signature check",
             _plot("signature", "check", a, *free, *machine),
             _plot("signature", "check", a, *free[:3], *machine),
+        ),
+        Case(
+            "signature forecast",
+            _plot("signature", "forecast", a, *season, *machine, *weather, "--temperatures", "10:25"),
+            _plot("signature", "forecast", a, *season, *machine, *weather, "--temperatures", "15:20"),
         ),
         Case("benchmark", (*benchmark, "gm", *every), (*benchmark, "pt", *every)),
         Case("benchmark, folder", (*benchmark, "gm", "-o", "{out}/report"), (*benchmark, "pt", "-o", "{out}/report")),

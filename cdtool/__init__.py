@@ -9,6 +9,7 @@ Every command is available as a function:
         cdtool.recover("damaged.mcap", "clean.mcap")                        -> Recovered
     cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
+    cdtool.forecast_signature("gate.json", logs, "machine.toml", ...)   -> Forecasted: false alarms by temperature, date
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
         cdtool.detect_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
+    from cdtool.workflows.signature.forecasting import forecast_signature
     from cdtool.workflows.signature.learning import learn_signature
     from cdtool.workflows.signature.upkeep import check_signature
     from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
@@ -62,6 +64,7 @@ _API = {
     "read": "cdtool.workflows.runs:read_log",
     "learn_signature": "cdtool.workflows.signature.learning:learn_signature",
     "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
+    "forecast_signature": "cdtool.workflows.signature.forecasting:forecast_signature",
     "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
     "coverage": "cdtool.workflows.coverage:coverage",
     "detect": "cdtool.workflows.detection:detect",
@@ -96,6 +99,7 @@ __all__ = [
     "detect_runs",
     "explain",
     "explain_runs",
+    "forecast_signature",
     "identify",
     "info",
     "init",

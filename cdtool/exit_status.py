@@ -100,6 +100,7 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "coverage": _CAN_LOSE,
     "signature show": _ALWAYS,
     "signature check": _CAN_LOSE,
+    "signature forecast": _CAN_LOSE,
     "signature update": _CAN_LOSE,
     "store status": _ALWAYS,
     "store gc": _ALWAYS,

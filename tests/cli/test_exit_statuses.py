@@ -138,6 +138,14 @@ def _update(files: Folder, *logs: Path) -> Outcome:
     return cdtool("signature", "update", files.path / "u.json", *logs, "-m", files.machine)
 
 
+def _forecast(files: Folder, *more: Path) -> Outcome:
+    made = cdtool("simulate", "season", "--runs", 33, "--runs-per-day", 3, "-o", files.path / "season")
+    assert made.status == 0, made.err
+    logs = sorted((files.path / "season" / "free").iterdir())
+    table = ("--conditions", files.path / "season" / "conditions.csv", "--false-alarm-budget", "1/100op")
+    return cdtool("signature", "forecast", files.signature, *logs, *more, "-m", files.machine, *table)
+
+
 def _simulate(kind: str, *arguments: object) -> tuple[Callable[[Folder], Outcome], Callable[[Folder], Outcome]]:
     return (
         lambda files: cdtool("simulate", kind, *arguments, "-o", files.path / kind),
@@ -224,6 +232,11 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("signature check", 0): lambda f: cdtool("signature", "check", f.signature, *f.free(11), "-m", f.machine),
     ("signature check", 2): lambda f: cdtool("signature", "check", f.signature, f.absent, "-m", f.machine),
     ("signature check", 3): lambda f: cdtool("signature", "check", f.signature, *f.free(11), f.empty, "-m", f.machine),
+    ("signature forecast", 0): lambda f: _forecast(f),
+    ("signature forecast", 2): lambda f: cdtool(
+        "signature", "forecast", f.signature, *f.free(3), "-m", f.machine, "--false-alarm-budget", "1/100op"
+    ),
+    ("signature forecast", 3): lambda f: _forecast(f, f.empty),
     ("signature update", 0): lambda f: _update(f, f.gate / "holdout" / "01.csv"),
     ("signature update", 2): lambda f: _update(f, f.absent),
     ("signature update", 3): lambda f: _update(f, f.gate / "holdout" / "01.csv", f.empty),

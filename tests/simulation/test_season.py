@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from datetime import date
 
 import numpy as np
 import pytest
 
 import cdtool
 from cdtool.errors import UsageError
+from cdtool.evaluation.upkeep.conditions import read_conditions
 from cdtool.simulation.gate_model import GateParameters, GateRun, integrate_gate
 from cdtool.simulation.season import Season, write_gate_season
 
@@ -76,6 +78,36 @@ def test_a_season_is_a_folder_of_impact_free_logs_in_their_order(tmp_path):
     assert np.abs(torque - run.motor_torque / NEW.transmission_ratio).max() < 1.0
 
 
+def test_friction_changes_by_its_share_with_each_kelvin():
+    season = Season(3, friction_per_kelvin=-0.01)
+    assert season.gate(1, NEW).coulomb_friction == NEW.coulomb_friction
+    assert season.gate(1, NEW, warmer=10.0).viscous_friction == pytest.approx(0.99**10 * NEW.viscous_friction)
+    assert season.gate(1, NEW, warmer=-10.0).static_friction == pytest.approx(0.99**-10 * NEW.static_friction)
+
+
+def test_a_run_has_the_friction_of_its_temperature():
+    runs = Season(120, friction_per_kelvin=-0.02, runs_per_day=1)
+    warm, cold = runs.run(10, 5, NEW), runs.run(120, 5, NEW)
+    warmth = 0.98 ** (runs.temperature(120, 5) - runs.temperature(10, 5))
+    assert warmth > 1.1
+    assert cruising_force(cold, 1.0) / cruising_force(warm, 1.0) == pytest.approx(warmth, rel=0.12)
+
+
+def test_runs_are_spread_over_the_hours_of_their_day():
+    season = Season(5, runs_per_day=2, start=date(2025, 12, 31))
+    found = [season.time(number).isoformat("T", "minutes") for number in range(1, 6)]
+    assert found == ["2025-12-31T10:00", "2025-12-31T18:00", "2026-01-01T10:00", "2026-01-01T18:00", "2026-01-02T10:00"]
+
+
+def test_a_season_has_a_table_with_date_and_temperature_of_each_run(tmp_path):
+    season = Season(3, friction_per_kelvin=-0.01)
+    write_gate_season(tmp_path / "season", season, 1)
+    found = read_conditions(tmp_path / "season" / "conditions.csv", [f"free/0{number}.csv" for number in (1, 2, 3)])
+    assert [item.when for item in found.values()] == [season.time(number) for number in (1, 2, 3)]
+    temperatures = [item.temperature for item in found.values()]
+    np.testing.assert_allclose(temperatures, [season.temperature(number, 1) for number in (1, 2, 3)], atol=0.051)
+
+
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path):
     for name, seed in (("one", 1), ("same", 1), ("other", 2)):
         write_gate_season(tmp_path / name, Season(1), seed)
@@ -91,6 +123,9 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path):
         ({"friction_change": float("nan")}, "friction change is nan"),
         ({"obstruction_growth": -0.5}, "obstruction growth is -0.5"),
         ({"obstruction_at": float("inf")}, "obstruction at inf"),
+        ({"friction_per_kelvin": 1.0}, "friction per kelvin is 1"),
+        ({"runs_per_day": 0}, "0 runs per day"),
+        ({"runs": 100_000, "runs_per_day": 1, "start": date(9999, 1, 1)}, "ends after the year 9999"),
     ],
 )
 def test_a_season_that_makes_no_sense_is_refused(wrong, said):

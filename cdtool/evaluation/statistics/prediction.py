@@ -144,10 +144,56 @@ def prediction_of(values: npt.ArrayLike, gumbel_share: float = GUMBEL_SHARE) -> 
     return Prediction(len(given), float(given.mean()), float(given.std(ddof=1)), gumbel_share)
 
 
+def tail(deviation: npt.ArrayLike, gumbel_share: float = GUMBEL_SHARE) -> FloatArray:
+    """Return the chance that a maximum exceeds a limit, for a known mean and standard deviation.
+
+    Parameters
+    ----------
+    deviation : array_like of float
+        The limit's distance from the mean of the maxima, in their standard deviations.
+    gumbel_share : float
+        The share of the variance that is modelled as Gumbel.
+
+    Returns
+    -------
+    ndarray of float
+        The chance, of the shape of `deviation`; it is constant beyond -12 and 60.
+
+    Examples
+    --------
+    >>> tail([0.0, 3.0]).round(4).tolist()
+    [0.4769, 0.0055]
+    """
+    log_tail: FloatArray = np.interp(np.asarray(deviation, dtype=np.float64), _TABLE, _log_tail(gumbel_share))
+    return np.exp(log_tail)
+
+
+def deviation_for(chance: float, gumbel_share: float = GUMBEL_SHARE) -> float:
+    """Return the deviation that is exceeded with that chance: the inverse of `tail`.
+
+    Parameters
+    ----------
+    chance : float
+        The chance.
+    gumbel_share : float
+        The share of the variance that is modelled as Gumbel.
+
+    Returns
+    -------
+    float
+        The distance from the mean, in standard deviations.
+
+    Examples
+    --------
+    >>> round(deviation_for(0.01), 2)
+    2.66
+    """
+    return float(np.interp(-math.log(chance), -_log_tail(gumbel_share), _TABLE))
+
+
 def _chance(t: float, n: int, share: float) -> float:
     mean, std = _samples(n, share)
-    log_tail: FloatArray = np.interp(mean + t * std, _TABLE, _log_tail(share))
-    return float(np.exp(log_tail).mean())
+    return float(tail(mean + t * std, share).mean())
 
 
 @cache

@@ -38,7 +38,7 @@ def verdicts(item: JointDrift) -> tuple[str, ...]:
         return (*lines, f"{many}: too few to show a drift; at least {LEAST_RUNS} are required")
     lines += [_local(shown, item) if shown.place is not None else _overall(shown, item) for shown in item.shown]
     if not item.shown:
-        lines.append(f"{NOTHING_SHOWN} at a level of 1 %: {_slope(item.course.trend.slope)}")
+        lines.append(f"{NOTHING_SHOWN} at a level of 1 %: {slope_words(item.course.trend.slope)}")
     return tuple(lines)
 
 
@@ -60,10 +60,10 @@ def _overall(shown: Shown, item: JointDrift) -> str:
     if trend is None:
         return NOTHING_SHOWN
     if shown.outward:
-        return f"drifts by {_slope(trend.slope)}; {_left(shown.runs_left)}: relearn"
+        return f"drifts by {slope_words(trend.slope)}; {_left(shown.runs_left)}: relearn"
     if item.two_sided:
-        return f"drifts back towards the middle of the band by {_slope(trend.slope)}"
-    return f"drifts away from the limit by {_slope(trend.slope)}; contacts are detected later: relearn"
+        return f"drifts back towards the middle of the band by {slope_words(trend.slope)}"
+    return f"drifts away from the limit by {slope_words(trend.slope)}; contacts are detected later: relearn"
 
 
 def _local(shown: Shown, item: JointDrift) -> str:
@@ -74,8 +74,8 @@ def _local(shown: Shown, item: JointDrift) -> str:
     if trend is None:
         return NOTHING_SHOWN
     if shown.outward:
-        return f"grows {place} by {_slope(trend.slope)}; {_left(shown.runs_left)}: {_INSPECT}"
-    return f"changes {place} by {_slope(trend.slope)}: {_INSPECT}"
+        return f"grows {place} by {slope_words(trend.slope)}; {_left(shown.runs_left)}: {_INSPECT}"
+    return f"changes {place} by {slope_words(trend.slope)}: {_INSPECT}"
 
 
 def _step(shown: Shown, item: JointDrift) -> str:
@@ -85,12 +85,12 @@ def _step(shown: Shown, item: JointDrift) -> str:
     return f"step of {step.height:+.2g} spreads at run {step.run + 1} ({item.runs[step.run].name})"
 
 
-def _slope(slope: Interval) -> str:
-    """With as many decimals as its first two digits need."""
+def slope_words(slope: Interval, unit: str = "run") -> str:
+    """Format a slope in spreads per unit, with as many decimals as its first two digits need."""
     largest = max(abs(slope.value), abs(slope.low), abs(slope.high), 1e-9)
     decimals = max(1 - math.floor(math.log10(largest)), 0)
     value, low, high = (f"{x:z.{decimals}f}" for x in (slope.value, slope.low, slope.high))
-    return f"{float(value):+.{decimals}f} spreads per run (95 %: {low} to {high})"
+    return f"{float(value):+.{decimals}f} spreads per {unit} (95 %: {low} to {high})"
 
 
 def _left(runs: Interval) -> str:

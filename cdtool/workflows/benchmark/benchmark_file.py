@@ -57,7 +57,7 @@ class ImpactGroup:
     A group of injected contacts has its own `machine_file`, exact `labels`, and detectors that it cannot test, each
     with the reason (`refused`). `injected` states how the contacts were made, for provenance; `made_from` has the
     impact-free log of each of its logs. A group that `is_impact_free` has no contacts: each alarm is a false one. A
-    group of a changed `condition` of the machine is compared with its `counterpart`, the group of the unchanged machine.
+    group of a changed `condition` of the machine is compared with its `counterpart`, the same of the unchanged one.
     """
 
     logs: tuple[Path, ...]
