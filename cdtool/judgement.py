@@ -15,12 +15,13 @@ import numpy as np
 from cdtool.detection import Band, Signal, Status, StatusArray, contiguous
 from cdtool.kernels import kernel
 from cdtool.motion import MotionClass
-from cdtool.motion.applicable import HOLD, judging_classes, speed_is_recent
+from cdtool.motion.applicable import HOLD, Motion, judging_classes, speed_is_recent
 from cdtool.motion.evident_motion import evident_speed
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, is_per_run, judges_whole_machine
+from cdtool.thresholds.base import FittedThreshold, KnownBand, is_per_run, judges_whole_machine
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
+from cdtool.thresholds.speed_range import over_speeds
 
 _MATRIX = "Array(float64, 2, 'C', readonly=True)"
 _STATUS = "Array(uint8, 2, 'C', readonly=True)"
@@ -33,7 +34,7 @@ OPEN_BELOW, OPEN_ABOVE, LIMITED = 1, 2, 4
 class _Share:
     """The rows of a log on which a threshold is evaluated, and those to which it applies, (rows,)."""
 
-    threshold: FittedThreshold
+    threshold: KnownBand
     recording: Recording
     signal: Signal
     rows: slice
@@ -109,9 +110,10 @@ class Judgement:
             everywhere = np.ones(len(self.signal.time), dtype=bool)
             rows = slice(0, len(self.signal.time))
             return tuple(_Share(item, self.recording, self.signal, rows, everywhere) for item in self.thresholds[:1])
-        judging = judging_classes(self.recording, self.classes, self.strokes, self.signal.time, self.hold)
-        learned = [item for item in self.thresholds if class_of(item) is not None]
-        return tuple(self._share(learned[item.motion], item.stroke, item.where) for item in judging)
+        applied = over_speeds([item for item in self.thresholds if class_of(item) is not None])
+        motions: list[Motion] = [getattr(item, "motion") for item in applied]  # noqa: B009
+        judging = judging_classes(self.recording, motions, self.strokes, self.signal.time, self.hold)
+        return tuple(self._share(applied[item.motion], item.stroke, item.where) for item in judging)
 
     def _of_stroke(self, number: int) -> _Share:
         """Evaluate the threshold in one stroke alone, and at rest after it: a contact that halts it ends the stroke."""
@@ -127,7 +129,7 @@ class Judgement:
         after = int(np.searchsorted(moves, applies, side="right"))
         return min(float(moves[after]) if after < len(moves) else np.inf, applies + self.hold)
 
-    def _share(self, threshold: FittedThreshold, number: int, judges: BoolArray) -> _Share:
+    def _share(self, threshold: KnownBand, number: int, judges: BoolArray) -> _Share:
         """Evaluate a class in a stroke, without other motions before it, so that its filters start there."""
         stroke = self.strokes[number]
         after = self.strokes[number + 1].applies + self.hold if number + 1 < len(self.strokes) else np.inf

@@ -38,6 +38,8 @@ def show_file(stored: SignatureFile) -> None:
     typer.echo(f"activation: {_activation(stored)}")
     typer.echo(f"joints: {plain(', '.join(stored.joints))}")
     typer.echo(f"runs: {len(stored.runs)}, the last {plain(stored.runs[-1].name)}" if stored.runs else "runs: none")
+    for words in _between(stored):
+        typer.echo(f"between learned speeds: {plain(words)}")
     rows = []
     for current, first in zip(stored.current, stored.first, strict=True):
         if not (isinstance(current, FittedSignature) and isinstance(first, FittedSignature)):
@@ -54,6 +56,17 @@ def show_file(stored: SignatureFile) -> None:
         columns = [("class", "left"), ("joint", "left"), ("effective\nruns", "right"), ("sides", "left")]
         columns += [("limits from\nto, travel", "right"), (f"spread\n{stored.unit}", "right")]
         table([*columns, ("limits moved since\nfirst learned, spreads", "right")], rows)
+
+
+def _between(stored: SignatureFile) -> list[str]:
+    """Return the motions whose bands are interpolated over speed, in words."""
+    from cdtool.motion.speed_range import in_ranges
+    from cdtool.thresholds.fitted_signature import FittedSignature
+
+    motions = [item.motion for item in stored.current if isinstance(item, FittedSignature) and item.speed_range]
+    ranges = [numbers for numbers in in_ranges(motions) if len(numbers) > 1]
+    ends = [(motions[numbers[0]], motions[numbers[-1]]) for numbers in ranges]
+    return [f"{slow.described} to {fast.speed_in_words(fast.nominal_speed)}" for slow, fast in ends]
 
 
 def _moved_at(item: SignatureSummary, joint: JointSummary) -> str:

@@ -140,6 +140,16 @@ class DetectorLeftOut(TemplateFact):
 
 
 @frozen
+class SingleSpeed(TemplateFact):
+    """`speed_range` was asked for, but a motion was learned at one speed only."""
+
+    motion: str
+
+    subject_field = "motion"
+    words = "speed_range has no effect: of this motion only one speed was learned, {motion}; add runs at another speed"
+
+
+@frozen
 class DetectorUnassessable(TemplateFact):
     """A detector can assess none of the runs to learn from."""
 

@@ -14,10 +14,12 @@ import numpy as np
 
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion.motion_class import MotionClass
-from cdtool.motion.speed_course import fitting_samples
+from cdtool.motion.speed_range import SpeedRange
 from cdtool.motion.strokes import Stroke
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
+# What a threshold was learned for: one class, or several and the speeds between them.
+Motion = MotionClass | SpeedRange
 # How long a class still applies after a departure that began while it fitted [s]: the matching window.
 HOLD = 1.0
 # A class that has fitted this long [s] before its stroke came to rest or turned round, or later, has completed it.
@@ -35,7 +37,7 @@ class Judging:
 
 def judging_classes(
     recording: Recording,
-    classes: Sequence[MotionClass],
+    classes: Sequence[Motion],
     strokes: Sequence[Stroke],
     clock: FloatArray,
     hold: float = HOLD,
@@ -56,7 +58,7 @@ def judging_classes(
 
 
 def _judging_classes(
-    recording: Recording, classes: Sequence[MotionClass], strokes: Sequence[Stroke], clock: FloatArray, hold: float
+    recording: Recording, classes: Sequence[Motion], strokes: Sequence[Stroke], clock: FloatArray, hold: float
 ) -> list[Judging]:
     speed = recording["speed"]
     if not len(speed):
@@ -72,7 +74,7 @@ def _judging_classes(
             continue
         part = recording if len(strokes) == 1 else recording.section(item.start, float(speed.time[last - 1]))
         for j, motion in enumerate(classes):
-            started, agrees = fitting_samples(part, motion.direction, motion.nominal_speed, motion.joint, motion.course)
+            started, agrees = motion.fitting(part)
             begun[first:last, j] = started[-(last - first) :]
             fits[first:last, j] = agrees[-(last - first) :]
         fresh[first] = True
@@ -89,7 +91,7 @@ def _judging_classes(
 
 
 def speed_is_recent(
-    recording: Recording, classes: Sequence[MotionClass], clock: FloatArray, hold: float = HOLD
+    recording: Recording, classes: Sequence[Motion], clock: FloatArray, hold: float = HOLD
 ) -> BoolArray:
     """Return where on `clock` (n,) [s] the last `hold` [s] contain a speed of every joint that leads a class."""
     own, joints = recording.own_clock(clock), tuple(sorted({motion.joint for motion in classes}))

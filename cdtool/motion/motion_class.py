@@ -10,8 +10,8 @@ from typing import Any, Self
 import numpy as np
 
 from cdtool.kernels import READ_ONLY, kernel
-from cdtool.motion.speed_course import SpeedCourse
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.motion.speed_course import SpeedCourse, fitting_samples
+from cdtool.recording import BoolArray, FloatArray, Recording, Series
 
 # The speed is averaged over this long [s], and over this many samples at least, before the usual one is looked for.
 _AVERAGED_SECONDS, _AVERAGED_SAMPLES = 0.1, 5
@@ -53,6 +53,13 @@ class MotionClass:
         """What decides which motion fits the class, its learned speed included: hashable, equal for equal classes."""
         course = self.course.content if self.course else None
         return self.direction, self.nominal_speed, self.joint, course
+
+    def fitting(self, recording: Recording) -> tuple[BoolArray, BoolArray]:
+        """Return for each speed sample (n,) whether a stroke has begun, and whether the speed fits it so far; causal.
+
+        See `fitting_samples`.
+        """
+        return fitting_samples(recording, self.direction, self.nominal_speed, self.joint, self.course)
 
     @property
     def described(self) -> str:

@@ -18,9 +18,9 @@ from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray, Recording
 
 # A speed fits within this many spreads of the mean.
-_SPREADS = 5.5
+SPREADS = 5.5
 # A stroke that ends at rest is below this share of the nominal speed at its end.
-_SLOW = 0.5
+SLOW = 0.5
 
 
 class Curves(NamedTuple):
@@ -274,10 +274,10 @@ def fit_course(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
             width = curves.grid[place + 1] - curves.grid[place]
             mean += (curves.mean[place + 1] - mean) / width * beyond
             spread += (curves.spread[place + 1] - spread) / width * beyond
-        reach = _SPREADS * spread
+        reach = SPREADS * spread
         if reach < least:
             reach = least
         lowest, highest = mean - reach, mean + reach
-        if running[k] and along >= curves.travel_end and mean < _SLOW * nominal and lowest > -least:
+        if running[k] and along >= curves.travel_end and mean < SLOW * nominal and lowest > -least:
             lowest = -least
         fits[k] = lowest <= forward <= highest

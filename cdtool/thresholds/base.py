@@ -13,8 +13,8 @@ from cdtool.recording import FloatArray, Recording
 from cdtool.thresholds.comparison_kernel import factors_met
 
 
-class FittedThreshold(Protocol):
-    """The contract of a fitted threshold: a known band, evaluated sample by sample.
+class KnownBand(Protocol):
+    """What a signal is compared with: a band that is evaluated sample by sample.
 
     Notes
     -----
@@ -56,6 +56,10 @@ class FittedThreshold(Protocol):
             The recording has no channel in `needs`, or the joints are not those of the runs.
         """
         ...
+
+
+class FittedThreshold(KnownBand, Protocol):
+    """The contract of a fitted threshold: a known band that can be stored."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the threshold as JSON values."""
@@ -119,12 +123,12 @@ class Threshold(Protocol):
         ...
 
 
-def is_per_run(threshold: Threshold | FittedThreshold | type) -> bool:
+def is_per_run(threshold: Threshold | KnownBand | type) -> bool:
     """Return whether a threshold determines its limits in each run itself, so that it needs no impact-free runs.
 
     Parameters
     ----------
-    threshold : Threshold, FittedThreshold or type
+    threshold : Threshold, KnownBand or type
         A rule, what it has fitted, or the class of one.
 
     Returns
@@ -142,12 +146,12 @@ def is_per_run(threshold: Threshold | FittedThreshold | type) -> bool:
     return bool(getattr(threshold, "per_run", False))
 
 
-def judges_whole_machine(threshold: FittedThreshold | type) -> bool:
+def judges_whole_machine(threshold: KnownBand | type) -> bool:
     """Return whether the statistic of a threshold has one column, of the whole machine, whatever the signal has.
 
     Parameters
     ----------
-    threshold : FittedThreshold or type
+    threshold : KnownBand or type
         A fitted threshold, or the class of one.
 
     Returns
@@ -166,7 +170,7 @@ def judges_whole_machine(threshold: FittedThreshold | type) -> bool:
 
 
 def exceedance(
-    threshold: FittedThreshold,
+    threshold: KnownBand,
     recording: Recording,
     signal: Signal,
     evaluated: tuple[Signal, Band] | None = None,
@@ -175,7 +179,7 @@ def exceedance(
 
     Parameters
     ----------
-    threshold : FittedThreshold
+    threshold : KnownBand
         The fitted threshold.
     recording : Recording
         The recording on the load side.

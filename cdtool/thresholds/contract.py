@@ -9,7 +9,7 @@ import numpy as np
 from cdtool.detection import Band, Signal, contiguous
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, Threshold, exceedance, judges_whole_machine
+from cdtool.thresholds.base import FittedThreshold, KnownBand, Threshold, exceedance, judges_whole_machine
 from cdtool.thresholds.comparison_kernel import unknown_but_valid
 from cdtool.value_words import fault_and_place
 
@@ -56,13 +56,13 @@ def checked_fit(rule: Threshold, pairs: Sequence[tuple[Recording, Signal]]) -> F
     return fitted
 
 
-def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
+def checked_evaluation(threshold: KnownBand, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
     """Return the statistic and band of a fitted threshold, after checking them against the contract.
 
     Parameters
     ----------
-    threshold : FittedThreshold
-        Any fitted threshold; may come from a plug-in.
+    threshold : KnownBand
+        Any known band; may come from a plug-in.
     recording : Recording
         The recording on the load side.
     signal : Signal
@@ -107,19 +107,19 @@ def checked_evaluation(threshold: FittedThreshold, recording: Recording, signal:
     return statistic, band
 
 
-def checked_factor(threshold: FittedThreshold, factor: float) -> FittedThreshold:
+def checked_factor(threshold: KnownBand, factor: float) -> KnownBand:
     """Return the threshold with another safety factor.
 
     Parameters
     ----------
-    threshold : FittedThreshold
-        Any fitted threshold; may come from a plug-in.
+    threshold : KnownBand
+        Any known band; may come from a plug-in.
     factor : float
         The safety factor, above 0.
 
     Returns
     -------
-    FittedThreshold
+    KnownBand
         What `threshold.with_safety_factor` returned.
 
     Raises
@@ -142,7 +142,7 @@ def checked_factor(threshold: FittedThreshold, factor: float) -> FittedThreshold
 
 
 def checked_exceedance(
-    threshold: FittedThreshold,
+    threshold: KnownBand,
     recording: Recording,
     signal: Signal,
     evaluated: tuple[Signal, Band] | None = None,
@@ -151,8 +151,8 @@ def checked_exceedance(
 
     Parameters
     ----------
-    threshold : FittedThreshold
-        Any fitted threshold.
+    threshold : KnownBand
+        Any known band.
     recording : Recording
         The recording on the load side.
     signal : Signal

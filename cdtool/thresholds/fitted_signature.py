@@ -65,19 +65,16 @@ class FittedSignature(SendsFields):
     by_time: Curve
     by_position: Curve
     adaptive_level: float = 0.0
+    speed_range: bool = False
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
         """Return the signal and its band on the signal's clock; raises RecordingError without speed and position.
 
         With `adaptive_level` the band follows the run, by at most so many spreads, see `follow_level`. Raises
-        SignatureError if the signal is of other joints than those learned.
+        SignatureError if the signal is of other joints than those learned. `speed_range`: for the speeds between this
+        class and others see `thresholds.speed_range`.
         """
-        if signal.joints != self.joints:
-            learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
-            raise SignatureError(f"learned for the joints {learned}, not for {given}", "learn a signature for these")
-        if signal.values.shape[1] != self.by_time.count.shape[1]:
-            learned, given = (str(item.shape[1]) for item in (self.by_time.count, signal.values))
-            raise SignatureError(f"learned for {learned} joints, not for {given}", "learn a signature for these")
+        self.check_joints(signal)
         places = self._places(recording, signal.time)
         lower, upper = np.empty(signal.values.shape), np.empty(signal.values.shape)
         status = np.empty(signal.values.shape, dtype=np.uint8)
@@ -89,6 +86,25 @@ class FittedSignature(SendsFields):
             values = np.ascontiguousarray(signal.values)
             follow_level(signal.time, values, mean, spread, status, self.adaptive_level, lower, upper)
         return signal.changed(status=status), Band(lower, upper)
+
+    def check_joints(self, signal: Signal) -> None:
+        """Raise SignatureError if the signal is of other joints than those learned."""
+        if signal.joints != self.joints:
+            learned, given = (", ".join(names) or "none" for names in (self.joints, signal.joints))
+            raise SignatureError(f"learned for the joints {learned}, not for {given}", "learn a signature for these")
+        if signal.values.shape[1] != self.by_time.count.shape[1]:
+            learned, given = (str(item.shape[1]) for item in (self.by_time.count, signal.values))
+            raise SignatureError(f"learned for {learned} joints, not for {given}", "learn a signature for these")
+
+    def normal(self, where: Progress, status: StatusArray) -> tuple[FloatArray, FloatArray]:
+        """Return mean and spread (n, J) at each location; NaN where too few runs were. `status` (n J,) is not changed.
+
+        The location is the time while `where` does not run, and the travel from there on.
+        """
+        shape = len(where.elapsed), self.by_time.count.shape[1]
+        mean, spread = np.empty(shape), np.empty(shape)
+        limits_at(*self._located(where), *self._mean, *self._spread, status, mean, spread, np.empty_like(status))
+        return mean, spread
 
     def _places(self, recording: Recording, clock: FloatArray) -> tuple[PlaceArray, PlaceArray, FloatArray]:
         """Return where each sample is on the grids, see `locate`; found once for all signatures with these grids."""
@@ -244,6 +260,7 @@ class FittedSignature(SendsFields):
             "by_time": self.by_time.to_dict(),
             "by_position": self.by_position.to_dict(),
             "adaptive_level": self.adaptive_level,
+            "speed_range": self.speed_range,
         }
 
     @classmethod
@@ -266,6 +283,7 @@ class FittedSignature(SendsFields):
             by_time=Curve.from_dict(values["by_time"]),
             by_position=Curve.from_dict(values["by_position"]),
             adaptive_level=float(values.get("adaptive_level", 0.0)),
+            speed_range=bool(values.get("speed_range", False)),
         )
 
     def progress(self, recording: Recording, clock: FloatArray) -> Progress:

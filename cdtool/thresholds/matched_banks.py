@@ -215,7 +215,7 @@ class MatchedBanks:
         """Return the model of some runs, with evidence that is not standardised yet."""
         two_sided = self.sides != "one"
         sides = "two" if two_sided else "one"
-        signature = replace(rule, sides=sides, safety_factor=1.0, adaptive_level=0.0).fit(pairs)
+        signature = replace(rule, sides=sides, safety_factor=1.0, adaptive_level=0.0, speed_range=False).fit(pairs)
         period, step = common_period(pairs), rule.position_step
         signal = pairs[0][1]
         columns = signal.channels or (("", "whole machine"),) * signal.values.shape[1]

@@ -54,6 +54,8 @@ class Signature:
     adaptive_level : float
         The band follows the slow change of a run by at most this many spreads: other friction, temperature, an offset.
         0: it stays where it was learned.
+    speed_range : bool
+        At speeds between two learned ones the band is interpolated; see `thresholds.speed_range`.
     force : bool
         Learn from fewer than 10 runs, but at least 2.
 
@@ -64,8 +66,8 @@ class Signature:
 
     Notes
     -----
-    Thesis 5.2.3 and 6.2.3. Learned for one class of motion (direction and speed). Fails with another speed, payload or
-    path, with temperature steps, in the first metres after a long stop, and with few runs.
+    Thesis 5.2.3 and 6.2.3. Learned for one class of motion (direction and speed). Fails with another speed (see
+    `speed_range`), payload or path, with temperature steps, in the first metres after a long stop, and with few runs.
 
     Examples
     --------
@@ -92,6 +94,7 @@ class Signature:
     position_window: float = 20e-3
     force: bool = False
     adaptive_level: float = 0.0
+    speed_range: bool = False
 
     name: ClassVar[str] = "signature"
     needs: ClassVar[tuple[str, ...]] = ("speed", "position")
@@ -109,6 +112,11 @@ class Signature:
             raise UsageError("the grid step must be above 0 and at most the window", "see docs/signature.md")
         if not 0.0 <= self.adaptive_level < math.inf:
             raise UsageError(f"adaptive_level is {self.adaptive_level}", "give a number of spreads; 0: the band stays")
+        if self.speed_range and self.alignment == "time":
+            raise UsageError(
+                "speed_range cannot be combined with alignment 'time': at another speed a time is another location",
+                "choose time_then_position or position",
+            )
 
     @property
     def factor(self) -> float:
@@ -154,6 +162,7 @@ class Signature:
             by_time=by_time.learned(np.array(samples[0])),
             by_position=by_position.learned(np.array(samples[1])),
             adaptive_level=self.adaptive_level,
+            speed_range=self.speed_range,
         )
         if not any(np.isfinite(curve.band(True)[0]).any() for curve in (fitted.by_time, fitted.by_position)):
             reasons = pairs[0][1].why_not() if not pairs[0][1].valid.any() else "valid in too few runs at a time"

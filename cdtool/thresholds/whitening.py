@@ -65,7 +65,7 @@ class Whitening:
     def _of(cls, rule: Signature, order: int, pairs: Sequence[tuple[Recording, Signal]]) -> Self:
         # Both sides and one spread: mean and spread are the middle and half the width of its band. A band that follows
         # its run would leave other innovations than those that were learned.
-        signature = replace(rule, sides="two", safety_factor=1.0, adaptive_level=0.0).fit(pairs)
+        signature = replace(rule, sides="two", safety_factor=1.0, adaptive_level=0.0, speed_range=False).fit(pairs)
         period = common_period(pairs)
         deviations = [_deviation(signature, recording, signal) for recording, signal in pairs]
         coefficients = np.zeros((order, deviations[0].values.shape[1]))

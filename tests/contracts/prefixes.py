@@ -39,6 +39,12 @@ RUNS = 10
 LEARNED = (0.3, -0.3, 0.15)
 TRIED = (0.3, -0.3, 0.22, 0.15)
 MACHINES = ("axis", "arm", "robot")
+# Settings of a signature that make its band depend on the run.
+SETTINGS: tuple[tuple[tuple[str, Any], ...], ...] = (
+    (("adaptive_level", 6.0),),
+    (("speed_range", True),),
+    (("adaptive_level", 6.0), ("speed_range", True)),
+)
 
 
 @cache
@@ -153,11 +159,12 @@ class Combination:
     reference: bool
     detector: str
     threshold: str
+    settings: tuple[tuple[str, Any], ...] = ()
 
     def __str__(self) -> str:
-        return (
-            f"{self.machine}, {'with' if self.reference else 'without'} reference, {self.detector} x {self.threshold}"
-        )
+        reference = "with" if self.reference else "without"
+        settings = "".join(f", {name} {value}" for name, value in self.settings)
+        return f"{self.machine}, {reference} reference, {self.detector} x {self.threshold}{settings}"
 
 
 def combinations() -> Iterator[Combination]:
@@ -167,6 +174,9 @@ def combinations() -> Iterator[Combination]:
             for detector in DETECTORS.names(plugins=True):
                 for threshold in THRESHOLDS.names(plugins=True):
                     yield Combination(machine, reference, detector, threshold)
+    for machine in MACHINES:
+        for settings in SETTINGS:
+            yield Combination(machine, False, "momentum", "signature", settings)
 
 
 @cache
@@ -193,7 +203,7 @@ def signals(machine: str, reference: bool, detector: str) -> tuple[Any, ...]:
 def learned(item: Combination) -> Fitted:
     """What the combination learns; raises CdtoolError where it cannot be used on these logs."""
     made = signals(item.machine, item.reference, item.detector)
-    rule = for_machine(THRESHOLDS.load(item.threshold)(), machine_of(item.machine))
+    rule = for_machine(THRESHOLDS.load(item.threshold)(**dict(item.settings)), machine_of(item.machine))
     return fitting(rule)(list(zip(runs(item.machine, item.reference), made, strict=True)))
 
 

@@ -766,6 +766,13 @@ SENTENCES: list[tuple[Fact, str]] = [
     (scoring.PlotsLeftOut(7), "7 more operations with a miss or a false alarm have no trigger plot"),
     (scoring.LimitsUnchecked(1, 2), "1 of 2 limits are set for detectors that were not run: not checked"),
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
+    (
+        scoring.SingleSpeed("forward at 0.2 m/s"),
+        (
+            "speed_range has no effect: of this motion only one speed was learned, forward at 0.2 m/s; add runs at "
+            "another speed"
+        ),
+    ),
     (scoring.DetectorUnassessable("nothing is valid"), "not assessable: nothing is valid"),
     (
         scoring.NothingLearnedWithout("momentum", "9 impact-free runs of one class"),

@@ -25,13 +25,13 @@ label = { column = "hit", scale = 1 }
 STROKE = 4.0
 
 
-def write_log(path: Path, strokes: int, contacts: dict[int, float], seed: int) -> None:
-    """Write strokes back and forth at 0.25 m/s, 4 s each; `contacts` are forces [N] on the drive by stroke number."""
+def write_log(path: Path, strokes: int, contacts: dict[int, float], seed: int, nominal_speed: float = 0.25) -> None:
+    """Write strokes back and forth, 4 s each; `contacts` are forces [N] on the drive by stroke number."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(strokes * STROKE / 1e-3)) * 1e-3
     phase = time % STROKE
     direction = np.where((time // STROKE).astype(int) % 2 == 0, 1.0, -1.0)
-    speed = direction * np.interp(phase, [0.0, 0.5, 1.0, 3.0, 3.5, 4.0], [0.0, 0.0, 0.25, 0.25, 0.0, 0.0])
+    speed = nominal_speed * direction * np.interp(phase, [0.0, 0.5, 1.0, 3.0, 3.5, 4.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
     rate = np.gradient(speed, 1e-3)
     pushed = np.zeros(len(time))
     for stroke, force in contacts.items():

@@ -134,7 +134,7 @@ class Teaching:
         about = AboutLearning(
             detectors=tuple(detector.name for detector in self._detectors[0]),
             skipped=(*runs.skipped, *made.skipped, *unassessable),
-            findings=(*runs.findings, *self._detectors[1], *made.not_assessable),
+            findings=(*runs.findings, *self._detectors[1], *made.findings),
             calibration=tuple(made.calibration),
             unusable=made.unusable,
             names=tuple(operation.name for operation in used),

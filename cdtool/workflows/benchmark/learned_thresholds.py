@@ -25,7 +25,7 @@ from cdtool.workflows.signature.fitting import NoUsableRunError, Pair, fitting, 
 
 @dataclass(frozen=True)
 class LearnedThresholds:
-    """Each detector's thresholds, runs left out, detectors that were not assessable, and how factors were set.
+    """Each detector's thresholds, runs left out, findings about detectors, and how factors were set.
 
     `unusable` maps the detectors that could not be used on any run to the reason; they have no threshold. `unused`: the
     runs that every other detector left out. `pairs` are the runs by detector if logs are scored that are learned from.
@@ -33,7 +33,7 @@ class LearnedThresholds:
 
     thresholds: dict[str, tuple[FittedThreshold, ...]]
     skipped: list[Skipped]
-    not_assessable: list[RecordingFinding]
+    findings: list[RecordingFinding]
     calibration: list[CalibrationResult]
     unusable: dict[str, str]
     unused: set[str]
@@ -80,13 +80,14 @@ def learn_thresholds(
                 learned.unusable[detector.name] = of_detector.reason
             else:
                 unassessable = Finding(DetectorUnassessable(of_detector.reason))
-                learned.not_assessable.append(RecordingFinding.of(detector.name, unassessable))
+                learned.findings.append(RecordingFinding.of(detector.name, unassessable))
             continue
         skipped = [*of_detector.skipped, *of_detector.made.skipped]
         left_out.add(detector.name, skipped)
         unused.append({item.recording for item in skipped})
         learned.calibration.extend(of_detector.made.calibration)
         learned.thresholds[detector.name] = of_detector.made.thresholds
+        learned.findings.extend(of_detector.made.findings)
         learned.pairs[detector.name] = of_detector.pairs
     learned.skipped.extend(left_out.combined())
     learned.unused.update(set.intersection(*unused) if unused else ())
@@ -99,6 +100,7 @@ def learn_thresholds(
 class _Made:
     thresholds: tuple[FittedThreshold, ...]
     skipped: tuple[Skipped, ...]
+    findings: tuple[RecordingFinding, ...]
     calibration: tuple[CalibrationResult, ...] = ()
 
 
@@ -144,14 +146,16 @@ class _Learning:
 
 def _learn(setup: BenchmarkFile, detector: str, pairs: Sequence[Pair], left_out: Sequence[Skipped] = ()) -> _Made:
     """Learn one detector's thresholds from runs; a budget sets their safety factor on the same runs."""
-    fit = fitting(setup.rule_of(detector))
+    rule = setup.rule_of(detector)
+    fit = fitting(rule)
     fitted = with_left_out(fit, left_out)(pairs)
+    findings = fitted.findings(rule, detector)
     if not setup.budget:
-        return _Made(fitted.thresholds, fitted.skipped)
+        return _Made(fitted.thresholds, fitted.skipped, findings)
     made = calibrate(setup.budget, detector, kept(pairs, fitted.skipped), fit, setup.activation, setup.split)
     result = CalibrationResult(detector, str(setup.budget), made.factor, made.operations, made.hours, made.alarms)
     thresholds = tuple(item.with_safety_factor(made.factor) for item in fitted.thresholds)
-    return _Made(thresholds, fitted.skipped, (result,))
+    return _Made(thresholds, fitted.skipped, findings, (result,))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,10 @@ from typing import Any
 from cdtool.detection import Signal
 from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError
-from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.findings.finding import Finding
+from cdtool.findings.scoring import SingleSpeed
+from cdtool.motion.speed_range import in_ranges
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector_on_each
 from cdtool.plain_text import counted
@@ -40,6 +43,14 @@ class Fitted:
     thresholds: tuple[FittedThreshold, ...]
     learned_from: tuple[tuple[Operation, ...], ...]
     skipped: tuple[Skipped, ...]
+
+    def findings(self, rule: Threshold, detector: str) -> tuple[RecordingFinding, ...]:
+        """Return a finding for each motion that `speed_range` of the rule cannot serve, learned at a single speed."""
+        if not getattr(rule, "speed_range", False):
+            return ()
+        motions = [motion for item in self.thresholds if (motion := getattr(item, "motion", None))]
+        single = [motions[numbers[0]].described for numbers in in_ranges(motions) if len(numbers) == 1]
+        return tuple(RecordingFinding.of(detector, Finding(SingleSpeed(motion))) for motion in single)
 
     @property
     def used(self) -> tuple[Operation, ...]:

@@ -199,7 +199,8 @@ def learned_from_runs(
         machine_parameters=machine_parameters(machine_file.machine),
     )
     counts = zip((getattr(item, "motion", None) for item in thresholds), map(len, fitted.learned_from), strict=True)
-    return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), runs.findings)
+    findings = (*runs.findings, *fitted.findings(rule, instance.name))
+    return Learned(signature, tuple(counts), (*runs.skipped, *skipped, *fitted.skipped), findings)
 
 
 def _part(paths: Sequence[Path], options: LearningOptions) -> PartOfLog | None:

@@ -33,7 +33,14 @@ def read_signature(table: Table, default_sides: str) -> Signature:
         "position_window": table.number("position_window", Signature.position_window, above=0.0),
         "force": table.flag("force", False),
         "adaptive_level": table.number("adaptive_level", Signature.adaptive_level, minimum=0.0),
+        "speed_range": table.flag("speed_range", Signature.speed_range),
     }
+    if settings["speed_range"] and settings["alignment"] == "time":
+        raise table.fault(
+            "speed_range",
+            "cannot be combined with an alignment by time: at another speed a time is another location",
+            "align by time_then_position or position",
+        )
     if "safety_factor" in table:
         settings["safety_factor"] = table.number("safety_factor", above=0.0)
     table.finish()
@@ -64,6 +71,12 @@ def read_threshold(root: Table, signature: Signature) -> tuple[str, Threshold]:
             "threshold",
             f"'{name}' does not follow a run: adaptive_level of [signature] is for the threshold 'signature'",
             "remove adaptive_level, or choose that threshold",
+        )
+    if signature.speed_range:
+        raise root.fault(
+            "threshold",
+            f"'{name}' has no limits between speeds: speed_range of [signature] is for the threshold 'signature'",
+            "remove speed_range, or choose that threshold",
         )
     rule = THRESHOLDS.load(name)
     own = [item for item in fields(rule) if item.name != "signature"]

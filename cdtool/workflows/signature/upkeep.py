@@ -17,6 +17,7 @@ from cdtool.evaluation.upkeep.audit import DriftAudit
 from cdtool.evaluation.upkeep.coverage import Coverage, check_coverage
 from cdtool.evaluation.upkeep.drift import audit_drift
 from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.motion.speed_course import TOLERANCE
 from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
 from cdtool.plain_text import counted
@@ -355,10 +356,13 @@ def _with_operation(
     if detection.verdict.outcome == "not_assessable":
         raise SignatureError(f"not assessable: {detection.verdict.reason}")
     pairs = signatures_in(file)
-    if not any(item.motion.matches(operation.motion, SPEED_TOLERANCE) for item, _ in pairs):
+    # With `speed_range` a run between two classes is assessed, too, and would teach the nearer one another speed.
+    tolerance = TOLERANCE if pairs[0][0].speed_range else SPEED_TOLERANCE
+    own = [i for i, (item, _) in enumerate(pairs) if item.motion.matches(operation.motion, tolerance)]
+    if not own:
         known = " and ".join(item.motion.described for item, _ in pairs)
         raise SignatureError(f"no signature for its class: runs {operation.motion.described}, learned {known}")
-    index = next(i for i, (item, _) in enumerate(pairs) if item.motion.matches(operation.motion, SPEED_TOLERANCE))
+    index = own[0]
     current, first = pairs[index]
     recording = operation.recording.without_ground_truth()
     forget, cap, reserve = guard

@@ -72,7 +72,8 @@ def benchmark_text(tuning: Tuning, tuned: TunedDetector, factor: float, folder: 
     if "signature" in document:
         document["signature"].pop("safety_factor", None)
         if tuned.choice.rule.name != "signature":
-            document["signature"].pop("adaptive_level", None)  # other thresholds do not follow a run
+            for name in ("adaptive_level", "speed_range"):  # of the threshold signature only
+                document["signature"].pop(name, None)
     document["threshold"] = _threshold(tuned.choice.rule, setup.signature.sides)
     limited = document["threshold"]
     if tuned.choice.rule.name == "signature":

@@ -371,7 +371,7 @@ class _TuningOf:
         if hasattr(self._detector, "own_threshold"):
             return rules_to_try([default], channels)
         machine, setup = self.setup.machine_file.machine, self.setup
-        signature = replace(setup.signature, adaptive_level=0.0)
+        signature = replace(setup.signature, adaptive_level=0.0, speed_range=False)
         rules: list[Threshold] = []
         for name in self.options.thresholds or THRESHOLDS.usable_names():
             rule = THRESHOLDS.load(name)

@@ -138,6 +138,15 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
             'threshold = "glr"\n[signature]\nadaptive_level = 6\n',
             "threshold: 'glr' does not follow a run.*adaptive_level",
         ),
+        (
+            'threshold = "glr"\n[signature]\nspeed_range = true\n',
+            "threshold: 'glr' has no limits between speeds.*speed_range",
+        ),
+        (
+            '[signature]\nspeed_range = true\nalignment = "time"\n',
+            "signature.speed_range: cannot be combined with an alignment by time.*time_then_position",
+        ),
+        ('[signature]\nspeed_range = "yes"\n', "signature.speed_range: is 'yes'"),
     ],
 )
 def test_a_wrong_threshold_is_one_line_that_names_its_key(door, text, said):

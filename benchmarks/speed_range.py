@@ -1,0 +1,154 @@
+"""What signatures do at speeds between two learned ones, with speed_range, and beside one learned at that very speed.
+
+    python benchmarks/speed_range.py                                      # seeds 601 to 605, 100 runs a speed
+    python benchmarks/speed_range.py --seeds 1 --runs 10 --impacts 4 --machines gate --speeds 0.9 1.0
+
+Each seed: 14 free runs at 0.8 and 14 at 1.2 of the nominal speed to learn from, for comparison 14 at the tested speed,
+and at that speed other impact-free runs, stiff and soft impacts. A share that is not assessable is that of the samples
+in motion. --stribeck-speed: up to about this speed [m/s] the gate's friction falls as the speed rises, instead of up to
+0.02 m/s; it is then far from linear between the learned speeds. All of it is a simulation, and no evidence about a real
+machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from statistics import fmean
+
+import fused
+import numpy as np
+from fused import Cell, Run
+from timing import environment, table
+
+from cdtool.activation import Activation
+from cdtool.detection import Status
+from cdtool.pipeline import judge
+from cdtool.simulation.changed_machine import ChangedMachine
+from cdtool.simulation.gate_model import GateParameters
+from cdtool.thresholds.base import FittedThreshold
+from cdtool.thresholds.signature import Signature
+
+FIRST_SEED = 601
+LEARNED = (0.8, 1.2)
+SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 0.7, 1.3)
+MACHINES = ("gate", "T1", "T2")
+DETECTORS = ("momentum", "friction_ekf", "inertial_momentum", "pure_inertia", "pure_torque")
+GROUPS = ("stiff", "soft")
+RUNS = 14
+# Of runs within the range: the most that may alarm, and the most that the latency may be above that of a signature of
+# the same speed, at the learned speeds.
+MOST_ALARMS, MOST_SLOWER = 0.05, 0.05
+
+
+@dataclass
+class Tally:
+    """Of one kind of signature: runs, those that alarm, shares not assessable, missed contacts, latencies [ms]."""
+
+    runs: int = 0
+    alarming: int = 0
+    missed: int = 0
+    unassessed: list[float] = field(default_factory=list)
+    latencies: dict[str, list[float]] = field(default_factory=lambda: {group: [] for group in GROUPS})
+
+    def mean(self, group: str) -> float:
+        """Return the mean latency [ms] of a group."""
+        return fmean(self.latencies[group]) if self.latencies[group] else math.nan
+
+    def add(self, run: Run, group: str, thresholds: Sequence[FittedThreshold]) -> None:
+        """Add the result of a run: an impact-free one, or one of a group of impacts."""
+        detection = judge(run.operation, "it", run.signal, thresholds, Activation())
+        times = [alarm.time for alarm in detection.verdict.alarms]
+        if group in GROUPS:
+            after = [time for time in times if run.onset <= time <= run.onset + fused.WINDOW]
+            self.missed += not after
+            self.latencies[group] += [1e3 * (after[0] - run.onset)] if after else []
+            return
+        self.runs += 1
+        self.alarming += bool(times)
+        status = detection.statistic.status[:, 0]
+        moves = status != Status.NO_LIMIT
+        self.unassessed.append(float(np.mean(status[moves] == Status.OTHER_SPEED)))
+
+    def shown(self) -> list[str]:
+        """Return the cells of a table."""
+        share = f"{100.0 * fmean(self.unassessed):.0f} %"
+        return [
+            f"{self.alarming} of {self.runs}",
+            share,
+            *(f"{self.mean(group):.1f}" for group in GROUPS),
+            f"{self.missed}",
+        ]
+
+
+def learned(cell: Cell, speed: float) -> FittedThreshold:
+    """Return the signature of one speed."""
+    rule = Signature(sides=cell.machine_file.machine.default_sides, speed_range=True)
+    runs = cell.runs("free", RUNS, ChangedMachine(speed=speed))
+    return rule.fit([(run.operation.recording, run.signal) for run in runs])
+
+
+def measure(name: str, detector: str, options: argparse.Namespace) -> list[str]:
+    """Print a table of a detector on a machine, and return what misses the targets."""
+    tallies = {speed: (Tally(), Tally()) for speed in options.speeds}
+    counts = {"fresh": options.runs, **dict.fromkeys(GROUPS, options.impacts)}
+    for seed in range(FIRST_SEED, FIRST_SEED + options.seeds):
+        cell = Cell(name, seed, detector)
+        ends = [learned(cell, speed) for speed in LEARNED]
+        for speed, (own, between) in tallies.items():
+            same = dict(zip(LEARNED, ends, strict=True)).get(speed) or learned(cell, speed)
+            for group, count in counts.items():
+                for run in cell.runs(group, count, ChangedMachine(speed=speed)):
+                    own.add(run, group, [same])
+                    between.add(run, group, ends)
+    print(f"\n{name}, {detector}", flush=True)
+    head = ("speed", "alarming", "n.a.", *GROUPS, "missed", "alarming", "n.a.", *GROUPS, "missed")
+    table(head, [(f"{speed:g}", *own.shown(), *between.shown()) for speed, (own, between) in tallies.items()])
+    return [
+        f"{name}, {detector}, {speed:g}: {fault}"
+        for speed, (own, between) in tallies.items()
+        for fault in faults(speed, own, between)
+    ]
+
+
+def faults(speed: float, own: Tally, between: Tally) -> list[str]:
+    """Return what misses the targets at a speed."""
+    found = []
+    if LEARNED[0] <= speed <= LEARNED[1] and between.alarming > MOST_ALARMS * between.runs:
+        found.append(f"{between.alarming} of {between.runs} runs alarm")
+    for group in GROUPS if speed in LEARNED else ():
+        if between.mean(group) > (1.0 + MOST_SLOWER) * own.mean(group):
+            found.append(f"{group} contacts {between.mean(group):.1f} ms, not {own.mean(group):.1f} ms")
+    return found
+
+
+def main(arguments: list[str]) -> int:
+    """Print a table per machine and detector, and 1 where one alarms too often or becomes too slow."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--runs", type=int, default=20, help="impact-free runs of each seed and speed")
+    parser.add_argument("--impacts", type=int, default=10, help="impacts of each kind, seed and speed")
+    parser.add_argument("--machines", nargs="+", choices=MACHINES, default=list(MACHINES))
+    parser.add_argument("--speeds", nargs="+", type=float, default=list(SPEEDS), help="shares of the nominal speed")
+    parser.add_argument("--detectors", nargs="+", default=list(DETECTORS), help="full names")
+    parser.add_argument("--stribeck-speed", type=float, default=GateParameters.stribeck_speed)
+    options = parser.parse_args(arguments)
+    gate = replace(GateParameters(), stribeck_speed=options.stribeck_speed)
+    fused.GATES.update(dict.fromkeys(("free", "fresh", *GROUPS), gate))
+    print(environment())
+    found = [
+        fault
+        for name in options.machines
+        for detector in options.detectors
+        for fault in measure(name, detector, options)
+    ]
+    print("\nleft: learned at that speed; right: learned at", " and ".join(map(str, LEARNED)), "with speed_range")
+    print(*found, sep="\n")
+    return int(bool(found))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
