@@ -177,18 +177,18 @@ def _measure(folder: Path, calls: Any, options: argparse.Namespace) -> int:
     inputs.mkdir()
     prepare(inputs, lambda words: _must(run(words, None, Strike(), inputs), words))
     _run_once(inputs)
-    known = {
-        case: _undisturbed(case, folder / f"old{number}", folder / "out", calls)
-        for number, case in enumerate(cases(inputs))
-        if options.only in case.name
-    }
+    known: dict[Case, Known] = {}  # a few tries do not come to every command
     rng = random.Random(options.seed)
     rows, wrong = [], []
-    turns = itertools.cycle(known.items())  # faults begin with the case after the last one that was killed
+    chosen = [case for case in cases(inputs) if options.only in case.name]
+    turns = itertools.cycle(chosen)  # faults begin with the case after the last one that was killed
     for what, wanted in (("kills", options.kills), ("faults", options.faults if calls else 0)):
         begin, done, tried = time.monotonic(), Counter[str](), 0
         while tried < wanted:
-            case, of_case = next(turns)
+            case = next(turns)
+            if case not in known:
+                known[case] = _undisturbed(case, folder / f"old{len(known)}", folder / "out", calls)
+            of_case = known[case]
             strike = _kill(rng, of_case, calls) if what == "kills" else _fault(rng, of_case)
             problem, struck = _try(case, of_case, strike, folder / "out", calls)
             if not struck:
