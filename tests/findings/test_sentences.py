@@ -829,6 +829,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         "plc: 2 of 9 recordings without a row: counted as monitored without an alarm; first stiff/01.csv",
     ),
     (
+        scoring.ConditionsNotTunedOn(2),
+        "2 changed conditions: not used for tuning: the tuned benchmark files have them, and cdtool benchmark scores them",
+    ),
+    (
         placeholders.PlaceholderRatio(157.08),
         "transmission_ratio = 1 m/rad is a placeholder of cdtool init: with it the load moves at 157 m/s; give the "
         "travel per motor angle",
