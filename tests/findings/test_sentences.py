@@ -830,7 +830,8 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (
         scoring.ConditionsNotTunedOn(2),
-        "2 changed conditions: not used for tuning: the tuned benchmark files have them, and cdtool benchmark scores them",
+        "2 changed conditions: not used for tuning: the tuned benchmark files have them, and cdtool benchmark scores "
+        "them",
     ),
     (
         placeholders.PlaceholderRatio(157.08),
