@@ -73,7 +73,7 @@ def cases(inputs: Path) -> list[Case]:
     stiff = [f"{gate}/stiff/0{number}.csv" for number in (1, 2)]
     a, b = f"{inputs}/a.json", f"{inputs}/b.json"
     season = [f"{inputs}/season/free/{number:02d}.csv" for number in range(1, 34)]
-    weather = ("--conditions", f"{inputs}/season/conditions.csv", "--false-alarm-budget", "1/100op")
+    weather = ("--ambient", f"{inputs}/season/ambient.csv", "--false-alarm-budget", "1/100op")
     every = [
         word
         for suffix in ("json", "html", "md", "xml", "csv", "png", "svg", "pdf")

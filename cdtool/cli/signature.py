@@ -179,9 +179,9 @@ def forecast(
         ),
     ],
     machine: MachineOption,
-    conditions: Annotated[
+    ambient: Annotated[
         Place | None,
-        typer.Option("--conditions", parser=location, help="CSV with recording, date and temperature_c of the logs."),
+        typer.Option("--ambient", parser=location, help="CSV with recording, date and temperature_c of the logs."),
     ] = None,
     temperatures: Annotated[
         str | None,
@@ -223,7 +223,7 @@ def forecast(
 ) -> None:
     """Forecast false alarms over the coming temperatures, and when to relearn.
 
-    Example: cdtool signature forecast gate.gm.json season/*.csv -m machine.toml --conditions conditions.csv
+    Example: cdtool signature forecast gate.gm.json season/*.csv -m machine.toml --ambient ambient.csv
     --temperatures -10:5 --false-alarm-budget 1/100op
     """
     from cdtool.evaluation.truth.onset import OnsetRule
@@ -238,7 +238,7 @@ def forecast(
             file,
             logs,
             machine,
-            conditions=conditions,
+            ambient=ambient,
             temperatures=None if temperatures is None else _temperatures(temperatures),
             expected=expected,
             until=until,

@@ -150,7 +150,7 @@ def season(
 ) -> None:
     """Simulate a season of the sliding gate without impacts: drifting friction, weather, a growing obstruction.
 
-    conditions.csv contains date and temperature of each run.
+    ambient.csv contains date and temperature of each run.
 
     Example: cdtool simulate season --runs 200 --friction-per-kelvin -0.01 --runs-per-day 2 -o season
     """
@@ -189,7 +189,7 @@ def _report(output: Path, written: int, counts: Mapping[str, int], seed: int, as
     recordings, why_not = counted(written, "recording"), without_benchmark(counts)
     files = "machine.toml" if why_not else "machine.toml, benchmark.toml"
     if set(counts) == {"free"}:  # a season
-        files += ", conditions.csv"
+        files += ", ambient.csv"
     typer.echo(f"{recordings}, {files} and contacts.csv written to {plain(output)}")
     if why_not and set(counts) > {"free"}:  # a season has nothing to score
         typer.echo(f"no benchmark.toml: {why_not}")

@@ -118,8 +118,10 @@ class Fused:
             )
         lost = np.column_stack([column.lost for column in columns])
         status = np.column_stack([column.status for column in columns])
-        # Without the speed nothing is known of the motion.
-        unknown: BoolArray = np.any(np.isnan(recording["speed"].values), axis=1, keepdims=True)
+        # Without the speed nothing is known of the motion; a joint that never has one is left out.
+        missing: BoolArray = np.isnan(recording["speed"].values)
+        known = ~missing.all(axis=0) if not missing.all() else np.ones(missing.shape[1], dtype=bool)
+        unknown: BoolArray = np.any(missing[:, known], axis=1, keepdims=True)
         status[(status == Status.VALID) & unknown] = Status.GAP
         return Signal(
             clock,
@@ -162,13 +164,14 @@ class Fused:
 def _notes(recording: Recording, columns: Sequence[_Column]) -> tuple[str, ...]:
     """Return what is not used for want of samples, and what that costs."""
     used = {(column.channel, column.joint) for column in columns}
-    if "acceleration" not in recording:
-        return ("fused without acceleration: stiff contacts are detected later",)
-    return tuple(
-        f"fused without acceleration of {joint}: its stiff contacts are detected later"
-        for joint in recording.joints
-        if ("acceleration", joint) not in used
-    )
+    notes = [] if "acceleration" in recording else ["fused without acceleration: stiff contacts are detected later"]
+    for joint in recording.joints:
+        lost = [name for name in ("torque", "speed", "acceleration") if name in recording and (name, joint) not in used]
+        if lost == ["acceleration"]:
+            notes.append(f"fused without acceleration of {joint}: its stiff contacts are detected later")
+        elif lost:
+            notes.append(f"fused without {', '.join(lost)} of {joint}: contacts with it are detected later, if at all")
+    return tuple(notes)
 
 
 def _robot(recording: Recording) -> list[_Column]:

@@ -114,12 +114,12 @@ def write_gate_season(
 ) -> int:
     """Write a season's recordings, free/001 and so on in their order, as `write_gate_recordings` does; how many.
 
-    conditions.csv has the date and temperature of each run. Same seed, same bytes. The machine file is that of the gate
+    ambient.csv has the date and temperature of each run. Same seed, same bytes. The machine file is that of the gate
     as it is in the first run. Raises UsageError where the folder is not empty.
     """
     new = parameters or GateParameters()
     bench = replace(
         gate_bench(new, lambda _, number: season.run(number, seed, new)),
-        condition=lambda number: (season.time(number).isoformat("T", "minutes"), season.temperature(number, seed)),
+        ambient=lambda number: (season.time(number).isoformat("T", "minutes"), season.temperature(number, seed)),
     )
     return write_folder(folder, {"free": season.runs}, file_format, bench, progress)

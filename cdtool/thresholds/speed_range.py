@@ -103,7 +103,22 @@ class SignatureOverSpeeds(SendsFields):
 def over_speeds(thresholds: Sequence[KnownBand]) -> tuple[KnownBand, ...]:
     """Return the thresholds that apply to a log: signatures of neighbouring speeds with `speed_range` become one.
 
-    Others, and those of a direction and joint with a single class, stay as they are.
+    Parameters
+    ----------
+    thresholds : sequence of KnownBand
+        The fitted thresholds of a signature file, one per class of motion.
+
+    Returns
+    -------
+    tuple of KnownBand
+        Those of a direction and joint with a single class, and those without `speed_range`, as they are.
+
+    Examples
+    --------
+    >>> from cdtool.thresholds.limit import Limit
+    >>> limit = Limit.given([400.0])
+    >>> over_speeds([limit]) == (limit,)
+    True
     """
     own = [item for item in thresholds if isinstance(item, FittedSignature) and item.speed_range and item.motion.course]
     ranges: dict[int, SignatureOverSpeeds] = {}

@@ -142,7 +142,7 @@ def _forecast(files: Folder, *more: Path) -> Outcome:
     made = cdtool("simulate", "season", "--runs", 33, "--runs-per-day", 3, "-o", files.path / "season")
     assert made.status == 0, made.err
     logs = sorted((files.path / "season" / "free").iterdir())
-    table = ("--conditions", files.path / "season" / "conditions.csv", "--false-alarm-budget", "1/100op")
+    table = ("--ambient", files.path / "season" / "ambient.csv", "--false-alarm-budget", "1/100op")
     return cdtool("signature", "forecast", files.signature, *logs, *more, "-m", files.machine, *table)
 
 

@@ -21,7 +21,7 @@ def season(tmp_path_factory) -> Path:
         *("simulate", "season", "--runs", 46, "--runs-per-day", 3, "--friction-per-kelvin", -0.015),
         *("--temperature", 12, "--temperature-swing", 8, "--start", "2025-09-01", "--seed", 2, "-o", folder),
     )
-    assert made.status == 0 and "conditions.csv" in made.out, made.err
+    assert made.status == 0 and "ambient.csv" in made.out, made.err
     learned = cdtool(
         "learn-signature", *logs(folder)[:12], "-m", folder / "machine.toml", "-d", "gm", "-o", stored(folder)
     )
@@ -43,7 +43,7 @@ def forecast(folder: Path, *options: object, given: list[Path] | None = None) ->
 
 
 def table(folder: Path) -> tuple[object, ...]:
-    return ("--conditions", folder / "conditions.csv")
+    return ("--ambient", folder / "ambient.csv")
 
 
 def test_the_forecast_states_share_budget_date_and_what_it_rests_on(season, tmp_path):
@@ -82,7 +82,7 @@ def test_the_python_function_returns_the_same_as_the_command(season):
         stored(season),
         logs(season),
         season / "machine.toml",
-        conditions=season / "conditions.csv",
+        ambient=season / "ambient.csv",
         false_alarm_budget="1/20op",
     )
     share = json.loads(done.out)["classes"][0]["share"]
@@ -99,32 +99,32 @@ def test_expected_temperatures_are_read_from_a_table(season, tmp_path):
     assert found["coming_temperatures"] == [0.0, 9.0] and found["forecast_until"] == "2025-09-26"
 
 
-def test_without_conditions_the_drift_over_the_runs_is_forecast(season):
+def test_without_a_table_the_drift_over_the_runs_is_forecast(season):
     done = forecast(season, "--until", 20, *BUDGET)
     assert done.status == 0, done.err
     assert "temperature is not known: only the drift is forecast" in done.out and "spreads per run" in done.out
 
 
 def test_logs_without_a_row_or_a_temperature_are_left_out_by_name(season, tmp_path):
-    lines = (season / "conditions.csv").read_text(encoding="utf-8").splitlines()
+    lines = (season / "ambient.csv").read_text(encoding="utf-8").splitlines()
     lines[20] = lines[20].rpartition(",")[0] + ","
     del lines[30]
     text = "\n".join(line.replace("free/", f"{season}/free/") for line in lines)
-    path = tmp_path / "conditions.csv"
+    path = tmp_path / "ambient.csv"
     path.write_text(text.replace(f"{season}/free/", ""), encoding="utf-8")
-    done = forecast(season, "--conditions", path, *BUDGET)
+    done = forecast(season, "--ambient", path, *BUDGET)
     assert done.status == 3
     assert "20.csv: no temperature in" in done.err and "30.csv: no row in" in done.err
     assert "seen: 32 runs" in done.out
 
 
 def test_no_temperature_at_all_leaves_the_drift_over_the_dates(season, tmp_path):
-    lines = (season / "conditions.csv").read_text(encoding="utf-8").replace("free/", "").splitlines()
-    path = tmp_path / "conditions.csv"
+    lines = (season / "ambient.csv").read_text(encoding="utf-8").replace("free/", "").splitlines()
+    path = tmp_path / "ambient.csv"
     path.write_text("\n".join(line.rpartition(",")[0] for line in lines), encoding="utf-8")
-    done = forecast(season, "--conditions", path, *BUDGET)
+    done = forecast(season, "--ambient", path, *BUDGET)
     assert done.status == 0 and "spreads per day" in done.out, done.err
-    refused = forecast(season, "--conditions", path, "--temperatures", "0:5", *BUDGET)
+    refused = forecast(season, "--ambient", path, "--temperatures", "0:5", *BUDGET)
     assert refused.status == 2 and "no log has a temperature" in refused.err
 
 
@@ -133,7 +133,7 @@ def test_no_temperature_at_all_leaves_the_drift_over_the_dates(season, tmp_path)
     [
         ((), "states no false-alarm budget (give --false-alarm-budget, as 1/100op)"),
         (("--false-alarm-budget", "1/8h"), "false-alarm budget is 1/8h"),
-        ((*BUDGET, "--temperatures", "0:5"), "add --conditions"),
+        ((*BUDGET, "--temperatures", "0:5"), "add --ambient"),
         ((*BUDGET, "TABLE", "--temperatures", "5:0"), "temperatures are 5 to 0"),
         ((*BUDGET, "TABLE", "--temperatures", "cold"), "--temperatures is 'cold'"),
         ((*BUDGET, "TABLE", "--temperatures", "-80:5"), "is too far outside"),
@@ -142,7 +142,7 @@ def test_no_temperature_at_all_leaves_the_drift_over_the_dates(season, tmp_path)
         ((*BUDGET, "TABLE", "--until", "2025-09-01"), "give a day after the last run"),
         ((*BUDGET, "TABLE", "--until", "2027-09-01"), "the forecast ends"),
         ((*BUDGET, "--until", "2025-12-01"), "the runs have no dates"),
-        ((*BUDGET, "--conditions", "absent.csv"), "absent.csv"),
+        ((*BUDGET, "--ambient", "absent.csv"), "absent.csv"),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_line(season, options, said):

@@ -44,7 +44,7 @@ commands = [
     ("signature", "check", signature, *sorted(folder.glob("free/*.csv")), "-m", machine),
     ("simulate", "season", "--runs", "33", "--runs-per-day", "3", "-o", folder / "season"),
     ("signature", "forecast", signature, *(folder / "season" / "free" / f"{n:02d}.csv" for n in range(1, 34)),
-     "-m", machine, "--conditions", folder / "season" / "conditions.csv", "--false-alarm-budget", "1/100op",
+     "-m", machine, "--ambient", folder / "season" / "ambient.csv", "--false-alarm-budget", "1/100op",
      "--plot", folder / "forecast.png"),
     ("signature", "update", signature, folder / "holdout" / "01.csv", "-m", machine),
     ("simulate", "arm", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", folder / "arm"),

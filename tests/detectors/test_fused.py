@@ -103,6 +103,34 @@ def test_a_watched_joint_leaves_all_columns_and_an_unknown_one_is_refused(gate, 
         signal.watching(("door",))
 
 
+def test_a_joint_without_a_single_sample_is_left_out_and_said(tmp_path):
+    """The log of a robot of which one joint is not mapped: the others are assessed."""
+    pytest.importorskip("pinocchio")
+    from tests.synthetic.robots import six_joint_robot
+
+    machine = six_joint_robot(tmp_path)
+    last = machine.joints[-1]
+
+    def unmapped(recording: Recording) -> Recording:
+        channels = {}
+        for name, series in recording.channels.items():
+            values = series.values.copy()
+            values[:, -1] = np.nan if name in ("torque", "speed", "acceleration") else values[:, -1]
+            channels[name] = series.with_values(values, series.unit)
+        return replace(recording, channels=channels)
+
+    known = [operations_of(unmapped(robot_stroke(machine, seed)))[0] for seed in range(12)]
+    signal = run_detector(known[0], machine, Fused())
+    assert signal.values.shape[1] == 15 and signal.valid[1500:2400].all()
+    assert signal.notes == (
+        f"fused without torque, speed, acceleration of {last}: contacts with it are detected later, if at all",
+    )
+    learned = fit_operations(known, machine, Fused(), MatchedBanks(order=4)).thresholds
+    hit = operations_of(unmapped(robot_stroke(machine, 91, 1.6)))[0]
+    verdict = detect_operation(hit, machine, Fused(), learned, AT_3).verdict
+    assert verdict.outcome == "alarm" and 1.6 <= verdict.alarms[0].time < 1.65
+
+
 @pytest.fixture(scope="module")
 def operations(simulated):
     return [operations_of(simulated("none", seed))[0] for seed in SEEDS]

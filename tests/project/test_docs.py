@@ -72,7 +72,7 @@ EXAMPLES = {
     "docs/detectors/friction-ekf.md": 1,
 }
 # Lines of shell blocks that set something up or take long: run by CI or by hand, not here.
-NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/")
+NOT_RUN_HERE = ("python3 -m venv ", "python benchmarks/", "python docs/make_")
 # Of the recordings that an example writes the later commands of its page get so many: each is learned from for every
 # other one. What the page says of all of them is checked by tests/whole_runs and benchmarks/robot_collisions.py.
 FEWER = {"docs/examples/robot_collisions.py": ("hits/hit_*.csv", 10)}

@@ -10,7 +10,7 @@ import pytest
 
 import cdtool
 from cdtool.errors import UsageError
-from cdtool.evaluation.upkeep.conditions import read_conditions
+from cdtool.evaluation.upkeep.ambient import read_ambient
 from cdtool.simulation.gate_model import GateParameters, GateRun, integrate_gate
 from cdtool.simulation.season import Season, write_gate_season
 
@@ -102,7 +102,7 @@ def test_runs_are_spread_over_the_hours_of_their_day():
 def test_a_season_has_a_table_with_date_and_temperature_of_each_run(tmp_path):
     season = Season(3, friction_per_kelvin=-0.01)
     write_gate_season(tmp_path / "season", season, 1)
-    found = read_conditions(tmp_path / "season" / "conditions.csv", [f"free/0{number}.csv" for number in (1, 2, 3)])
+    found = read_ambient(tmp_path / "season" / "ambient.csv", [f"free/0{number}.csv" for number in (1, 2, 3)])
     assert [item.when for item in found.values()] == [season.time(number) for number in (1, 2, 3)]
     temperatures = [item.temperature for item in found.values()]
     np.testing.assert_allclose(temperatures, [season.temperature(number, 1) for number in (1, 2, 3)], atol=0.051)

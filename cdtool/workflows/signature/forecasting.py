@@ -13,7 +13,7 @@ import numpy as np
 from cdtool.errors import SignatureError, UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
-from cdtool.evaluation.upkeep.conditions import Condition, read_conditions, read_expected
+from cdtool.evaluation.upkeep.ambient import Ambient, read_ambient, read_expected
 from cdtool.evaluation.upkeep.demand import Demand, demand_of
 from cdtool.evaluation.upkeep.forecast import LEAST_DAYS, Coming, Forecast, forecast_season
 from cdtool.evaluation.upkeep.season_model import SeasonRun
@@ -44,7 +44,7 @@ class ForecastOptions(SeasonOptions):
 
     Parameters
     ----------
-    conditions : str or Path, optional
+    ambient : str or Path, optional
         A CSV with recording, date and temperature_c of each log. Without it, or without temperatures in it, only the
         drift over the runs, or dates, is used.
     temperatures : tuple of float, optional
@@ -60,7 +60,7 @@ class ForecastOptions(SeasonOptions):
         Seed of the resampled days.
     """
 
-    conditions: str | Path | None = None
+    ambient: str | Path | None = None
     temperatures: tuple[float, float] | None = None
     expected: str | Path | None = None
     until: str | None = None
@@ -91,7 +91,7 @@ def forecast_by(path: str | Path, options: ForecastOptions) -> Forecasted:
     path : str or Path
         The signature file.
     options : ForecastOptions
-        The season's logs and conditions, the coming temperatures and the budget.
+        The season's logs with dates and temperatures, the coming temperatures and the budget.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def forecast_by(path: str | Path, options: ForecastOptions) -> Forecasted:
         The file does not belong to the machine, contains another threshold or no budget, or the season supports no
         forecast.
     ConfigurationError
-        A table of conditions is wrong.
+        A table of ambient temperatures is wrong.
     UsageError
         An option is wrong, or two do not go together.
     CdtoolError
@@ -124,9 +124,9 @@ def forecast_by(path: str | Path, options: ForecastOptions) -> Forecasted:
     >>> runs = write_gate_season(Path("season"), Season(45, friction_per_kelvin=-0.01, runs_per_day=3), seed=1)
     >>> logs, machine = sorted(Path("season/free").iterdir()), "season/machine.toml"
     >>> write_signature("july.json", cdtool.learn_signature(logs[:12], machine, "momentum").signature)
-    >>> table, budget = "season/conditions.csv", "1/20op"
+    >>> table, budget = "season/ambient.csv", "1/20op"
     >>> done = cdtool.forecast_signature(
-    ...     "july.json", logs, machine, conditions=table, temperatures=(8.0, 20.0), false_alarm_budget=budget
+    ...     "july.json", logs, machine, ambient=table, temperatures=(8.0, 20.0), false_alarm_budget=budget
     ... )
     >>> forecast = done.classes[0]
     >>> forecast.so_far, forecast.effect("temperature").shown, forecast.exceeds
@@ -141,12 +141,12 @@ def forecast_by(path: str | Path, options: ForecastOptions) -> Forecasted:
     file.check(machine_file.machine, detector)
     expected = read_expected(location(options.expected)) if options.expected else None
     runs = options.runs(file, machine_file)
-    conditions = _conditions(options, runs)
+    ambient = _ambient(options, runs)
     pairs, unusable = signals_of(runs.operations, machine_file.machine, detector, file.joints, runs.skipped)
     known = {(run.sha256, run.operation) for run in file.runs}
     season = [pair for pair in pairs if (pair[0].recording.digest, pair[0].number) not in known]
     skipped = [*runs.skipped, *unusable]
-    seasons = _Season(options, budget, conditions, expected, skipped)
+    seasons = _Season(options, budget, ambient, expected, skipped)
     classes, refused = [], []
     for current, _ in signatures:
         own = [pair for pair in season if current.motion.matches(pair[0].motion, SPEED_TOLERANCE)]
@@ -185,25 +185,23 @@ def _check_options(options: ForecastOptions) -> None:
     if both is not None and options.expected is not None:
         raise UsageError("both a range and a table of coming temperatures", "give --temperatures or --expected")
     for name, value in (("--temperatures", both), ("--expected", options.expected)):
-        if value is not None and options.conditions is None:
-            raise UsageError(
-                f"{name} is given, but not the temperatures of the logs", "add --conditions with their dates"
-            )
+        if value is not None and options.ambient is None:
+            raise UsageError(f"{name} is given, but not the temperatures of the logs", "add --ambient with their dates")
     if both is not None and not (-100.0 <= both[0] < both[1] <= 200.0):
         raise UsageError(f"temperatures are {both[0]:g} to {both[1]:g}", "give the lower one first, in °C, as -10:5")
 
 
-def _conditions(options: ForecastOptions, runs: Runs) -> Mapping[str, Condition]:
-    """Return the conditions by the names of logs or runs."""
-    if options.conditions is None:
+def _ambient(options: ForecastOptions, runs: Runs) -> Mapping[str, Ambient]:
+    """Return date and temperature by the names of logs or runs."""
+    if options.ambient is None:
         return {}
-    table = location(options.conditions)
+    table = location(options.ambient)
     names: dict[str, str] = {}
     for operation in runs.operations:
         for recording in (operation.recording, operation.whole):
             names[_below(recording.name, table)] = recording.name
             names[_below(_log(recording.name), table)] = _log(recording.name)
-    return {names[name]: item for name, item in read_conditions(table, list(names)).items()}
+    return {names[name]: item for name, item in read_ambient(table, list(names)).items()}
 
 
 def _below(name: str, table: Path) -> str:
@@ -221,8 +219,8 @@ class _Season:
 
     options: ForecastOptions
     budget: Budget
-    conditions: Mapping[str, Condition]
-    expected: Sequence[Condition] | None
+    ambient: Mapping[str, Ambient]
+    expected: Sequence[Ambient] | None
     skipped: list[Skipped]
 
     def forecast(self, file: SignatureFile, signature: FittedSignature, pairs: Sequence[Pair]) -> Forecast:
@@ -231,7 +229,7 @@ class _Season:
             raise SignatureError("no run to forecast from", _NOTHING_NEW)
         demands = self._demands(file, signature, pairs)
         origin: datetime | None = None
-        if self.conditions:
+        if self.ambient:
             dated = self._with_temperature([(item, at) for item, at in demands if at is not None])
             if not dated:
                 raise SignatureError("no run to forecast from", f"see why the logs of {self.table} are left out")
@@ -249,25 +247,25 @@ class _Season:
 
     @property
     def table(self) -> str:
-        """The name of the table of conditions, for messages."""
-        return str(self.options.conditions)
+        """The name of the table, for messages."""
+        return str(self.options.ambient)
 
     def _demands(
         self, file: SignatureFile, signature: FittedSignature, pairs: Sequence[Pair]
-    ) -> list[tuple[Demand, Condition | None]]:
-        demands: list[tuple[Demand, Condition | None]] = []
+    ) -> list[tuple[Demand, Ambient | None]]:
+        demands: list[tuple[Demand, Ambient | None]] = []
         for operation, signal in pairs:
             detection = judge(operation, "", signal, (signature,), file.activation)
-            condition = _condition_of(operation, self.conditions)
+            ambient = _ambient_of(operation, self.ambient)
             if detection.verdict.outcome == "not_assessable":
                 self._leave_out(operation.name, f"not assessable: {detection.verdict.reason}")
-            elif self.conditions and condition is None:
+            elif self.ambient and ambient is None:
                 self._leave_out(operation.name, f"no row in {self.table}")
             else:
-                demands.append((demand_of(signature, detection, file.activation), condition))
+                demands.append((demand_of(signature, detection, file.activation), ambient))
         return demands
 
-    def _with_temperature(self, dated: list[tuple[Demand, Condition]]) -> list[tuple[Demand, Condition]]:
+    def _with_temperature(self, dated: list[tuple[Demand, Ambient]]) -> list[tuple[Demand, Ambient]]:
         """Return the runs in order of time; without those whose temperature is missing, if others have one."""
         dated = sorted(dated, key=lambda pair: pair[1].when)
         known = [pair for pair in dated if not math.isnan(pair[1].temperature)]
@@ -310,16 +308,14 @@ class _Season:
         ahead = max(len(runs) // 2, 1)
         if until is not None:
             if not until.isascii() or not until.isdigit() or not 0 < int(until) <= _MOST_RUNS:
-                raise UsageError(
-                    f"--until is '{until}'", "the runs have no dates: give a number of runs, or --conditions"
-                )
+                raise UsageError(f"--until is '{until}'", "the runs have no dates: give a number of runs, or --ambient")
             ahead = int(until)
         return Coming.over_range(None, float(len(runs)), float(len(runs) + ahead), ahead)
 
 
-def _condition_of(operation: Operation, conditions: Mapping[str, Condition]) -> Condition | None:
+def _ambient_of(operation: Operation, ambient: Mapping[str, Ambient]) -> Ambient | None:
     names = (operation.name, operation.whole.name, _log(operation.name))
-    return next((conditions[name] for name in names if name in conditions), None)
+    return next((ambient[name] for name in names if name in ambient), None)
 
 
 def _by_number(demands: Sequence[Demand]) -> list[SeasonRun]:

@@ -1,4 +1,4 @@
-"""Tables of conditions: date and temperature of each recording, and the temperatures to be expected.
+"""Tables of ambient temperatures: date and temperature of each recording, and the temperatures to be expected.
 
 Conventions: CSV as in `named_rows`. `date` is a day or a day and time of ISO 8601, `temperature_c` in °C; a cell of it
 may be empty. Recordings are named by their path from the table's folder, or by their file name where that is unique.
@@ -22,7 +22,7 @@ _FIRST_YEAR, _LAST_YEAR = 1900, 2200
 
 
 @dataclass(frozen=True)
-class Condition:
+class Ambient:
     """When a run took place, or will, and the temperature then [°C]; NaN if unknown.
 
     `when` has no zone; one that was given is UTC. `day` is the day as written.
@@ -33,8 +33,8 @@ class Condition:
     temperature: float
 
 
-def read_conditions(path: Path, recordings: Sequence[str]) -> dict[str, Condition]:
-    """Read the conditions of recordings.
+def read_ambient(path: Path, recordings: Sequence[str]) -> dict[str, Ambient]:
+    """Read date and ambient temperature of recordings.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def read_conditions(path: Path, recordings: Sequence[str]) -> dict[str, Conditio
 
     Returns
     -------
-    dict of str to Condition
+    dict of str to Ambient
         Those of the recordings that are named; rows of other recordings are ignored.
 
     Raises
@@ -55,18 +55,18 @@ def read_conditions(path: Path, recordings: Sequence[str]) -> dict[str, Conditio
 
     Examples
     --------
-    >>> found = read_conditions(Path("docs/examples/conditions.csv"), ["free/01.csv", "free/02.csv"])
+    >>> found = read_ambient(Path("docs/examples/ambient.csv"), ["free/01.csv", "free/02.csv"])
     >>> found["free/02.csv"].when.isoformat(), found["free/02.csv"].temperature
     ('2025-07-01T18:00:00', 23.1)
     """
-    rows = read_named_rows(path, ("recording", "date"), ("temperature_c",), "conditions")
+    rows = read_named_rows(path, ("recording", "date"), ("temperature_c",), "ambient")
     zoned: dict[bool, str] = {}
-    read: dict[str, Condition] = {}
+    read: dict[str, Ambient] = {}
     for row in rows:
         if row.recording in read:
             raise row.fault(f"'{row.recording}' is named again", "give one row per recording")
-        read[row.recording] = _condition(row, zoned)
-    found: dict[str, Condition] = {}
+        read[row.recording] = _ambient(row, zoned)
+    found: dict[str, Ambient] = {}
     for name, recording in by_recording(path, read, recordings, runs=True).items():
         if recording is not None:
             found[recording] = read[name]
@@ -78,7 +78,7 @@ def read_conditions(path: Path, recordings: Sequence[str]) -> dict[str, Conditio
     return found
 
 
-def read_expected(path: Path) -> list[Condition]:
+def read_expected(path: Path) -> list[Ambient]:
     """Read the temperatures to be expected.
 
     Parameters
@@ -88,7 +88,7 @@ def read_expected(path: Path) -> list[Condition]:
 
     Returns
     -------
-    list of Condition
+    list of Ambient
         In order of time.
 
     Raises
@@ -104,17 +104,17 @@ def read_expected(path: Path) -> list[Condition]:
     zoned: dict[bool, str] = {}
     found = []
     for row in read_table_rows(path, ("date", "temperature_c"), ("recording",), "temperature"):
-        condition = _condition(row, zoned)
-        if math.isnan(condition.temperature):
+        ambient = _ambient(row, zoned)
+        if math.isnan(ambient.temperature):
             raise row.fault("temperature_c is empty", "give a temperature in °C, or leave the row out")
-        found.append(condition)
+        found.append(ambient)
     if not found:
         raise ConfigurationError(f"{path}: contains no row", "give a date and a temperature in °C per row")
     return sorted(found, key=lambda item: item.when)
 
 
-def _condition(row: TableRow, zoned: dict[bool, str]) -> Condition:
-    """Return the condition of a row; `zoned` remembers a row with and one without a zone, for messages."""
+def _ambient(row: TableRow, zoned: dict[bool, str]) -> Ambient:
+    """Return date and temperature of a row; `zoned` remembers a row with and one without a zone, for messages."""
     text = row.text("date")
     try:
         when = datetime.fromisoformat(text)
@@ -135,4 +135,4 @@ def _condition(row: TableRow, zoned: dict[bool, str]) -> Condition:
         raise row.fault(
             f"temperature_c is {temperature:g}", f"give °C from {_COLDEST:g} to {_HOTTEST:g}; 300 K are 26.85 °C"
         )
-    return Condition(when, day, math.nan if temperature is None else temperature)
+    return Ambient(when, day, math.nan if temperature is None else temperature)
