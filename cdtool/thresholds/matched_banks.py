@@ -70,7 +70,8 @@ class FittedMatchedBanks:
         if signal.joints != self.model.signature.joints:
             learned, given = (", ".join(names) or "none" for names in (self.model.signature.joints, signal.joints))
             raise SignatureError(
-                f"learned for the columns {learned}, not for {given}", "learn from logs with the same channels"
+                f"{recording.name}: learned for the columns {learned}, not for {given}",
+                "learn from logs with the same channels",
             )
         # Bands of several factors have the same statistic: each log is evaluated once.
         for known_recording, known_signal, known in self._latest[:1]:
@@ -200,6 +201,14 @@ class MatchedBanks:
 
     def fit(self, pairs: Sequence[tuple[Recording, Signal]]) -> FittedMatchedBanks:
         """Learn from impact-free runs of one class of motion; see `Threshold.fit`."""
+        first, of_first = pairs[0]
+        for recording, signal in pairs:
+            if signal.joints != of_first.joints:
+                own, others = ", ".join(signal.joints), ", ".join(of_first.joints)
+                raise SignatureError(
+                    f"{recording.name} has the columns {own}, {first.name} {others}",
+                    "learn from logs with the same channels: leave one of the two out",
+                )
         rule = self.signature or Signature()
         model = self._learned(pairs, rule)
         tested = self._tested(model, pairs, replace(rule, force=True))

@@ -234,6 +234,13 @@ def test_other_columns_than_those_learned_are_refused(fitted, runs):
         fitted.evaluate(run, two)
 
 
+def test_a_run_with_other_columns_is_named(runs):
+    (run, values), *others = runs
+    odd = replace(run, name="odd.csv"), replace(values, joints=("other",))
+    with pytest.raises(SignatureError, match=r"odd\.csv has the columns other, .* axis"):
+        MatchedBanks().fit([*others, odd])
+
+
 def test_it_says_which_template_and_column_decided(fitted, runs):
     run, quiet = runs[0]
     hit = quiet.changed(values=quiet.values + 6.0 * (TIME[:, np.newaxis] >= 3.0))

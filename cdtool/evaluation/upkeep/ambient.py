@@ -59,8 +59,9 @@ def read_ambient(path: Path, recordings: Sequence[str]) -> dict[str, Ambient]:
     >>> found["free/02.csv"].when.isoformat(), found["free/02.csv"].temperature
     ('2025-07-01T18:00:00', 23.1)
     """
-    rows = read_named_rows(path, ("recording", "date"), ("temperature_c",), "ambient")
+    rows = read_named_rows(path, ("recording", "date"), ("temperature_c",), "temperature")
     zoned: dict[bool, str] = {}
+    rows_of = {row.recording: row for row in rows}
     read: dict[str, Ambient] = {}
     for row in rows:
         if row.recording in read:
@@ -68,6 +69,8 @@ def read_ambient(path: Path, recordings: Sequence[str]) -> dict[str, Ambient]:
         read[row.recording] = _ambient(row, zoned)
     found: dict[str, Ambient] = {}
     for name, recording in by_recording(path, read, recordings, runs=True).items():
+        if recording in found:
+            raise rows_of[name].fault(f"'{name}' is {recording}, which is named before", "give one row per recording")
         if recording is not None:
             found[recording] = read[name]
     if not found:

@@ -489,12 +489,17 @@ def _conditions(
         table.finish()
         if not condition.strip():
             raise tables.fault(condition, "has no name", "give it a name")
+        if condition.strip() == ALL:
+            raise tables.fault(condition, "is not a valid name", f"choose another name; {ALL} stands for every group")
         if not named:
             raise tables.fault(condition, "has no logs", "add holdout.logs, impacts.GROUP.logs or both")
         for name, table_of_logs in named.items():
             group = f"{condition}/{name}"
             if group in (*groups, *changed) or condition in groups:
-                raise tables.fault(condition, "is the name of a group", "choose another name for the condition")
+                same = condition if condition in groups else group
+                raise tables.fault(
+                    condition, f"{same} is the name of another group", "choose another name for the condition"
+                )
             logs = found.sections(table_of_logs)
             sections |= logs
             unchanged = groups.get(name, ImpactGroup((), window, is_impact_free=True))

@@ -289,6 +289,8 @@ class _Season:
         end = last + _HALF * (last - first) if until is None else _days(_day_of(until), origin) + 1.0
         per_day = len(runs) / max(last - first, 1.0)
         if self.expected is None:
+            if until is None and not end > last:
+                raise SignatureError("all runs are of one time", "give dates with times, or --until")
             if not end > last:
                 raise UsageError(f"--until is {until}", "give a day after the last run")
             known = [item.temperature for item in runs if not math.isnan(item.temperature)]

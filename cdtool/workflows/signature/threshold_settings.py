@@ -140,7 +140,7 @@ def _value(table: Table, item: Field[Any]) -> Any:
     kind = item.type
     if kind == "bool":
         return table.flag(item.name, False)
-    if kind == "int":
+    if kind in ("int", "int | None"):
         return table.whole(item.name, 0, minimum=0)
     if kind in ("float", "float | None"):
         return table.number(item.name)

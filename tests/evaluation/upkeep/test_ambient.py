@@ -56,6 +56,10 @@ def test_a_zone_is_converted_and_the_day_stays_as_written(tmp_path):
         ("01.csv,2025-07-01,293.15\n", "line 2: temperature_c is 293.15"),
         ("01.csv,2025-07-01,3,5\n", "line 2: 4 cells under 3 columns"),
         ("01.csv,2025-07-01,3\n01.csv,2025-07-02,3\n", "line 3: '01.csv' is named again"),
+        (
+            "01.csv,2025-07-01,3\nfree/01.csv,2025-07-02,3\n",
+            "line 3: 'free/01.csv' is free/01.csv, which is named before",
+        ),
         ("01.csv,2025-07-01T08:00Z,3\n02.csv,2025-07-02,3\n", "line 3: date is '2025-07-02', without a zone"),
         ("09.csv,2025-07-01,3\n", "no row is of any log"),
         ("", "no row is of any log: it contains no row"),

@@ -131,7 +131,7 @@ def test_what_is_wrong_is_named(read, tables, message):
 
 
 def test_a_condition_has_no_name_of_a_group(read):
-    with pytest.raises(ConfigurationError, match=r"conditions\.stiff: is the name of a group"):
+    with pytest.raises(ConfigurationError, match=r"conditions\.stiff: stiff is the name of another group"):
         read('[conditions.stiff]\nholdout.logs = ["winter/holdout/*.csv"]\n')
 
 

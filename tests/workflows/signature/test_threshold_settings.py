@@ -14,8 +14,10 @@ from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
 from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.limit import Limit
+from cdtool.thresholds.matched_banks import MatchedBanks
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+from cdtool.workflows.signature.threshold_settings import rule_of
 from tests.synthetic.door import MACHINE, write_log
 
 HEAD = 'machine = "machine.toml"\ndetectors = ["gm"]\noperations = "motion"\n'
@@ -152,6 +154,13 @@ def test_without_its_own_a_rule_takes_the_safety_factor_of_the_signature(door):
 def test_a_wrong_threshold_is_one_line_that_names_its_key(door, text, said):
     with pytest.raises(ConfigurationError, match=said):
         read_benchmark_file(written(door, text))
+
+
+def test_an_order_may_be_given_where_none_is_the_default():
+    rule = rule_of("matched_banks", ["order=10"], {}, "one")
+    assert isinstance(rule, MatchedBanks) and rule.order == 10
+    with pytest.raises(ConfigurationError, match="order: is 'ten'"):
+        rule_of("matched_banks", ["order=ten"], {}, "one")
 
 
 def test_a_signature_may_follow_its_runs(door):
