@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import date, timedelta
 from pathlib import Path
 
 import pytest
@@ -126,6 +127,24 @@ def test_no_temperature_at_all_leaves_the_drift_over_the_dates(season, tmp_path)
     assert done.status == 0 and "spreads per day" in done.out, done.err
     refused = forecast(season, "--ambient", path, "--temperatures", "0:5", *BUDGET)
     assert refused.status == 2 and "no log has a temperature" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("dates", "until", "said"),
+    [
+        (("2025-12-01", "2025-12-09"), (), "days after the last run (add the days between the two)"),
+        ((), ("--until", "2025-12-24"), "ends before --until 2025-12-24 (add days, or omit --until)"),
+    ],
+)
+def test_expected_temperatures_that_do_not_cover_the_coming_time_are_refused(season, tmp_path, dates, until, said):
+    """Alarms of the time that is missing would be counted at the temperatures of another one."""
+    rows = (season / "ambient.csv").read_text(encoding="utf-8").splitlines()
+    last = date.fromisoformat(rows[-1].split(",")[1][:10])
+    days = dates or tuple((last + timedelta(days=number)).isoformat() for number in (1, 2, 3))
+    path = tmp_path / "expected.csv"
+    path.write_text("date,temperature_c\n" + "".join(f"{day},15.0\n" for day in days), encoding="utf-8")
+    done = forecast(season, "--ambient", season / "ambient.csv", "--expected", path, *until, *BUDGET)
+    assert done.status == 2 and said in done.err, done.err
 
 
 @pytest.mark.parametrize(

@@ -303,6 +303,13 @@ class _Season:
                 f"{self.options.expected}: no date is in the coming time", "give dates after that of the last run"
             )
         times, temperatures = np.array(both).T
+        if float(times.min()) - last > _WEEK:
+            days = round(float(times.min()) - last)
+            raise SignatureError(
+                f"{self.options.expected}: begins {days} days after the last run", "add the days between the two"
+            )
+        if until is not None and float(times.max()) < end - 1.0:
+            raise SignatureError(f"{self.options.expected}: ends before --until {until}", "add days, or omit --until")
         return Coming.by_time(temperatures, times, _WEEK, round(per_day * (float(times[-1]) - last)))
 
     def _coming_runs(self, runs: Sequence[SeasonRun]) -> Coming:
