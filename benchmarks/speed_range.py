@@ -3,7 +3,7 @@
     python benchmarks/speed_range.py                                      # seeds 601 to 605, 100 runs a speed
     python benchmarks/speed_range.py --seeds 1 --runs 10 --impacts 4 --machines gate --speeds 0.9 1.0
 
-Each seed: 14 free runs at 0.8 and 14 at 1.2 of the nominal speed to learn from, for comparison 14 at the tested speed,
+Each seed: 14 free runs at 0.8 and 14 at 1.2 of the nominal speed (--learned) to learn from, for comparison 14 at the tested speed,
 and at that speed other impact-free runs, stiff and soft impacts. A share that is not assessable is that of the samples
 in motion. --stribeck-speed: up to about this speed [m/s] the gate's friction falls as the speed rises, instead of up to
 0.02 m/s; it is then far from linear between the learned speeds. All of it is a simulation, and no evidence about a real
@@ -97,9 +97,9 @@ def measure(name: str, detector: str, options: argparse.Namespace) -> list[str]:
     counts = {"fresh": options.runs, **dict.fromkeys(GROUPS, options.impacts)}
     for seed in range(FIRST_SEED, FIRST_SEED + options.seeds):
         cell = Cell(name, seed, detector)
-        ends = [learned(cell, speed) for speed in LEARNED]
+        ends = [learned(cell, speed) for speed in options.learned]
         for speed, (own, between) in tallies.items():
-            same = dict(zip(LEARNED, ends, strict=True)).get(speed) or learned(cell, speed)
+            same = dict(zip(options.learned, ends, strict=True)).get(speed) or learned(cell, speed)
             for group, count in counts.items():
                 for run in cell.runs(group, count, ChangedMachine(speed=speed)):
                     own.add(run, group, [same])
@@ -110,16 +110,16 @@ def measure(name: str, detector: str, options: argparse.Namespace) -> list[str]:
     return [
         f"{name}, {detector}, {speed:g}: {fault}"
         for speed, (own, between) in tallies.items()
-        for fault in faults(speed, own, between)
+        for fault in faults(speed, own, between, options.learned)
     ]
 
 
-def faults(speed: float, own: Tally, between: Tally) -> list[str]:
-    """Return what misses the targets at a speed."""
+def faults(speed: float, own: Tally, between: Tally, ends: Sequence[float]) -> list[str]:
+    """Return what misses the targets at a speed, learned at the speeds `ends`."""
     found = []
-    if LEARNED[0] <= speed <= LEARNED[1] and between.alarming > MOST_ALARMS * between.runs:
+    if min(ends) <= speed <= max(ends) and between.alarming > MOST_ALARMS * between.runs:
         found.append(f"{between.alarming} of {between.runs} runs alarm")
-    for group in GROUPS if speed in LEARNED else ():
+    for group in GROUPS if speed in ends else ():
         if between.mean(group) > (1.0 + MOST_SLOWER) * own.mean(group):
             found.append(f"{group} contacts {between.mean(group):.1f} ms, not {own.mean(group):.1f} ms")
     return found
@@ -133,6 +133,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--impacts", type=int, default=10, help="impacts of each kind, seed and speed")
     parser.add_argument("--machines", nargs="+", choices=MACHINES, default=list(MACHINES))
     parser.add_argument("--speeds", nargs="+", type=float, default=list(SPEEDS), help="shares of the nominal speed")
+    parser.add_argument("--learned", nargs="+", type=float, default=list(LEARNED), help="speeds to learn from")
     parser.add_argument("--detectors", nargs="+", default=list(DETECTORS), help="full names")
     parser.add_argument("--stribeck-speed", type=float, default=GateParameters.stribeck_speed)
     options = parser.parse_args(arguments)
@@ -145,7 +146,9 @@ def main(arguments: list[str]) -> int:
         for detector in options.detectors
         for fault in measure(name, detector, options)
     ]
-    print("\nleft: learned at that speed; right: learned at", " and ".join(map(str, LEARNED)), "with speed_range")
+    print(
+        "\nleft: learned at that speed; right: learned at", " and ".join(map(str, options.learned)), "with speed_range"
+    )
     print(*found, sep="\n")
     return int(bool(found))
 

@@ -5,8 +5,10 @@ At each location of the stroke the classes' learned speeds c_i(x) are compared w
     s = n_i + (v - c_i) / (c_i+1 - c_i) (n_i+1 - n_i),    n_i: nominal speeds
 
 The mean of s over the last 2 s, of samples that are at least 0.3 s old, is the speed that the log runs at: a contact
-that slows the axis does not change it before its alarm. It is looked for where the classes run alike, that is where
-c_i / n_i is the same for all: not while a faster class still accelerates, or already brakes.
+that slows the axis does not change it before its alarm. A sample counts by its precision, that is by how many of their
+spreads the two classes are apart there: close classes cannot be told from each other while both accelerate. It is
+looked for where the classes run alike, that is where c_i / n_i is the same for all: not while a faster class still
+accelerates, or already brakes.
 """
 
 from __future__ import annotations
@@ -30,11 +32,18 @@ from cdtool.recording import BoolArray, FloatArray, Recording
 GUARD = 0.3
 # The speed is the mean over about this time, and known after this much of it [s].
 MEMORY, KNOWN = 2.0, 0.1
+# The speed is known once its standard deviation is below this part of how far the fastest and the slowest class are
+# apart; of classes closer than the second, below this part of the second times the slowest speed. Errors of less than
+# `KNOWN` seconds go together.
+_DOUBT, _CLOSE = 0.1, 0.2
+# A spread below this part of the nominal speed counts as this much: without noise every sample is as precise.
+_LEAST_SPREAD = 1e-3
 # A departure that lasts longer is another speed, which is learned again [s].
 FORGET = 1.0
 # Classes run alike where their shares of the nominal speed differ by at most this much, and by at most this part of
-# how far the nominal speeds are apart, and where none is below the third.
-_ALIKE, _ALIKE_PART, _MOVING = 0.1, 0.3, 0.5
+# how far the nominal speeds are apart, and where none is below the third: between the first and the last location where
+# each of them has reached the fourth. Before that, all accelerate, and those that do so alike cannot be told apart.
+_ALIKE, _ALIKE_PART, _MOVING, _RUNNING = 0.1, 0.3, 0.5, 0.9
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 
@@ -131,6 +140,10 @@ class SpeedRange(SendsFields):
         shares = mean / nominal
         most = min(_ALIKE, _ALIKE_PART * float(np.diff(nominal).min() / nominal[-1]))
         alike = (np.ptp(shares, axis=1) <= most) & (shares.min(axis=1) >= _MOVING)
+        for share in shares.T:
+            runs = np.flatnonzero(share >= _RUNNING)
+            first, last = (runs[0], runs[-1]) if len(runs) else (len(share), -1)
+            alike[:first] = alike[last + 1 :] = False
         return (
             Courses(read_only(nominal), read_only(alike.astype(np.float64)), step, float(self.direction)),
             mean,
@@ -170,7 +183,9 @@ def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     nominal, count, last = courses.nominal, len(courses.nominal), len(courses.alike) - 1
     own = np.empty(len(time))
     slowest, fastest = nominal[0], nominal[count - 1]
-    level = learned = 0.0
+    most_doubt = _DOUBT * max(_CLOSE * slowest, fastest - slowest)
+    precision = np.empty(len(time))
+    level = learned = weights = weighed = 0.0
     old = first = backward = 0
     departed, frozen_until = math.nan, -math.inf
     for k in range(len(time)):
@@ -186,16 +201,20 @@ def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
             if old >= first and time[k] > frozen_until and not math.isnan(own[old]):
                 # What happened in a gap is unknown: the sample before it counts for the guard at most.
                 step = min(time[old + 1] - time[old], GUARD)
-                learned += step
-                if learned > 0.0:
-                    level += step / min(learned, MEMORY) * (own[old] - level)
+                if step > 0.0:
+                    learned += step
+                    past = math.exp(-step / MEMORY)
+                    weighed = past * weighed + step
+                    weights = past * weights + step * precision[old]
+                    level += step * precision[old] / weights * (own[old] - level)
             old += 1
         at = 0.0 if math.isnan(travel[k]) else min(max(travel[k] / courses.step, 0.0), float(last))
         place = min(int(at), max(last - 1, 0))
         part = at - place
         after = min(place + 1, last)
         alike = courses.alike[place] > 0.0 and courses.alike[after] > 0.0
-        known = learned >= KNOWN and alike
+        doubt = math.sqrt(min(weighed, KNOWN) / weights) if weights > 0.0 else math.inf
+        known = learned >= KNOWN and alike and doubt <= most_doubt
         if known:
             speed[k] = min(max(level, slowest), fastest)
         if math.isnan(forward):
@@ -217,10 +236,13 @@ def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
                 ordered = ordered and here - before_mean > 0.5 * _MOVING * gap  # so that dividing by it is safe
                 if alike and ordered and (math.isnan(own[k]) or forward > before_mean):
                     own[k] = nominal[i - 1] + (forward - before_mean) / (here - before_mean) * gap
+                    noise = max(around, before_wide, _LEAST_SPREAD * nominal[i])
+                    precision[k] = ((here - before_mean) / (gap * noise)) ** 2
                 if known and not is_found and speed[k] <= nominal[i]:
                     weight = (speed[k] - nominal[i - 1]) / gap
                     mean = before_mean + weight * (here - before_mean)
                     wide = before_wide + weight * (around - before_wide)
+                    wide = math.hypot(wide, doubt * (here - before_mean) / gap)
                     is_found = True
             before_mean, before_wide = here, around
         fits[k] = lowest <= forward <= highest
@@ -237,7 +259,7 @@ def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
             departed = time[k]
         frozen_until = time[k] + GUARD
         if time[k] - departed > FORGET:
-            level = learned = 0.0
+            level = learned = weights = weighed = 0.0
             first = k + 1
             departed = math.nan
             frozen_until = -math.inf

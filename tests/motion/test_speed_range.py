@@ -13,6 +13,9 @@ from cdtool.motion import MotionClass
 from cdtool.motion.speed_course import TOLERANCE
 from cdtool.motion.speed_range import FORGET, GUARD, KNOWN, SpeedRange, in_ranges
 from cdtool.recording import Recording, Series
+from cdtool.simulation.changed_machine import ChangedMachine
+from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
+from cdtool.simulation.gate_recordings import as_recording
 from cdtool.thresholds.common_class import common_class
 from tests.motion.speed_logs import log
 
@@ -46,6 +49,28 @@ def test_a_speed_in_the_range_fits_from_end_to_end_and_is_found(speed, seed, dir
     # At first from where the fastest class is within 10 % of its speed.
     assert found[known] == pytest.approx(speed, rel=0.05)
     assert found[known & (time > 2.5)] == pytest.approx(speed, rel=0.02)
+
+
+def gate_run(share: float, number: int) -> Recording:
+    """An impact-free stroke of the simulated gate, at a share of its nominal speed."""
+    changed = ChangedMachine(speed=share)
+    run = simulate_gate_run(changed.gate(GateParameters()), np.random.default_rng([int(1e3 * share), number]), "none")
+    return as_recording(changed.logged_gate(run, 0.56), f"run {number}", GateParameters()).without_ground_truth()
+
+
+@pytest.mark.parametrize("slow", [0.9, 0.95])
+def test_close_speeds_are_told_apart_where_they_differ_by_more_than_their_noise(slow):
+    # Early in the acceleration both are equally fast: what is found there says nothing.
+    among = SpeedRange(tuple(common_class([gate_run(share, 100 + i) for i in range(14)]) for share in (slow, 1.0)))
+    for share in (slow, 0.5 * (slow + 1.0), 1.0):
+        for number in range(4):
+            time, fits, found = found_in(gate_run(share, number), among)
+            nominal = share * among.classes[1].nominal_speed
+            known = np.flatnonzero(np.isfinite(found))
+            assert time[known[0]] < 2.5
+            assert found[known] == pytest.approx(nominal, rel=0.05), (share, number)
+            assert found[known[200:]] == pytest.approx(nominal, rel=0.02), (share, number)
+            assert fits.mean() > 0.995
 
 
 @pytest.mark.parametrize("speed", [0.15, 0.36])
