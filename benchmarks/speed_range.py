@@ -4,7 +4,7 @@
     python benchmarks/speed_range.py --seeds 1 --runs 10 --impacts 4 --machines gate --speeds 0.9 1.0
 
 Each seed: 14 free runs at 0.8 and 14 at 1.2 of the nominal speed (--learned) to learn from, for comparison 14 at the
-tested speed, and at that speed other impact-free runs, stiff and soft impacts. A share that is not assessable is that of
+tested speed, and at that speed other impact-free runs, stiff and soft impacts. A share not assessable is that of
 the samples in motion. --stribeck-speed: up to about this speed [m/s] the gate's friction falls as the speed rises,
 instead of up to 0.02 m/s; it is then far from linear between the learned speeds. All of it is a simulation, and no
 evidence about a real machine.
