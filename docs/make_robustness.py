@@ -52,8 +52,10 @@ STATES = (UNCHANGED, *CHANGES)
 SIMULATORS: Mapping[str, Callable[..., int]] = {"gate": simulate_gate, "arm": partial(simulate_arm, trial=1)}
 TITLES = {"gate": "Sliding gate", "arm": "Arm, hit on its first link"}
 # The signature with options that help, as lines of [signature], and the threshold that a detector brings.
-FOLLOWING, OWN = "signature, adaptive_level", "its own"
-OPTIONS = {FOLLOWING: "adaptive_level = 6"}
+FOLLOWING, RANGE, OWN = "signature, adaptive_level", "signature, speed_range", "its own"
+OPTIONS = {FOLLOWING: "adaptive_level = 6", RANGE: "speed_range = true"}
+# With speed_range, a third of the runs is learned from at each of these shares of the nominal speed.
+LEARNED_SPEEDS = {"slow": 0.8, "nominal": 1.0, "fast": 1.2}
 # The largest shares of alarming runs, and of runs, contacts and further samples that are not assessable, with which a
 # combination of a detector and a threshold tolerates a change.
 MOST_ALARMING, MOST_NOT_ASSESSABLE = 0.05, 0.1
@@ -197,6 +199,9 @@ def benchmark_text(simulated: str, threshold: str, changes: Sequence[str]) -> st
     if threshold in OPTIONS:
         text = text if "[signature]" in text else f"{text}\n[signature]\n"
         text = text.replace("[signature]\n", f"[signature]\n{OPTIONS[threshold]}\n")
+        if threshold == RANGE:
+            logs = ", ".join(f'"{folder}/free/*.csv"' for folder in LEARNED_SPEEDS)
+            text = text.replace('logs = ["free/*.csv"]', f"logs = [{logs}]")
     elif threshold != OWN:
         text = text.replace("\n[learn]", f'threshold = "{threshold}"\n\n[learn]')
     return text + "".join(CONDITION.format(change=name, folder=f"changed_{i}") for i, name in enumerate(changes, 1))
@@ -209,6 +214,9 @@ def simulate(
     runs, impacts = counts
     numbers = {"holdout": runs, **dict.fromkeys(GROUPS, impacts)}
     SIMULATORS[machine](folder, {"free": LEARNED_RUNS, **numbers}, seed=seed)
+    for number, (name, speed) in enumerate(LEARNED_SPEEDS.items(), 1):
+        free = {"free": LEARNED_RUNS // len(LEARNED_SPEEDS)}
+        SIMULATORS[machine](folder / name, free, seed=seed + 100_000 * number, changed=ChangedMachine(speed=speed))
     for number, changed in enumerate(changes.values(), 1):
         SIMULATORS[machine](folder / f"changed_{number}", numbers, seed=seed + 1000 * number, changed=changed)
 
@@ -321,6 +329,10 @@ the smallest geometric mean of the two mean latencies. Where many runs alarm, a 
 there by chance, and one that is active when a contact begins does not detect it.
 
 """
+LEARNED_FROM = {
+    RANGE: f", learned from {LEARNED_RUNS // len(LEARNED_SPEEDS)} runs at each of "
+    f"{', '.join(f'{100 * share:.0f}' for share in LEARNED_SPEEDS.values())} % of the nominal speed"
+}
 TAIL = """## Your own machine
 
 The same comparison on your recordings needs no simulator: list the logs of the changed machine in the benchmark file,
@@ -365,7 +377,7 @@ def page_text(machines: Mapping[str, Simulated]) -> str:
         ),
         numbers="\n".join(_numbers(machine, simulated) for machine, simulated in machines.items()),
         options="\n".join(
-            f"* `{name}` is the signature with `{option}`, see [Signature](signature.md)."
+            f"* `{name}` is the signature with `{option}`{LEARNED_FROM.get(name, '')}, see [Signature](signature.md)."
             for name, option in OPTIONS.items()
         ),
         alarming=100 * MOST_ALARMING,
@@ -430,17 +442,20 @@ def conclusions(cells: Cells) -> Iterator[str]:
             f"{_named(*fastest)} ({_in_words(every[fastest], UNCHANGED)[1]} ms)."
         )
     for words, states in PAIRS.items():
-        counts = []
-        for rule in ("signature", FOLLOWING):
+        counts = {}
+        for rule in ("signature", *OPTIONS):
             rows = [rules[rule] for rules in cells.values() if rule in rules]
-            counts.append(f"{sum(all(tolerates(row, state) for state in states) for row in rows)} of {len(rows)}")
+            counts[rule] = f"{sum(all(tolerates(row, state) for state in states) for row in rows)} of {len(rows)}"
         yield (
-            f"{words}: tolerated by {counts[0]} detectors with `signature`, by {counts[1]} with its `adaptive_level`."
+            f"{words}: tolerated by {counts['signature']} detectors with `signature`, by {counts[FOLLOWING]} with its "
+            f"`adaptive_level`, by {counts[RANGE]} with its `speed_range`."
         )
-    costs = _costs_of_following(cells)
-    if costs:
-        name, group, cost = max(costs, key=lambda item: item[2])
-        yield f"`adaptive_level` costs at most {100.0 * cost:.0f} % latency as learned (`{name}`, {group})."
+    for option in OPTIONS:
+        costs = _costs_of(option, cells)
+        if costs:
+            name, group, cost = max(costs, key=lambda item: item[2])
+            words = option.removeprefix("signature, ")
+            yield f"`{words}` costs at most {100.0 * cost:.0f} % latency as learned (`{name}`, {group})."
     lost = {state: sum(_is_hardly_assessable(states, state) for states in every.values()) for state in CHANGES}
     unassessable = ", ".join(f"{state} ({number})" for state, number in lost.items() if number)
     if unassessable:
@@ -453,18 +468,18 @@ def conclusions(cells: Cells) -> Iterator[str]:
         )
 
 
-def _costs_of_following(cells: Cells) -> list[tuple[str, str, float]]:
-    """Return by how much the latency as learned is longer with `adaptive_level`, as a share, by detector and group."""
+def _costs_of(option: str, cells: Cells) -> list[tuple[str, str, float]]:
+    """Return by how much the latency as learned is longer with an option, as a share, by detector and group."""
     pairs = [
-        (name, rules["signature"][UNCHANGED], rules[FOLLOWING][UNCHANGED])
+        (name, rules["signature"][UNCHANGED], rules[option][UNCHANGED])
         for name, rules in cells.items()
-        if "signature" in rules and FOLLOWING in rules
+        if "signature" in rules and option in rules
     ]
     return [
-        (name, group, following.mean(group) / still.mean(group) - 1.0)
-        for name, still, following in pairs
+        (name, group, with_option.mean(group) / without.mean(group) - 1.0)
+        for name, without, with_option in pairs
         for group in GROUPS
-        if still.detected[group] and following.detected[group]
+        if without.detected[group] and with_option.detected[group]
     ]
 
 

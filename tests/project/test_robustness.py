@@ -39,7 +39,7 @@ def test_the_page_is_that_of_its_results():
     for cells in (simulated.cells for simulated in machines.values()):
         assert set(cells) <= set(DETECTORS.names())
         for rules in cells.values():
-            assert set(rules) <= {script.FOLLOWING, script.OWN, *THRESHOLDS.names()}
+            assert set(rules) <= {*script.OPTIONS, script.OWN, *THRESHOLDS.names()}
             assert all(set(states) == set(script.STATES) for states in rules.values())
 
 
@@ -66,9 +66,10 @@ def test_the_files_select_the_thresholds():
         for simulated in (gate, arm):
             read = tomllib.loads(script.benchmark_text(simulated, name, ["mass +10 %"]))
             assert read["conditions"]["mass +10 %"]["impacts"]["soft"]["logs"] == ["changed_1/soft/*.csv"]
-            following = name == script.FOLLOWING
-            assert read.get("threshold") == (None if following else name)
-            assert read.get("signature", {}).get("adaptive_level") == (6 if following else None)
+            assert read.get("threshold") == (None if name in script.OPTIONS else name)
+            assert read.get("signature", {}).get("adaptive_level") == (6 if name == script.FOLLOWING else None)
+            assert read.get("signature", {}).get("speed_range") == (True if name == script.RANGE else None)
+            assert len(read["learn"]["logs"]) == (3 if name == script.RANGE else 1)
     assert "conditions" not in tomllib.loads(script.benchmark_text(arm, script.OWN, []))
 
 
@@ -127,17 +128,22 @@ def test_the_conclusions_follow_from_the_cells():
     cold = {**FINE, "friction +20 %": cell(40)}
     blind = {**FINE, "speed +20 %": cell(assessable=0)}
     cells = {
-        "momentum": {"signature": cold, script.FOLLOWING: replace_all(FINE, 22.0)},
+        "momentum": {"signature": cold, script.FOLLOWING: replace_all(FINE, 22.0), script.RANGE: FINE},
         "energy": {"signature": blind},
     }
     assert list(script.conclusions(cells)) == [
-        "Every change is tolerated by `momentum` with `signature, adaptive_level` (22/80 ms).",
-        "Every change but that of the speed is tolerated by 2 combinations; the fastest is `energy` with `signature` "
-        "(20/80 ms).",
-        "friction ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`.",
-        "speed ±10 %: tolerated by 2 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`.",
-        "speed ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`.",
+        "Every change is tolerated by `momentum` with `signature, speed_range` (20/80 ms), "
+        "`momentum` with `signature, adaptive_level` (22/80 ms), the fastest first.",
+        "Every change but that of the speed is tolerated by 3 combinations; the fastest is `momentum` with "
+        "`signature, speed_range` (20/80 ms).",
+        "friction ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`, "
+        "by 1 of 1 with its `speed_range`.",
+        "speed ±10 %: tolerated by 2 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`, "
+        "by 1 of 1 with its `speed_range`.",
+        "speed ±20 %: tolerated by 1 of 2 detectors with `signature`, by 1 of 1 with its `adaptive_level`, "
+        "by 1 of 1 with its `speed_range`.",
         "`adaptive_level` costs at most 10 % latency as learned (`momentum`, stiff).",
+        "`speed_range` costs at most 0 % latency as learned (`momentum`, stiff).",
         "Combinations that are assessable as learned and hardly any more afterwards: speed +20 % (1).",
         "1 combination can assess no impact-free run at a speed that is 20 % too high and detect contacts "
         "nevertheless, late: the contact slows the machine to the speed that was learned.",
