@@ -139,6 +139,7 @@ def main(arguments: list[str]) -> int:
     """Print a row per machine; return 0 if the intervals cover and the mean forecast is not biased."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seasons", type=int, default=24)
+    parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--machines", nargs="+", choices=list(MACHINES), default=list(MACHINES))
     options = parser.parse_args(arguments)
     print(environment(), flush=True)
@@ -146,7 +147,7 @@ def main(arguments: list[str]) -> int:
     for name in options.machines:
         detector, season = MACHINES[name]
         found = []
-        for seed in range(FIRST_SEED, FIRST_SEED + options.seasons):
+        for seed in range(options.first_seed, options.first_seed + options.seasons):
             try:
                 found.append(compared(season, detector, seed))
             except SignatureError as fault:
