@@ -25,7 +25,7 @@ MEMORY = 2.0
 # A deviation counts as at most so many spreads, and nothing is learned from one of more than so many.
 CLIP, FREEZE = 3.0, 4.0
 # The band is so many times as wide at the start, and as learned after this time in motion [s].
-WIDER, START = 1.5, 0.5
+WIDER, START = 2.0, 1.0
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
 
