@@ -235,8 +235,10 @@ def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
                 gap = nominal[i] - nominal[i - 1]
                 ordered = ordered and here - before_mean > 0.5 * _MOVING * gap  # so that dividing by it is safe
                 if alike and ordered and (math.isnan(own[k]) or forward > before_mean):
-                    own[k] = nominal[i - 1] + (forward - before_mean) / (here - before_mean) * gap
-                    noise = max(around, before_wide, _LEAST_SPREAD * nominal[i])
+                    share = (forward - before_mean) / (here - before_mean)
+                    own[k] = nominal[i - 1] + share * gap
+                    noise = before_wide + min(max(share, 0.0), 1.0) * (around - before_wide)
+                    noise = max(noise, _LEAST_SPREAD * nominal[i])
                     precision[k] = ((here - before_mean) / (gap * noise)) ** 2
                 if known and not is_found and speed[k] <= nominal[i]:
                     weight = (speed[k] - nominal[i - 1]) / gap
