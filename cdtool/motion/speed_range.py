@@ -35,7 +35,7 @@ MEMORY, KNOWN = 2.0, 0.1
 # The speed is known once its standard deviation is below this part of how far the fastest and the slowest class are
 # apart; of classes closer than the second, below this part of the second times the slowest speed. Errors of less than
 # `KNOWN` seconds go together.
-_DOUBT, _CLOSE = 0.1, 0.2
+_DOUBT, _CLOSE = 0.2, 0.2
 # A spread below this part of the nominal speed counts as this much: without noise every sample is as precise.
 _LEAST_SPREAD = 1e-3
 # A departure that lasts longer is another speed, which is learned again [s].
