@@ -231,12 +231,13 @@ def forecast_season(
         correlation = confounded(runs)
         regressors = ("temperature",) if abs(correlation) > CONFOUNDED else ("temperature", "time")
     _check_time(runs, coming)
-    model = fit_season(runs, regressors, seed)
+    relative_spread = _relative_spread(signature)
+    model = fit_season(runs, regressors, seed, relative_spread=relative_spread)
     odd = outlying(model)
     kept = [item for item, out in zip(runs, odd, strict=True) if not out]
     if odd.any():
         _check_counts(kept)
-        model = fit_season(kept, regressors, seed)
+        model = fit_season(kept, regressors, seed, relative_spread=relative_spread)
     ends = {
         "temperature": (*(seen or ()), *(coming_range or ())),
         "time": (runs[0].time, runs[-1].time, float(coming.times.max())),
@@ -324,6 +325,18 @@ class _Surface:
         above, below = deviation_for(0.5 - 0.5 * _BAND), deviation_for(0.5 + 0.5 * _BAND)
         share = _bounds(self.chance(conditions, factor))
         return ForecastCurve(at, mean[0], mean[0] + below * std[0], mean[0] + above * std[0], share, beyond)
+
+
+def _relative_spread(signature: FittedSignature) -> list[float]:
+    """Return for each joint the median over the stroke of spread over mean; 0 where nothing was learned."""
+    curves = [curve for curve in (signature.by_time, signature.by_position) if len(curve.count)]
+    count, mean, squares = (
+        np.concatenate([getattr(curve, name) for curve in curves]) for name in ("count", "mean", "squares")
+    )
+    spread = np.sqrt(squares / np.maximum(count - 1.0, 1.0))
+    known = (count > 1.0) & (np.abs(mean) > 0.0)
+    relative = np.where(known, spread / np.where(known, np.abs(mean), 1.0), np.nan)
+    return [float(np.nanmedian(column)) if np.isfinite(column).any() else 0.0 for column in relative.T]
 
 
 def _check_counts(runs: Sequence[SeasonRun]) -> None:

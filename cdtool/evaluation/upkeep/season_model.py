@@ -4,25 +4,27 @@ Conventions: n runs, J joints, c columns (sides, places and joints of a demand, 
 (temperature [°C], time [days or runs], those that are known), 1 + b fits: the first is the estimate, the others are
 fits of resampled days. Slopes are in spreads per kelvin, day or run.
 
-The level of a joint, its shift over the whole stroke, is a line over the regressors, with a curvature over the
-temperature; what a place demands follows the level in its own proportion. So a run is moved to other conditions x by
-the slopes of its columns, and its demand is the largest of them::
+The level l of a joint, its shift over the whole stroke, is a line over the regressors, with a curvature over the
+temperature; what a place demands follows the level in its own proportion. More friction also scatters more, so the
+residuals grow exponentially with the level. A run is moved to other conditions x by the slopes of its columns, and its
+demand is the largest of them::
 
-    c_i(x) = max over columns q of   held_iq + (x - x_i) . slope_q
+    c_i(x) = max over columns q of   a_q + x . slope_q + r_iq exp(g (l(x) - l(x_i)))
+    r_iq = held_iq - a_q - x_i . slope_q
 
 which is not linear in x: the worst place changes, and with two sides the worst side. The distribution at x is that of
 all runs moved there.
 
 The temperatures seen hardly show the curvature, and beyond them it decides. It has a prior: over the span of the
 temperatures seen the slope changes by nothing, with a standard deviation of 30 % of it. So the interval grows with the
-square of the distance.
+square of the distance. The growth g is hardly seen either. Its prior: the scatter is proportional to the signal.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,6 +45,9 @@ _HUBER, _STEPS = 1.345, 12
 _MAD = 0.6745
 # Standard deviation of the change of a slope over the span of the temperatures seen, as a share of the slope.
 _CURVATURE = 0.3
+# The growth g of the residuals is at most this before the runs are seen [1/spread]; its standard deviation is as much
+# as the growth, and at least the second.
+_MOST_GROWTH, _LEAST_DOUBT = 0.1, 0.03
 # A run is no run like the others from so many robust standard deviations on.
 _OUTLYING = 8.0
 
@@ -75,8 +80,9 @@ class Effect:
 class SeasonModel:
     """Regression of a season: see the module.
 
-    `design` (n, k) is that of the runs; `slopes` (1 + b, k', c) are those of its features, see `features`; `weights`
-    (1 + b, n) are the numbers of times that each run's day was drawn; `held` (n, c) is what they demand in
+    `design` (n, k) is that of the runs; `slopes` (1 + b, k', c) are those of its features, see `features`, and
+    `middle` (1 + b, c) their intercepts; `growth` (1 + b, k', c) are the slopes of the logarithm of the residuals;
+    `weights` (1 + b, n) are the numbers of times that each run's day was drawn; `held` (n, c) is what they demand in
     the `columns` (c,) of the demands in which any run was assessable. `levels` (n, J) are the shifts of the whole
     stroke, `residuals` (n, J) what a line leaves of them. `bend` is middle and span of the temperatures.
     """
@@ -85,6 +91,8 @@ class SeasonModel:
     design: FloatArray
     bend: tuple[float, float] | None
     slopes: FloatArray
+    middle: FloatArray
+    growth: FloatArray
     weights: FloatArray
     held: FloatArray
     columns: npt.NDArray[np.intp]
@@ -100,8 +108,7 @@ class SeasonModel:
 
     def demanded(self, conditions: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
         """Return what each run demands at conditions (k,), and in which column of a demand: each (n,)."""
-        base, moves = self._moved(conditions[np.newaxis], 0)
-        moved = base + moves[0]
+        (moved,) = self._moved(conditions[np.newaxis], 0)
         columns = moved.argmax(axis=1)
         return moved[np.arange(len(moved)), columns], self.columns[columns]
 
@@ -110,8 +117,7 @@ class SeasonModel:
         mean, std = np.empty((2, len(self.slopes), len(conditions)))
         for fit, weights in enumerate(self.weights):
             drawn = np.flatnonzero(weights)
-            base, moves = self._moved(conditions, fit, drawn)
-            factors = np.stack([(base + move).max(axis=1) for move in moves])
+            factors = np.stack([moved.max(axis=1) for moved in self._moved(conditions, fit, drawn)])
             times = weights[drawn]
             total = times.sum()
             mean[fit] = factors @ times / total
@@ -121,11 +127,13 @@ class SeasonModel:
 
     def _moved(
         self, conditions: FloatArray, fit: int, runs: npt.NDArray[np.intp] | slice = slice(None)
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return what the runs demand where all features are 0 (n, c), and what is added at conditions (m, c)."""
-        slopes = self.slopes[fit]
-        base = self.held[runs] - features(self.design[runs], self.bend) @ slopes
-        return base, features(conditions, self.bend) @ slopes
+    ) -> Iterator[FloatArray]:
+        """Yield what the runs demand (n, c) at each of the conditions (m, k)."""
+        own, there = features(self.design[runs], self.bend), features(conditions, self.bend)
+        slopes, growth = self.slopes[fit], self.growth[fit]
+        residuals = (self.held[runs] - self.middle[fit] - own @ slopes) * np.exp(-own @ growth)
+        for middle, scale in zip(self.middle[fit] + there @ slopes, np.exp(there @ growth), strict=True):
+            yield middle + residuals * scale
 
 
 def features(conditions: FloatArray, bend: tuple[float, float] | None) -> FloatArray:
@@ -155,7 +163,11 @@ def features(conditions: FloatArray, bend: tuple[float, float] | None) -> FloatA
 
 
 def fit_season(
-    runs: Sequence[SeasonRun], regressors: tuple[Regressor, ...], seed: int, resamples: int = RESAMPLES
+    runs: Sequence[SeasonRun],
+    regressors: tuple[Regressor, ...],
+    seed: int,
+    resamples: int = RESAMPLES,
+    relative_spread: Sequence[float] = (),
 ) -> SeasonModel:
     """Fit the dependence of a season's runs on temperature and time.
 
@@ -169,6 +181,9 @@ def fit_season(
         Seed of the resampled days.
     resamples : int
         Number of resamples.
+    relative_spread : sequence of float
+        Of each joint (J,), the spread of what was learned, relative to its mean: by as much per spread of the level the
+        residuals grow if the scatter is proportional to the signal. 0 where it is not given.
 
     Returns
     -------
@@ -203,11 +218,12 @@ def fit_season(
     rest = rest - np.median(rest, axis=0)
     joints = levels.shape[1]
     slopes = np.empty((len(weights), len(regressors) + (bend is not None), held.shape[1]))
+    growth, own_features = np.zeros(slopes.shape), features(design, bend)
     side_of, joint_of = used // math.prod(runs[0].demand.held.shape[1:]), used % joints
     for j in range(joints):
         level, on_level = lines[:, :, j], _projections_on(levels[:, j], robust)
         if bend is not None:
-            level = _bent(features(design, bend), levels[:, j], robust, lines[0, 0, j], rng)
+            level = _bent(own_features, levels[:, j], robust, lines[0, 0, j], rng)
         for side in range(len(runs[0].demand.sides)):
             columns = np.flatnonzero((joint_of == j) & (side_of == side))
             if not len(columns):
@@ -216,8 +232,15 @@ def fit_season(
             own = _shrunk(project @ held[:, columns] - lines[:, :, j, np.newaxis] * proportion[:, np.newaxis])
             slopes[:, :, columns] = level[:, :, np.newaxis] * proportion[:, np.newaxis]
             slopes[:, : len(regressors), columns] += own
+        columns = np.flatnonzero(joint_of == j)
+        before = min(relative_spread[j], _MOST_GROWTH) if relative_spread else 0.0
+        rate = _growth(held[:, columns], own_features, slopes[0][:, columns], level[0], weights, before, rng)
+        growth[:, :, columns] = (rate[:, np.newaxis] * level)[:, :, np.newaxis]
+    middle = weights @ held / weights.sum(axis=1, keepdims=True)
+    centre = weights @ own_features / weights.sum(axis=1, keepdims=True)
+    middle -= (centre[:, np.newaxis] @ slopes)[:, 0]
     effects = _effects(regressors, lines, len(days))
-    return SeasonModel(regressors, design, bend, slopes, weights, demands, used, levels, rest, effects)
+    return SeasonModel(regressors, design, bend, slopes, middle, growth, weights, demands, used, levels, rest, effects)
 
 
 def _effects(regressors: tuple[Regressor, ...], lines: FloatArray, days: int) -> tuple[Effect, ...]:
@@ -286,6 +309,34 @@ def _bent(
     right = centred @ level
     right[1:, -1] += noise / deviation**2 * deviation * rng.standard_normal(len(weights) - 1)
     found: FloatArray = (np.linalg.pinv(squares, hermitian=True) @ right[:, :, np.newaxis])[:, :, 0]
+    return found
+
+
+def _growth(
+    held: FloatArray,
+    own_features: FloatArray,
+    slopes: FloatArray,
+    level: FloatArray,
+    weights: FloatArray,
+    before: float,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Return by how much the logarithm of a joint's residuals grows with its level, in each fit (f,) [1/spread].
+
+    `held` (n, c) with `slopes` (k', c) over `own_features` (n, k'); `level` (k',): its coefficients. The prior is
+    normal about `before`; every resample draws from it, as that of the bend.
+    """
+    rest = held - own_features @ slopes
+    size = np.abs(rest - rest.mean(axis=0))
+    logarithm = np.log(np.maximum(size, 1e-3 * (size.mean(axis=0) + 1e-300))).mean(axis=1)
+    expected = (own_features @ level)[:, np.newaxis]
+    weighted, squares = _normal_equations(expected, weights)
+    noise = float(np.var(logarithm - logarithm.mean(), ddof=1))
+    doubt = max(before, _LEAST_DOUBT)
+    prior = noise / doubt**2
+    right = (weighted @ logarithm)[:, 0] + prior * before
+    right[1:] += prior * doubt * rng.standard_normal(len(weights) - 1)
+    found: FloatArray = right / (squares[:, 0, 0] + prior) if noise > 0.0 else np.zeros(len(weights))
     return found
 
 

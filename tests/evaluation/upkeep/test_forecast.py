@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from cdtool.evaluation.upkeep import forecast as module
 from cdtool.evaluation.upkeep.forecast import Coming, Forecast, forecast_season
 from cdtool.evaluation.upkeep.forecast_words import forecast_lines, headlines
 from cdtool.evaluation.upkeep.season_model import fit_season
+from cdtool.thresholds.fitted_signature import FittedSignature
 from tests.evaluation.upkeep.forecasts import ORIGIN, made_season, signature
 
 FACTOR = 5.5
@@ -22,7 +24,7 @@ FACTOR = 5.5
 @pytest.fixture(autouse=True)
 def few_resamples(monkeypatch):
     """Let the intervals be coarse, for the sake of time."""
-    monkeypatch.setattr(module, "fit_season", lambda runs, names, seed: fit_season(runs, names, seed, 60))
+    monkeypatch.setattr(module, "fit_season", partial(fit_season, resamples=60))
 
 
 def law(temperature: float, days: float) -> float:
@@ -140,6 +142,16 @@ def test_the_interval_contains_what_follows_in_nearly_all_seasons():
     assert inside >= 17
 
 
+def of_two_joints(fitted: FittedSignature) -> FittedSignature:
+    """Return the signature of two joints that are as the one of another."""
+    curves = {}
+    for name in ("by_time", "by_position"):
+        curve = getattr(fitted, name)
+        tables = {each: np.repeat(getattr(curve, each), 2, axis=1) for each in ("count", "mean", "squares")}
+        curves[name] = replace(curve, **tables)
+    return replace(fitted, joints=("knee", "hip"), **curves)
+
+
 def test_of_two_joints_the_one_that_follows_the_temperature_is_named():
     still, moved = made_season(lambda *_: 0.0, 0.3, places=3), made_season(law, 0.3, places=3, seed=1)
     runs = []
@@ -148,7 +160,7 @@ def test_of_two_joints_the_one_that_follows_the_temperature_is_named():
             np.concatenate((getattr(one.demand, name), getattr(two.demand, name)), axis=-1) for name in ("held", "mean")
         )
         runs.append(replace(two, demand=replace(two.demand, held=held, mean=mean)))
-    found = forecast_season(replace(signature(), joints=("knee", "hip")), runs, over(-5.0, 10.0), 0.1, origin=ORIGIN)
+    found = forecast_season(of_two_joints(signature()), runs, over(-5.0, 10.0), 0.1, origin=ORIGIN)
     assert found.place.joint == "hip" and found.effect("temperature").joint == 1
     lines = "\n".join(forecast_lines(found))
     assert "the level of hip changes with temperature by -0." in lines and "to the limit of hip" in lines

@@ -61,6 +61,44 @@ def test_a_few_wild_runs_hardly_change_the_slope_and_are_found():
     assert not outlying(fit_season(made_season(law, 0.3), BOTH, 1, resamples=20)).any()
 
 
+def scattering(growth: float, seed: int, count: int = 400):
+    """Runs whose level falls with the temperature, and whose scatter about it grows with the level."""
+    runs = made_season(law, 0.0, count=count, places=12, seed=seed)
+    rng = np.random.default_rng(seed)
+    for i, run in enumerate(runs):
+        noise = 0.3 * np.exp(growth * law(run.temperature, run.time)) * rng.normal(size=run.demand.held.shape)
+        runs[i] = replace(run, demand=replace(run.demand, held=run.demand.held + noise))
+    return runs
+
+
+@pytest.mark.parametrize("growth", [0.0, 0.2, 0.4])
+def test_a_scatter_that_grows_with_the_level_is_found(growth):
+    rates = []
+    for seed in range(5):
+        model = fit_season(scattering(growth, seed), BOTH, seed, resamples=50, relative_spread=[0.1])
+        rates.append(model.growth[0, 0, 0] / model.slopes[0, 0, 0])
+    # The prior, 0.1, counts as much as the runs at most.
+    assert np.mean(rates) == pytest.approx(growth, abs=0.5 * abs(growth - 0.1) + 0.03)
+
+
+@pytest.mark.parametrize("relative", [0.0, 0.05, 0.5])
+def test_with_few_runs_the_scatter_is_proportional_to_the_signal(relative):
+    rates = []
+    for seed in range(10):
+        model = fit_season(scattering(0.0, seed, 20), BOTH, seed, resamples=20, relative_spread=[relative])
+        rates.append(model.growth[0, 0, 0] / model.slopes[0, 0, 0])
+    # Without a limit, a signal that is about 0 would have a scatter that grows without one.
+    assert np.mean(rates) == pytest.approx(min(relative, 0.1), abs=0.05)
+
+
+def test_runs_moved_to_a_higher_level_scatter_more():
+    model = fit_season(scattering(0.3, 1), BOTH, 1, resamples=20, relative_spread=[0.1])
+    (mean_warm, mean_cold), (warm, cold) = (item[0] for item in model.moments(np.array([[20.0, 0.0], [0.0, 0.0]])))
+    rate = model.growth[0, 0, 0] / model.slopes[0, 0, 0]
+    assert mean_cold > mean_warm
+    assert cold / warm == pytest.approx(np.exp(2.0 * rate), rel=0.02)
+
+
 def test_places_that_no_run_reached_demand_nothing():
     runs = made_season(law, 0.1)
     for i, run in enumerate(runs):

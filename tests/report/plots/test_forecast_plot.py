@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from tests.report.plots.svg import texts
 @pytest.fixture(scope="module")
 def found() -> Forecast:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "fit_season", lambda runs, names, seed: fit_season(runs, names, seed, 40))
+        patch.setattr(module, "fit_season", partial(fit_season, resamples=40))
         runs = made_season(lambda at, _: 3.2 - 0.15 * (at - 10.0), 0.5, places=3)
         coming = Coming.over_range((0.0, 15.0), 59.5, 80.0, 40)
         return forecast_season(signature(), runs, coming, 0.05, origin=ORIGIN)
