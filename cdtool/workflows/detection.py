@@ -358,8 +358,8 @@ def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
     if first is None:
         return f"contact at {contact.start:.3f} s, more than {found.window:g} s after its onset"
     if first.joint != alarm.joint:
-        return f"same contact, also {found.joints[alarm.joint]}"
-    return f"same contact, {found.joints[alarm.joint]} again"
+        return f"same contact, also {alarm.joint}"
+    return f"same contact, {alarm.joint} again"
 
 
 def why_no_contact(found: Detected, alarm: Alarm) -> str:

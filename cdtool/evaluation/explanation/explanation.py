@@ -202,7 +202,7 @@ def explain_alarm(
     --------
     `explain_operation` explains every alarm of an operation.
     """
-    margin = (margins or joint_margins(detection))[alarm.joint]
+    margin = (margins or joint_margins(detection))[alarm.column]
     at = int(np.searchsorted(margin.time, alarm.time))
     runs = margin.runs
     containing = runs[(runs[:, 0] <= at) & (runs[:, 1] >= at), 0]

@@ -197,7 +197,7 @@ def _panel(
 ) -> Panel:
     alarms = detection.verdict.alarms
     alarm = shown.alarm if shown and shown.alarm else (alarms[0] if alarms else None)
-    joint = alarm.joint if alarm else detection.leading
+    joint = alarm.column if alarm else detection.leading
     return Panel(
         detector=detection.detector,
         unit=detection.statistic.unit,

@@ -127,7 +127,7 @@ def match(
 
     Examples
     --------
-    >>> alarm = Alarm(time=1.05, joint=0, side="above", statistic=450.0, limit=400.0)
+    >>> alarm = Alarm(time=1.05, joint="axis", side="above", statistic=450.0, limit=400.0)
     >>> time = np.arange(3000) * 1e-3
     >>> statistic = Signal(time, np.zeros((3000, 1)), np.zeros((3000, 1), dtype=np.uint8), "N")
     >>> verdict = Verdict("alarm", (alarm,), crossings=(alarm,))
