@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypedDict
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -127,7 +127,8 @@ class Activation:
                 statistic_then, highest = float(value[k]), float(upper[k])
                 above = statistic_then > highest
                 limit = highest if above else float(lower[k])
-                crossing = Alarm(float(time[k]), joint, "above" if above else "below", statistic_then, limit)
+                side: Literal["above", "below"] = "above" if above else "below"
+                crossing = Alarm(float(time[k]), statistic.name_of(joint), side, statistic_then, limit, joint)
                 crossings.append(crossing)
                 if was_armed:
                     alarms.append(crossing)
@@ -154,8 +155,8 @@ class Activation:
         if not math.isfinite(self.wait):
             return math.inf
         limits = (band.lower, band.upper, inner.lower, inner.upper)
-        columns = (_column(item, alarm.joint) for item in (statistic.values, *limits))
-        status = np.ascontiguousarray(statistic.status[:, alarm.joint])
+        columns = (_column(item, alarm.column) for item in (statistic.values, *limits))
+        status = np.ascontiguousarray(statistic.status[:, alarm.column])
         time = np.ascontiguousarray(statistic.time)
         return float(_calm_from(time, *columns, status, int(np.searchsorted(time, alarm.time)), self.wait))
 
@@ -224,7 +225,7 @@ def begins_at(time: FloatArray, begins: Sequence[float]) -> BoolArray:
 
 
 def _in_order(alarms: list[Alarm]) -> tuple[Alarm, ...]:
-    return tuple(sorted(alarms, key=lambda alarm: (alarm.time, alarm.joint)))
+    return tuple(sorted(alarms, key=lambda alarm: (alarm.time, alarm.column)))
 
 
 def crossings_of(

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 StatusArray = npt.NDArray[np.uint8]
 
@@ -64,6 +65,8 @@ class Signal:
     notes: tuple[str, ...] = ()
     lost: BoolArray | None = None
     channels: tuple[tuple[str, str], ...] = ()
+
+    __repr__ = short_repr
 
     @property
     def valid(self) -> BoolArray:
@@ -124,6 +127,10 @@ class Signal:
         values = np.full(status.shape, np.nan)
         return self.changed(values=values, status=status, unit="1", joints=WHOLE_MACHINE, lost=lost, channels=())
 
+    def name_of(self, column: int) -> str:
+        """Return the name of a column: its joint, or its number from 0 where the columns have no names."""
+        return self.joints[column] if self.joints else str(column)
+
     def rows(self, start: float, end: float) -> slice:
         """Return the rows with start <= time <= end [s]."""
         first, last = np.searchsorted(self.time, start, side="left"), np.searchsorted(self.time, end, side="right")
@@ -155,6 +162,8 @@ class Band:
 
     lower: FloatArray
     upper: FloatArray
+
+    __repr__ = short_repr
 
     def part(self, rows: slice) -> Band:
         """Return these rows of the band; the band itself for all rows."""
@@ -200,14 +209,16 @@ class Evidence:
 class Alarm:
     """An exit of the statistic from its band: time [s] of the sample that raised the alarm, debounce included.
 
-    `joint` is the column of the signal; the signal's `joints` has its name.
+    `joint` is the name of the joint, `column` its column in the signal. A signal of the whole machine has one column,
+    which is named so.
     """
 
     time: float
-    joint: int
+    joint: str
     side: Literal["above", "below"]
     statistic: float
     limit: float
+    column: int = 0
 
 
 @dataclass(frozen=True)
@@ -225,3 +236,5 @@ class Verdict:
     reason: str = ""
     crossings: tuple[Alarm, ...] = ()
     rearmed: tuple[float, ...] = ()
+
+    __repr__ = short_repr

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,11 @@ import numpy.typing as npt
 from cdtool.derived import StoresDerived
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
+from cdtool.html_table import html_table
+from cdtool.short_repr import short_repr
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -39,6 +44,8 @@ class Series(StoresDerived):
     time: FloatArray
     values: FloatArray
     unit: str
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -93,6 +100,8 @@ class TableRows:
     time: FloatArray
     kept: BoolArray | None = None
 
+    __repr__ = short_repr
+
     @property
     def count(self) -> int:
         """Return the number of rows."""
@@ -137,6 +146,8 @@ class Recording(StoresDerived):
     beside: tuple[tuple[str, str], ...] = ()
     truth_clock: float = 0.0
     label_kinds: tuple[tuple[float, str], ...] = ()
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name, series in self.channels.items():
@@ -208,6 +219,48 @@ class Recording(StoresDerived):
     def _without_ground_truth(self) -> Recording:
         seen = {name: series for name, series in self.channels.items() if name not in GROUND_TRUTH}
         return replace(self, channels=seen)
+
+    def to_frame(self, channels: Sequence[str] = ()) -> pd.DataFrame:
+        """Return channels as a DataFrame with a row for each time at which one of them has a sample.
+
+        A value is NaN where the channel has no sample at that time: nothing is interpolated, and `frame.ffill()` holds
+        the last sample. The index is `time_s`; the columns are named as `cdtool convert` names them: `speed [m/s]`,
+        with several joints `speed arm [rad/s]`. Without `channels`: all of them. Raises RecordingError for a channel
+        that the recording does not have.
+        """
+        import pandas as pd
+
+        shown = {name: self[name] for name in channels or self.channels}
+        time = np.unique(np.concatenate([np.empty(0), *(series.time for series in shown.values())]))
+        columns: dict[str, FloatArray] = {}
+        for name, series in shown.items():
+            values = np.full((len(time), series.joint_count), np.nan)
+            values[np.searchsorted(time, series.time)] = series.values
+            columns |= dict(zip(self._headings(name), values.T, strict=True))
+        return pd.DataFrame(columns, index=pd.Index(time, name="time_s"))
+
+    def _headings(self, name: str) -> Iterator[str]:
+        """Yield the heading of each column of a channel, as `cdtool convert` writes it."""
+        series, unit = self.channels[name], f" [{self.channels[name].unit}]" if self.channels[name].unit else ""
+        of_joints = series.joint_count == len(self.joints) and name not in (*GROUND_TRUTH, *TRIGGER)
+        parts = self.joints if of_joints else [str(number) for number in range(1, series.joint_count + 1)]
+        for part in parts:
+            yield f"{name} {part}{unit}" if series.joint_count > 1 else f"{name}{unit}"
+
+    def _repr_html_(self) -> str:
+        """Return the channels as a table, which a notebook shows."""
+        rows = [
+            (
+                name,
+                series.unit or "–",
+                series.joint_count,
+                len(series),
+                1.0 / series.period if len(series) > 1 else None,
+            )
+            for name, series in self.channels.items()
+        ]
+        caption = f"{self.name}: {self.duration:.3g} s, joints: {', '.join(self.joints)}"
+        return html_table(caption, ("channel", "unit", "columns", "samples", "rate [Hz]"), rows)
 
     def own_clock(self, clock: FloatArray) -> FloatArray | None:
         """Return the times of the first channel whose times equal those of `clock` [s]; None without such a channel.

@@ -29,7 +29,7 @@ def alarms(values, status=None, debounce=3, rearm=0.5, period=1e-3):
 def test_the_alarm_has_the_time_of_the_last_sample_that_was_counted():
     (alarm,) = alarms([0, 0, 2, 2, 3, 2, 0])
     assert alarm.time == pytest.approx(4e-3)
-    assert (alarm.side, alarm.statistic, alarm.limit, alarm.joint) == ("above", 3.0, 1.0, 0)
+    assert (alarm.side, alarm.statistic, alarm.limit, alarm.joint) == ("above", 3.0, 1.0, "0")
 
 
 def test_a_value_inside_interrupts_the_sequence():
@@ -234,5 +234,5 @@ def test_samples_outside_are_marked_as_by_numpy(data, count, debounce, has_inner
     made = crossings_by_numpy(activation, statistic, band, inner, begins)
     for needed in (None, lambda: activation.needed(time)):
         alarms, crossings = activation.alarms(statistic, band, inner, begins, needed)
-        assert [(item.time, item.joint, item.statistic, item.limit) for item in crossings] == [it[:4] for it in made]
+        assert [(item.time, item.column, item.statistic, item.limit) for item in crossings] == [it[:4] for it in made]
         assert [item.time for item in alarms] == [it[0] for it in made if it[4]]

@@ -66,10 +66,10 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
 
 
 def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
-    name, joints = detection.operation.name, detection.statistic.joints
+    name = detection.operation.name
     latency = {item.alarm: item for item in matching.matches if item.alarm}
     rows: list[tuple[object, ...]] = []
-    for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.joint)):
+    for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.column)):
         late = number(1e3 * latency[alarm].latency, 3) if alarm in latency else "-"
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
         why = "" if alarm in latency else _why_no_latency(found, alarm)
@@ -79,7 +79,7 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
             later = 1e3 * latency[alarm].contact.uncertainty
             missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"
             why = f"{why}; {missing}" if why else missing
-        rows.append((name, "alarm", f"{alarm.time:.3f}", joints[alarm.joint], *figures, why))
+        rows.append((name, "alarm", f"{alarm.time:.3f}", alarm.joint, *figures, why))
     for item in matching.matches:
         if not item.alarm:
             outcome = item.outcome.replace("_", " ")
@@ -159,7 +159,6 @@ def _as_json(
 ) -> dict[str, Any]:
     from cdtool.workflows.detection import contact_of, why_no_contact
 
-    joints = detection.statistic.joints
     belonging = {alarm: contact_of(found, alarm) for alarm in detection.verdict.alarms}
     belonging |= {item.alarm: item.contact for item in matching.matches if item.alarm}
     return {
@@ -173,7 +172,7 @@ def _as_json(
         "alarms": [
             {
                 "time_s": alarm.time,
-                "joint": joints[alarm.joint],
+                "joint": alarm.joint,
                 "side": alarm.side,
                 "statistic": alarm.statistic,
                 "limit": alarm.limit,

@@ -14,6 +14,7 @@ from typing import Any, Self
 from cdtool.evaluation.rows import picked, values_of
 from cdtool.findings import Finding
 from cdtool.frozen import frozen
+from cdtool.short_repr import short_repr
 
 SCHEMA_VERSION = 4
 # How reports introduce what is lost of a recording that was used.
@@ -144,6 +145,8 @@ class ExposureResult:
     hours: float = meant("time in which the signal was assessable")
     not_assessable: int = meant("operations that were nowhere assessable", default=0)
     not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
+
+    __repr__ = short_repr
 
 
 @frozen
@@ -312,6 +315,8 @@ class Results:
         default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
+
+    __repr__ = short_repr
 
     @property
     def every_group(self) -> tuple[str, ...]:

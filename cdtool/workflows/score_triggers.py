@@ -25,6 +25,7 @@ from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, Wanted, outcome_of
@@ -49,6 +50,8 @@ class Score:
     evaluated: Evaluated
     traces: tuple[Trace, ...]
     inputs: tuple[Path, ...] = ()
+
+    __repr__ = short_repr
 
 
 def score(
@@ -234,7 +237,7 @@ def _detection(operation: Operation, detector: str, said: Triggered, shift: floa
         values[(time >= at) & (time < at + _HELD)] = 1.0
     for begin, end in said.blind:
         status[(time >= begin - shift) & (time <= end - shift)] = Status.NOT_APPLICABLE
-    crossings = tuple(Alarm(at, 0, "above", 1.0, 0.5) for at in inside)
+    crossings = tuple(Alarm(at, WHOLE_MACHINE[0], "above", 1.0, 0.5) for at in inside)
     alarms = tuple(item for i, item in enumerate(crossings) if not i or item.time - crossings[i - 1].time > _HELD)
     signal = Signal(time, values, status, "1", joints=WHOLE_MACHINE)
     band = Band(np.full_like(values, -np.inf), np.full_like(values, 0.5))

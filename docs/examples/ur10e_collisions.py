@@ -160,13 +160,13 @@ def closest(judged: Judged) -> str:
 
 def described(alarm: Alarm, judged: Judged) -> str:
     """Joint and time of an alarm; for one joint also its speed, since friction is worst known near rest."""
-    name = judged.detection.statistic.joints[alarm.joint]
+    name = alarm.joint
     text = f"{name} {alarm.time - judged.recording.start:.2f} s"
     if name not in judged.recording.joints:
         return text
     speed = judged.recording["speed"]
     row = int(np.searchsorted(speed.time, alarm.time))
-    return f"{text} ({speed.values[row, alarm.joint]:.3f} rad/s)"
+    return f"{text} ({speed.values[row, alarm.column]:.3f} rad/s)"
 
 
 def report(judged: Judged) -> None:
@@ -179,7 +179,7 @@ def report(judged: Judged) -> None:
     for i, item in enumerate(matching.matches, 1):
         if item.alarm:
             late = item.alarm.time - item.contact.start
-            found = f"{statistic.joints[item.alarm.joint]}, {late:+.2f} s after the window's start"
+            found = f"{item.alarm.joint}, {late:+.2f} s after the window's start"
         else:
             found = item.outcome.replace("_", " ") + (f" ({item.reason})" if item.reason else "")
         print(f"    contact {i}: {found}")

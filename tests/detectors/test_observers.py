@@ -99,7 +99,7 @@ def test_the_alarm_names_the_joint_that_feels_the_contact_and_its_side(name, kin
     detection = detect_operation(operation, machine, OBSERVERS[name], [Limit.given([3.0])], Activation())
     assert detection.verdict.outcome == "alarm"
     (alarm,) = detection.verdict.alarms
-    assert detection.statistic.joints[alarm.joint] == machine.joints[joint]
+    assert (alarm.joint, detection.statistic.joints[alarm.column]) == (machine.joints[joint],) * 2
     assert alarm.side == ("above" if sign > 0.0 else "below")
     assert CONTACT_AT < alarm.time < CONTACT_AT + 0.15
 

@@ -181,7 +181,7 @@ def test_every_contact_of_the_arm_is_found_with_limits_from_five_seconds_without
         for match, (start, end) in zip(item.matching.matches, example["WINDOWS"][log], strict=True):
             assert match.outcome == "detected"
             assert start - 0.11 <= match.alarm.time - item.recording.start <= end
-            assert item.detection.statistic.joints[match.alarm.joint] == "joint3"
+            assert match.alarm.joint == "joint3"
 
 
 @needs_arm
@@ -196,8 +196,8 @@ def test_false_alarms_come_only_from_a_wrist_that_stands_still(judged, name, cou
     assert len(false) == count
     speed = moving.recording["speed"]
     for alarm in false:
-        assert moving.detection.statistic.joints[alarm.joint] == "joint6"
-        assert abs(speed.values[np.searchsorted(speed.time, alarm.time), alarm.joint]) < 1e-3
+        assert alarm.joint == "joint6"
+        assert abs(speed.values[np.searchsorted(speed.time, alarm.time), alarm.column]) < 1e-3
 
 
 @needs_arm

@@ -20,6 +20,7 @@ from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.pipeline import Detection
 from cdtool.recording import GROUND_TRUTH, Contact
+from cdtool.short_repr import short_repr
 
 Role = Literal["detection", "further alarm", "in progress", "false alarm", "alarm"]
 
@@ -61,6 +62,8 @@ class AlarmExplanation:
     absent: Absence | None = None
     evidence: Evidence | None = None
 
+    __repr__ = short_repr
+
     @property
     def zero(self) -> float:
         """Return the time from which others count [s]: the contact's onset, else the alarm."""
@@ -92,6 +95,8 @@ class MissExplanation:
     inputs: tuple[str, ...]
     runs: int = 0
     absent: Absence | None = None
+
+    __repr__ = short_repr
 
     @property
     def zero(self) -> float:
@@ -140,7 +145,7 @@ def explain_operation(
 
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0]).detected
     >>> (alarm,) = explain_operation(found.detections[0], found.matchings[0], found.activation)
     >>> alarm.role, alarm.joint, alarm.debounce, alarm.absent.value
     ('detection', 'gate', 9, 'limits set by hand')
@@ -202,7 +207,7 @@ def explain_alarm(
     --------
     `explain_operation` explains every alarm of an operation.
     """
-    margin = (margins or joint_margins(detection))[alarm.joint]
+    margin = (margins or joint_margins(detection))[alarm.column]
     at = int(np.searchsorted(margin.time, alarm.time))
     runs = margin.runs
     containing = runs[(runs[:, 0] <= at) & (runs[:, 1] >= at), 0]
@@ -293,7 +298,7 @@ def explain_miss(
 
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[4000.0])
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[4000.0]).detected
     >>> miss = explain_miss(found.detections[0], found.matchings[0].matches[0], found.activation)
     >>> miss.outcome, miss.joint, miss.approaches[0].longest
     ('missed', 'gate', 0)

@@ -19,6 +19,7 @@ import numpy as np
 
 from cdtool.detection import Alarm, Signal, Verdict
 from cdtool.recording import Contact
+from cdtool.short_repr import short_repr
 
 # What raises an alarm again within this time [s] is the same event.
 REARM = 0.5
@@ -45,6 +46,8 @@ class Match:
     watched: float = float("nan")
     reason: str = ""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Matching:
@@ -52,6 +55,8 @@ class Matching:
 
     matches: tuple[Match, ...]
     false_alarms: tuple[Alarm, ...]
+
+    __repr__ = short_repr
 
 
 def windows(contacts: Sequence[Contact], window: float) -> list[tuple[Contact, float, float]]:
@@ -127,7 +132,7 @@ def match(
 
     Examples
     --------
-    >>> alarm = Alarm(time=1.05, joint=0, side="above", statistic=450.0, limit=400.0)
+    >>> alarm = Alarm(time=1.05, joint="axis", side="above", statistic=450.0, limit=400.0)
     >>> time = np.arange(3000) * 1e-3
     >>> statistic = Signal(time, np.zeros((3000, 1)), np.zeros((3000, 1), dtype=np.uint8), "N")
     >>> verdict = Verdict("alarm", (alarm,), crossings=(alarm,))

@@ -127,7 +127,7 @@ class _Joint:
             local_at=float(self.found.places[at]) if at >= 0 else math.nan,
             critical_factor=critical,
             margin_used=critical / factor,
-            alarm=any(alarm.joint == self.joint for alarm in detection.verdict.alarms),
+            alarm=any(alarm.column == self.joint for alarm in detection.verdict.alarms),
         )
 
     def _local(self, overall: ChangeOverRuns) -> Shown | None:

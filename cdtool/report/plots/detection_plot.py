@@ -61,9 +61,13 @@ def plot_detected(found: Detected, path: Path) -> None:
 
     Raises UsageError, CdtoolError (see `save`).
     """
+    save(detection_figure(found), path)
+
+
+def detection_figure(found: Detected) -> Figure:
+    """Return the figure of `plot_detected`, which a notebook shows."""
     with drawing():
-        figure = _figure(found)
-        save(figure, path)
+        return _figure(found)
 
 
 def _figure(found: Detected) -> Figure:
@@ -119,7 +123,7 @@ def _column(
         for item in parts:
             draw_signal(axes, StatisticCurve.of(item, joint), item.detector, span, legend)
             for alarm in item.verdict.alarms:
-                if alarm.joint == joint:
+                if alarm.column == joint:
                     draw_alarm(axes, alarm, colour, legend)
     draw_trigger(rows[len(joints)], parts, colour, legend)
     if len(rows) > len(joints) + 1:
@@ -155,9 +159,9 @@ def _name_event(rows: list[Axes], joints: list[int], event: _Event) -> None:
     if event.contact:
         side = "left" if event.alarm and event.alarm.time < event.contact.start else "right"
         _write_above(rows[0], event.contact.start, f" onset {event.contact.start:.3f} s ", side)
-    if event.alarm and event.alarm.joint in joints:
+    if event.alarm and event.alarm.column in joints:
         side = "right" if event.contact and event.alarm.time < event.contact.start else "left"
-        axes = rows[joints.index(event.alarm.joint)]
+        axes = rows[joints.index(event.alarm.column)]
         _write_above(axes, event.alarm.time, f" alarm {event.alarm.time:.3f} s ", side, bold=True)
 
 
@@ -188,7 +192,7 @@ def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
 
 def _shown_joints(found: Detected) -> tuple[list[int], list[int]]:
     """Return the joints that alarm, and those that are drawn."""
-    alarming = sorted({alarm.joint for item in found.detections for alarm in item.verdict.alarms})
+    alarming = sorted({alarm.column for item in found.detections for alarm in item.verdict.alarms})
     leading = sorted({item.leading for item in found.detections})
     return alarming, (alarming or leading)[:_MOST_PANELS]
 

@@ -90,7 +90,7 @@ def _contact_row(
         recording=recording.name,
         group=judged.group,
         detector=detection.detector,
-        joint=detection.statistic.joints[alarm.joint] if alarm else None,
+        joint=alarm.joint if alarm else None,
         onset_s=contact.start,
         onset_uncertainty_s=None if contact.in_progress else contact.uncertainty,
         alarm_s=alarm.time if alarm else None,
@@ -120,7 +120,7 @@ def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
             recording=judged.operation.name,
             group=judged.group,
             detector=detection.detector,
-            joint=detection.statistic.joints[alarm.joint],
+            joint=alarm.joint,
             time_s=alarm.time,
             **_crossing(detection, alarm),
         )

@@ -182,7 +182,7 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
     for detections in found:
         for detection in detections:
             pooled.setdefault(detection.detector, []).extend(detection.verdict.crossings)
-    return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.joint)) for name, items in pooled.items()}
+    return {name: sorted(items, key=lambda alarm: (alarm.time, alarm.column)) for name, items in pooled.items()}
 
 
 def force_curves(

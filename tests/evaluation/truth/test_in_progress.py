@@ -18,7 +18,7 @@ LATER = Contact(6.0, 6.3, 0.01, 900.0)
 def matching(times, contacts, crossings=()):
     time = np.arange(0.0, 10.0, 1e-2)
     signal = Signal(time, np.zeros((1000, 1)), np.full((1000, 1), Status.VALID, dtype=np.uint8), "1", joints=("a",))
-    alarms = tuple(Alarm(at, 0, "above", 1.0, 0.5) for at in times)
+    alarms = tuple(Alarm(at, "axis", "above", 1.0, 0.5) for at in times)
     return match(Verdict("alarm", alarms, crossings=alarms), contacts, signal)
 
 

@@ -19,7 +19,7 @@ CONTACT = Contact(5.0, 5.3, 0.01)
 
 
 def alarm(time: float) -> Alarm:
-    return Alarm(time, 0, "above", 2.0, 1.0)
+    return Alarm(time, "axis", "above", 2.0, 1.0)
 
 
 def match(alarms: list[Alarm], contacts: list[Contact], signal: Signal) -> Matching:
@@ -124,7 +124,9 @@ def test_windows_never_overlap(onsets):
 
 
 def test_one_event_on_several_joints_is_one_false_alarm():
-    alarms = [Alarm(2.0 + 0.01 * joint, joint, "above", 2.0, 1.0) for joint in range(6)] + [alarm(4.0)]
+    alarms = [Alarm(2.0 + 0.01 * joint, f"joint {joint}", "above", 2.0, 1.0, joint) for joint in range(6)] + [
+        alarm(4.0)
+    ]
     assert [item.time for item in match(alarms, [CONTACT], statistic()).false_alarms] == [2.0, 4.0]
 
 

@@ -39,7 +39,7 @@ def recording(force: FloatArray, begin: float, end: float, own_clock: bool) -> R
 def matched(contacts: list[Contact], alarm: float) -> tuple:
     status = np.full((len(TIME), 1), Status.VALID, dtype=np.uint8)
     signal = Signal(TIME, np.zeros((len(TIME), 1)), status, "1", joints=("x",))
-    alarms = (Alarm(alarm, 0, "above", 1.0, 0.5),)
+    alarms = (Alarm(alarm, "axis", "above", 1.0, 0.5),)
     return match(Verdict("alarm", alarms, crossings=alarms), contacts, signal).matches
 
 

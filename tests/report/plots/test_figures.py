@@ -54,7 +54,7 @@ def six_joints() -> Detected:
         recording, Signal(time, torque, status, "N m", joints=names)
     )
     alarms, _ = Activation().alarms(statistic, band)
-    assert {alarm.joint for alarm in alarms} == {1, 3}
+    assert {alarm.column for alarm in alarms} == {1, 3}
     operation = operations_of(recording)[0]
     return Detected(
         recording,
