@@ -78,12 +78,11 @@ class _Session:
 
     def end(self) -> None:
         """Remove the folder, and with it those of the workers if this is the first process."""
-        folder = self.root if self.owned is not None else self.folder
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-        if self.owned is not None:
+        if self.owned is not None and self.root is not None:
             os.environ.pop(_FOLDER, None)
-            self.owned.close()
+            _remove(self.root, self.owned)
+        elif self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
 
 
 _session = _Session()
@@ -246,7 +245,15 @@ def _remove_left_behind(own: Path) -> None:
             continue
         with suppress(OSError), (folder / _LOCK).open("r+b") as file:
             if lock_handle(file.fileno()):
-                shutil.rmtree(folder, ignore_errors=True)
+                _remove(folder, file)
+
+
+def _remove(folder: Path, lock: IO[bytes]) -> None:
+    """Remove a folder while it is locked; on Windows its lock file, and with it the folder, after that is closed."""
+    shutil.rmtree(folder, ignore_errors=True)
+    lock.close()
+    if folder.exists():
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _end() -> None:

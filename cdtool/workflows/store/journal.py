@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
+from cdtool.file_locks import remove_locked
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
 
@@ -46,8 +47,7 @@ class Journal:
 
     def close(self) -> None:
         """Remove the journal."""
-        self.path.unlink(missing_ok=True)
-        self._file.close()
+        remove_locked(self.path, self._file.close)
 
 
 def _locked_file(folder: Path) -> tuple[Path, IO[bytes]]:
@@ -66,12 +66,17 @@ def _close(file: IO[bytes] | None) -> None:
 
 
 def left_behind(folder: Path) -> Iterator[tuple[Path, list[Entry]]]:
-    """Yield the journals of writers that have ended, locked until the next one is asked for, with their entries."""
+    """Yield the journals of writers that have ended, with their entries.
+
+    Each is locked until the next one is asked for, and then removed.
+    """
     for path in sorted(folder.glob(f"*{_SUFFIX}")):
         with suppress(OSError), path.open("r+b") as file:
             if not _lock(file.fileno()) or not path.exists():
                 continue
             yield path, list(_entries(file.read()))
+            file.truncate(0)  # where it is closed before it is removed, another run may open it meanwhile
+            remove_locked(path, file.close)
 
 
 def _line(entry: Entry) -> bytes:
