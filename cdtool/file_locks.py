@@ -26,6 +26,8 @@ LOCK_SECONDS = 60.0
 # Windows removes no file that a process has open.
 REMOVES_OPEN_FILES = os.name != "nt"
 _PAUSE_SECONDS = 0.01
+# A lock on Windows is one of bytes, which nobody else can read then: of one behind any content.
+_LOCKED_BYTE = 1 << 40
 # Two names of one error on Linux, of two on macOS.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EINVAL)
 _NAME = re.compile(r"\.cdtool-(?P<key>[0-9a-f]{16})(-[0-9a-f]{16}\.tmp|\.lock)")
@@ -144,10 +146,13 @@ def remove_locked(path: Path, close: Callable[[], None]) -> None:
 def _lock_on_windows(handle: int) -> bool:
     import msvcrt
 
+    os.lseek(handle, _LOCKED_BYTE, os.SEEK_SET)
     try:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
     except OSError:
         return False
+    finally:
+        os.lseek(handle, 0, os.SEEK_SET)
     return True
 
 

@@ -1,7 +1,7 @@
 """Files as on Windows, simulated on Linux: a file that this process has open or mapped is not removed or renamed.
 
 Python opens files there without permission for others to delete them. A folder that contains such a file is not renamed
-either. `renameat2`, `fcntl` and `fork` do not exist.
+either. The module `fcntl` does not exist; that of Windows for locks does.
 
 As a plug-in (`python -m pytest -p tests.windows_files ...`) it simulates this for every test.
 """
@@ -12,6 +12,7 @@ import errno
 import os
 import shutil
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,6 +22,8 @@ import pytest
 
 from cdtool import file_locks
 
+# A name is looked up and removed in one step there: no other thread opens the file in between.
+_one_step = threading.RLock()
 CAN_SIMULATE = Path("/proc/self/fd").is_dir()
 
 
@@ -52,6 +55,7 @@ def windows_files() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         for name, both in (("unlink", False), ("remove", False), ("rename", True), ("replace", True)):
             patch.setattr(os, name, _refusing(getattr(os, name), both))
+        patch.setattr(os, "open", _in_one_step(os.open))
         patch.setattr(shutil, "_use_fd_functions", False)
         patch.setitem(sys.modules, "fcntl", None)
         patch.setitem(sys.modules, "msvcrt", ByteLocks())
@@ -61,13 +65,22 @@ def windows_files() -> Iterator[None]:
 
 def _refusing(call: Callable[..., Any], both: bool) -> Callable[..., Any]:
     def checked(path: Any, *others: Any, **options: Any) -> Any:
-        if options.get("dir_fd") is None:
-            refuse_open(path)
-            if both:
-                refuse_open(others[0])
-        return call(path, *others, **options)
+        with _one_step:
+            if options.get("dir_fd") is None:
+                refuse_open(path)
+                if both:
+                    refuse_open(others[0])
+            return call(path, *others, **options)
 
     return checked
+
+
+def _in_one_step(call: Callable[..., Any]) -> Callable[..., Any]:
+    def alone(*arguments: Any, **options: Any) -> Any:
+        with _one_step:
+            return call(*arguments, **options)
+
+    return alone
 
 
 class ByteLocks:
@@ -78,9 +91,7 @@ class ByteLocks:
     def locking(self, handle: int, mode: int, size: int) -> None:
         """Lock bytes at the current position; raise OSError if another handle has locked them."""
         assert mode == self.LK_NBLCK and size == 1
-        import _posixsubprocess  # noqa: F401  this is Linux, whatever the test simulates
-
-        real = sys.modules.pop("fcntl")
+        absent = sys.modules.pop("fcntl")
         try:
             import fcntl
 
@@ -88,7 +99,7 @@ class ByteLocks:
         except BlockingIOError as fault:
             raise PermissionError(errno.EACCES, "Permission denied") from fault
         finally:
-            sys.modules["fcntl"] = real
+            sys.modules["fcntl"] = absent
 
 
 @pytest.fixture(autouse="tests.windows_files" in " ".join(sys.argv))

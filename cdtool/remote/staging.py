@@ -11,6 +11,7 @@ from __future__ import annotations
 import atexit
 import errno
 import os
+import re
 import shutil
 import tempfile
 import threading
@@ -191,8 +192,8 @@ def _fetched(url: str, found: ObjectInfo) -> Path:
         _drop(url)
         _make_room(url, found.size)
         _session.number += 1
-        name = url.rpartition("/")[2]
-        target = _session.own_folder() / f"{_session.number}{Path(name).suffix[:16]}"
+        suffix = re.sub(r"[^A-Za-z0-9.]", "_", Path(url.rpartition("/")[2]).suffix[:16])  # as any system allows it
+        target = _session.own_folder() / f"{_session.number}{suffix}"
         copy = _session.copies[url] = _Copy(target, found)
         try:
             storage.fetch(url, target)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import secrets
-import sys
 import weakref
 import zlib
 from collections.abc import Iterator
@@ -17,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
-from cdtool.file_locks import remove_locked
+from cdtool.file_locks import lock_handle, remove_locked
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
 
@@ -97,21 +96,7 @@ def _entries(content: bytes) -> Iterator[Entry]:
 
 def _lock(handle: int) -> bool:
     """Lock a file for this process; return False if another one has locked it."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        try:
-            os.lseek(handle, 1 << 40, os.SEEK_SET)
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        finally:
-            os.lseek(handle, 0, os.SEEK_SET)
-        return True
-    import fcntl
-
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return lock_handle(handle)
     except OSError:
         return False
-    return True
