@@ -15,7 +15,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 _TAG = re.compile(r"v(?P<version>\d+\.\d+\.\d+)")
-_SECTION = re.compile(r"^## (?P<version>\d+\.\d+\.\d+) - (?P<date>\S+)\n(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
+_SECTION = re.compile(
+    r"^## (?P<version>\d+\.\d+\.\d+) - (?P<date>\S+)\n(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL
+)
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
@@ -42,7 +44,9 @@ def problems(tag: str, root: Path) -> Iterator[str]:
 
 def notes(tag: str, root: Path) -> str:
     """The section of a tag's version in CHANGELOG.md, without its heading."""
-    (found,) = [m["text"] for m in _SECTION.finditer(_text(root, "CHANGELOG.md")) if m["version"] == tag.removeprefix("v")]
+    (found,) = [
+        m["text"] for m in _SECTION.finditer(_text(root, "CHANGELOG.md")) if m["version"] == tag.removeprefix("v")
+    ]
     return f"{found.strip()}\n"
 
 

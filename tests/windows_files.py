@@ -30,9 +30,9 @@ CAN_SIMULATE = Path("/proc/self/fd").is_dir()
 def opened() -> set[str]:
     """Return the real paths of all files that this process has open or mapped."""
     found = set()
-    for entry in os.listdir("/proc/self/fd"):
+    for entry in Path("/proc/self/fd").iterdir():
         with suppress(OSError):
-            found.add(os.readlink(f"/proc/self/fd/{entry}"))
+            found.add(str(entry.readlink()))
     for line in Path("/proc/self/maps").read_text(encoding="utf-8", errors="surrogateescape").splitlines():
         parts = line.split(maxsplit=5)
         if len(parts) == 6:
@@ -44,7 +44,8 @@ def refuse_open(path: Any) -> None:
     """Raise PermissionError for a file that is open, or a folder with one in it."""
     if isinstance(path, int):
         return
-    real = os.path.join(os.path.realpath(os.path.dirname(os.fspath(path)) or "."), os.path.basename(os.fspath(path)))
+    given = Path(os.fspath(path))
+    real = str(given.parent.resolve() / given.name)
     if any(name == real or name.startswith(f"{real}/") for name in opened()):
         raise PermissionError(errno.EACCES, "used by this process (as on Windows)", str(path))
 

@@ -1,4 +1,4 @@
-"""The GitHub Action: its steps run in bash with a stand-in for GitHub's program, and no input reaches a shell as code."""
+"""The GitHub Action: its steps run in bash with a stand-in for GitHub's program; no input reaches a shell as code."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ assert words[0] == "api", words
 if "--method" not in words:
     assert words[1:3] == ["--paginate", "repos/owner/gate/issues/7/comments"], words
     assert "env.MARK" in words[4] and '.user.type == "Bot"' in words[4]
-    print("\\n".join(str(item["id"]) for item in comments if item["bot"] and item["body"].startswith(os.environ["MARK"])))
+    found = [item for item in comments if item["bot"] and item["body"].startswith(os.environ["MARK"])]
+    print("\\n".join(str(item["id"]) for item in found))
     sys.exit()
 method, path = words[words.index("--method") + 1 :][:2]
 (field,) = [word for word in words if word.startswith("body=@")]

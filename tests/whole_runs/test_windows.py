@@ -10,7 +10,7 @@ from pathlib import Path, PureWindowsPath
 
 import pytest
 
-from cdtool import file_locks, files
+from cdtool import file_locks
 from cdtool.cli import streams
 from cdtool.file_locks import holding, lock_handle
 from cdtool.files import replaced_folder, write_text
@@ -80,7 +80,7 @@ def test_the_file_of_a_lock_that_another_process_waits_for_stays_for_it(monkeypa
 def test_a_file_is_closed_even_if_it_cannot_be_removed(monkeypatch, tmp_path):
     closed = []
     monkeypatch.setattr(file_locks, "REMOVES_OPEN_FILES", True)
-    with pytest.raises(OSError):  # noqa: PT011  a folder
+    with pytest.raises(OSError):
         file_locks.remove_locked(tmp_path, lambda: closed.append(True))
     assert closed
 
@@ -121,7 +121,10 @@ def test_commands_write_replace_and_reuse_their_files(on_windows, tmp_path):
             ("detect", log, "-m", machine, "-s", tmp_path / "gate.json", "--plot", tmp_path / "a.png", "--force"),
             ("benchmark", bench, "-o", f"{tmp_path / 'report'}/", "-o", tmp_path / "results.parquet", "--force"),
             ("benchmark", bench, "--store", tmp_path / "store"),
-            *(("convert", log, tmp_path / f"to{end}", "--force") for end in (".csv", ".mcap", ".parquet", ".h5", ".tdms")),
+            *(
+                ("convert", log, tmp_path / f"to{end}", "--force")
+                for end in (".csv", ".mcap", ".parquet", ".h5", ".tdms")
+            ),
             ("store", "gc", tmp_path / "store"),
         ):
             done = cdtool(*words)
