@@ -33,7 +33,7 @@ OfLost = Callable[[Any, str], Any]
 
 _AHEAD = 2  # batches per worker
 _SHARES = 4  # of what is left, per worker
-# Python 3.12 itself leaves some hundred objects out of garbage collection; a caller that does so leaves out all of them.
+# Python 3.12.1 itself leaves some hundred objects out of garbage collection; a caller that does so leaves out all.
 _LEFT_OUT_BY_PYTHON = 10_000
 
 
