@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs cdtool with the lower bound of each dependency on Python 3.11, and runs the main job: --help, learn-signature,
-# detect, benchmark. Skipped, by name, where there is no Python 3.11.
+# Builds the wheel, installs it alone with the lower bound of each dependency on Python 3.11, and runs the main job: --help,
+# learn-signature, detect, benchmark. Skipped, by name, where there is no Python 3.11.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 python=$(command -v python3.11 || true)
@@ -15,11 +15,14 @@ mkdir "$folder/source"
 git ls-files -z | tar --null --files-from=- -cf - | tar -xf - -C "$folder/source"
 "$python" -m venv "$folder/venv"
 mapfile -t pins < <("$python" .ci/lowest_versions.py)
-echo "+ pip install ${pins[*]} ."
-"$folder/venv/bin/pip" install --quiet "${pins[@]}" "$folder/source"
+"$folder/venv/bin/pip" wheel --quiet --no-deps --wheel-dir "$folder" "$folder/source"
+rm -r "$folder/source"
+echo "+ pip install ${pins[*]} cdtool-*.whl"
+"$folder/venv/bin/pip" install --quiet "${pins[@]}" "$folder"/cdtool-*.whl
 cdtool="$folder/venv/bin/cdtool"
 gate=$PWD/sample_logs/gate
 cd "$folder" # the installed package is run, not this folder's
+"$cdtool" --version
 "$cdtool" --help > help.txt
 "$cdtool" benchmark --help >> help.txt
 "$cdtool" learn-signature "$gate"/free/* -m "$gate/machine.toml" -d feekf --force -o gate.feekf.json > learned.txt

@@ -15,7 +15,7 @@ import secrets
 import shutil
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -23,8 +23,13 @@ from cdtool.errors import OutputError
 from cdtool.plain_text import plain
 
 LOCK_SECONDS = 60.0
+# Windows removes no file that a process has open.
+REMOVES_OPEN_FILES = os.name != "nt"
 _PAUSE_SECONDS = 0.01
-_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
+# A lock on Windows is one of bytes, which nobody else can read then: of one behind any content.
+_LOCKED_BYTE = 1 << 40
+# Two names of one error on Linux, of two on macOS.
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EINVAL)
 _NAME = re.compile(r"\.cdtool-(?P<key>[0-9a-f]{16})(-[0-9a-f]{16}\.tmp|\.lock)")
 # The locks of this process: lock file -> its handle, which is None before the file is open.
 _handles: dict[tuple[Path, int], int | None] = {}
@@ -121,24 +126,44 @@ def lock_handle(handle: int) -> bool:
     return True
 
 
+def remove_locked(path: Path, close: Callable[[], None]) -> None:
+    """Remove a file that this process has locked, and close it; raises OSError.
+
+    While it is locked, no other process can hold it. Where an open file cannot be removed, it is closed first: it stays
+    if another process has opened it meanwhile, which then removes it.
+    """
+    if REMOVES_OPEN_FILES:
+        try:
+            path.unlink(missing_ok=True)
+        finally:
+            close()
+    else:
+        close()
+        with suppress(PermissionError):
+            path.unlink(missing_ok=True)
+
+
 def _lock_on_windows(handle: int) -> bool:
     import msvcrt
 
+    os.lseek(handle, _LOCKED_BYTE, os.SEEK_SET)
     try:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
     except OSError:
         return False
+    finally:
+        os.lseek(handle, 0, os.SEEK_SET)
     return True
 
 
 def _release(mine: tuple[Path, int]) -> None:
     with suppress(OSError):
-        if _handles.get(mine) is not None or _try(mine, create=False):
-            mine[0].unlink(missing_ok=True)  # while locked: no other process can hold it
+        if _handles.get(mine) is None:
+            _try(mine, create=False)
     handle = _handles.pop(mine, None)
     if handle is not None:
         with suppress(OSError):
-            os.close(handle)
+            remove_locked(mine[0], lambda: os.close(handle))
 
 
 def _remove_left_behind(folder: Path, own: tuple[Path, int]) -> None:

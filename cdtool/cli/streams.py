@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TextIO
 
 _STANDARD_INPUT_OUTPUT_ERROR = range(3)
+_IS_WINDOWS = os.name == "nt"
 
 
 class _Descriptor(io.FileIO):
@@ -58,7 +59,9 @@ def lost_output() -> OSError | None:
         return None
     stream.flush()
     fault = stream.descriptor.fault
-    return None if fault is None or fault.errno == errno.EPIPE else fault
+    # Windows has no error of its own for a closed pipe.
+    closed_pipe = (errno.EPIPE, errno.EINVAL) if _IS_WINDOWS else (errno.EPIPE,)
+    return None if fault is None or fault.errno in closed_pipe else fault
 
 
 def _opened(stream: TextIO | None, descriptor: int) -> TextIO:
@@ -66,7 +69,7 @@ def _opened(stream: TextIO | None, descriptor: int) -> TextIO:
         return Path(os.devnull).open("w", encoding="utf-8")
     if type(stream) is not io.TextIOWrapper or stream.fileno() != descriptor:
         return stream
-    if os.name != "posix":  # a Windows console has its own writer
+    if _IS_WINDOWS and stream.isatty():  # a console there has its own writer
         stream.reconfigure(errors="replace")
         return stream
     stream.flush()

@@ -11,6 +11,7 @@ from __future__ import annotations
 import atexit
 import errno
 import os
+import re
 import shutil
 import tempfile
 import threading
@@ -78,12 +79,11 @@ class _Session:
 
     def end(self) -> None:
         """Remove the folder, and with it those of the workers if this is the first process."""
-        folder = self.root if self.owned is not None else self.folder
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-        if self.owned is not None:
+        if self.owned is not None and self.root is not None:
             os.environ.pop(_FOLDER, None)
-            self.owned.close()
+            _remove(self.root, self.owned)
+        elif self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
 
 
 _session = _Session()
@@ -192,8 +192,8 @@ def _fetched(url: str, found: ObjectInfo) -> Path:
         _drop(url)
         _make_room(url, found.size)
         _session.number += 1
-        name = url.rpartition("/")[2]
-        target = _session.own_folder() / f"{_session.number}{Path(name).suffix[:16]}"
+        suffix = re.sub(r"[^A-Za-z0-9.]", "_", Path(url.rpartition("/")[2]).suffix[:16])  # as any system allows it
+        target = _session.own_folder() / f"{_session.number}{suffix}"
         copy = _session.copies[url] = _Copy(target, found)
         try:
             storage.fetch(url, target)
@@ -246,7 +246,15 @@ def _remove_left_behind(own: Path) -> None:
             continue
         with suppress(OSError), (folder / _LOCK).open("r+b") as file:
             if lock_handle(file.fileno()):
-                shutil.rmtree(folder, ignore_errors=True)
+                _remove(folder, file)
+
+
+def _remove(folder: Path, lock: IO[bytes]) -> None:
+    """Remove a folder while it is locked; on Windows its lock file, and with it the folder, after that is closed."""
+    shutil.rmtree(folder, ignore_errors=True)
+    lock.close()
+    if folder.exists():
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _end() -> None:

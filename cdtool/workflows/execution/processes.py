@@ -6,7 +6,9 @@ process has several threads, they are new processes of Python.
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
@@ -25,6 +27,8 @@ from cdtool.workflows.execution.workers import shares_memory
 
 # On Windows, a process is ended in one way only.
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
+# Windows waits for no more processes at a time.
+_MOST_PROCESSES = 61 if os.name == "nt" else sys.maxsize
 # So many times in a row processes may end although none of them has begun a piece.
 _MOST_RESTARTS = 3
 _JOINED_WITHIN, _ENDED_WITHIN = 10.0, 3.0
@@ -37,14 +41,14 @@ _NOTICED_WITHIN = 2.0
 class Processes:
     """A `ProcessPoolExecutor` for one kind of work that is replaced when one of its processes ends.
 
-    `size` processes do the work; a piece that takes longer than `limit` [s] ends its process.
+    `size` processes do the work, on Windows at most 61; a piece that takes longer than `limit` [s] ends its process.
     """
 
     broken: tuple[type[BaseException], ...] = (BrokenProcessPool, CancelledError)
     isolates = False
 
     def __init__(self, work: Callable[[Any], Any], size: int, limit: float | None) -> None:
-        self.size = size
+        self.size = min(size, _MOST_PROCESSES)
         self._work = work
         self._limit = limit
         self._restarts = 0

@@ -56,6 +56,8 @@ def decoded(text: str | bytes, kind: type[T]) -> T:
 def _plan(kind: Any) -> _Plan:
     """Return the plan of a type."""
     origin, inner = get_origin(kind), get_args(kind)
+    if hasattr(origin, "__value__"):  # a `type` statement: NumPy 2.5 defines NDArray by one
+        return _plan(origin.__value__[inner])
     if kind in _PLAIN or origin is Literal:
         return _Plan(None, None)
     if origin in (Union, types.UnionType):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import secrets
-import sys
 import weakref
 import zlib
 from collections.abc import Iterator
@@ -17,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
+from cdtool.file_locks import lock_handle, remove_locked
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
 
@@ -46,8 +46,7 @@ class Journal:
 
     def close(self) -> None:
         """Remove the journal."""
-        self.path.unlink(missing_ok=True)
-        self._file.close()
+        remove_locked(self.path, self._file.close)
 
 
 def _locked_file(folder: Path) -> tuple[Path, IO[bytes]]:
@@ -66,12 +65,17 @@ def _close(file: IO[bytes] | None) -> None:
 
 
 def left_behind(folder: Path) -> Iterator[tuple[Path, list[Entry]]]:
-    """Yield the journals of writers that have ended, locked until the next one is asked for, with their entries."""
+    """Yield the journals of writers that have ended, with their entries.
+
+    Each is locked until the next one is asked for, and then removed.
+    """
     for path in sorted(folder.glob(f"*{_SUFFIX}")):
         with suppress(OSError), path.open("r+b") as file:
             if not _lock(file.fileno()) or not path.exists():
                 continue
             yield path, list(_entries(file.read()))
+            file.truncate(0)  # where it is closed before it is removed, another run may open it meanwhile
+            remove_locked(path, file.close)
 
 
 def _line(entry: Entry) -> bytes:
@@ -92,21 +96,7 @@ def _entries(content: bytes) -> Iterator[Entry]:
 
 def _lock(handle: int) -> bool:
     """Lock a file for this process; return False if another one has locked it."""
-    if sys.platform == "win32":
-        import msvcrt
-
-        try:
-            os.lseek(handle, 1 << 40, os.SEEK_SET)
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        finally:
-            os.lseek(handle, 0, os.SEEK_SET)
-        return True
-    import fcntl
-
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return lock_handle(handle)
     except OSError:
         return False
-    return True

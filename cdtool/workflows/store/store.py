@@ -72,10 +72,9 @@ class Store:
         self._flushed = time.monotonic()
         self._parts: OrderedDict[Path, dict[str, list[Any]]] = OrderedDict()
         if writes:
-            for path, entries in left_behind(folder):
+            for _, entries in left_behind(folder):
                 if entries:
                     write_part(folder, entries)
-                path.unlink(missing_ok=True)
         self._all_parts = sorted((folder / "parts").glob("*.parquet"))
         self._index = _Index(self._all_parts)
 

@@ -74,13 +74,14 @@ def frozen_objects(_):
 def test_objects_made_before_the_work_are_not_searched_for_garbage_during_it(jobs):
     if jobs > 1 and not shares_memory():
         pytest.skip("an earlier test has left a thread: workers are not forked from this process")
-    assert gc.get_freeze_count() == 0
+    before = gc.get_freeze_count()
+    assert before < 1000  # some hundred: those of Python 3.12 itself
     assert all(count > 10_000 for count in in_order(frozen_objects, range(6), 6, Workers(jobs)))
-    assert gc.get_freeze_count() == 0
+    assert gc.get_freeze_count() <= before
     results = in_order(frozen_objects, range(6), 6)
     next(results)
     results.close()
-    assert gc.get_freeze_count() == 0
+    assert gc.get_freeze_count() <= before
 
 
 def test_objects_that_the_caller_has_left_out_of_garbage_collection_stay_left_out():
