@@ -260,7 +260,6 @@ UR10E = ("joint1", "joint2", "joint3", "joint4", "joint5", "joint6")
 
 def test_a_point_that_was_beyond_the_obstacle_before_meets_it_at_the_contact_only() -> None:
     """A real motion in which the tool crosses every plane several times, without a rest between."""
-    assert DATA is not None
     keys = {"urdf": "ur10e.urdf", "joints": list(UR10E), "drive_inertia": [0.0, 3.7434, 0.0, 0.0708, 0.2342, 0.4365]}
     keys |= {"viscous_friction": 10.0, "coulomb_friction": 5.0, "coulomb_slope": 50.0}
     machine = UrdfRobot.from_table(Table(keys, str(UR10E_LOGS / "machine.toml"), "machine."))
