@@ -21,6 +21,7 @@ import sys
 import tempfile
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,9 @@ def stage(target: Path) -> None:
     (target / "_static").mkdir()
     shutil.copy(SITE / "style.css", target / "_static")
     shutil.copy(SITE / "conf.py", target)
+    (target / "_static" / "fonts").mkdir()
+    fonts = Path(str(files("ziamath"))) / "fonts"
+    shutil.copy(fonts / "STIXTwoMath-Regular.ttf", target / "_static" / "fonts")
     pages = runpy.run_path(str(SITE / "generated_pages.py"))["generated_pages"](DOCS / "results.schema.json")
     for name, text in pages.items():
         file = target / "docs" / f"{name}.md"
@@ -122,18 +126,21 @@ def _descriptions() -> dict[str, str]:
 
 
 def _pictures(target: Path) -> str:
-    """Return every raster picture of the pages, with its text and the page that it is from."""
-    cards = []
-    seen = set[str]()
+    """Return every raster picture of the pages under the title of the first page that shows it, with its text."""
+    text = ["## Pictures\n"]
+    seen = set[Path]()
     for page in sorted((target / "docs").rglob("*.md")):
-        for text, image in re.findall(r"!\[([^\]]*)\]\(([^)\s]+\.(?:png|svg))\)", page.read_text(encoding="utf-8")):
-            place = os.path.relpath(page.parent / image, target / "docs")
-            if place in seen or place.endswith((".svg",)):
-                continue
-            seen.add(place)
-            name = os.path.relpath(page, target / "docs")
-            cards.append(f"### {text.partition(':')[0] if len(text) > 90 else text}\n\n![{text}]({place})\n\nFrom [{_title(target, name[:-3])}]({name}).\n")
-    return "## Pictures\n\n" + "\n".join(cards)
+        name = page.relative_to(target / "docs").as_posix().removesuffix(".md")
+        shown = re.findall(r"!\[([^\]]*)\]\(([^)\s]+\.png)\)", page.read_text(encoding="utf-8"))
+        new = [(words, (page.parent / image).resolve()) for words, image in shown]
+        new = [(words, image) for words, image in new if image not in seen]
+        seen |= {image for _, image in new}
+        if new:
+            text.append(f"### {_title(target, name)}\n")
+            for words, image in new:
+                place = os.path.relpath(image, (target / "docs").resolve())
+                text.append(f"![{words}]({place})\n\n{words}: [{_title(target, name)}]({name}.md).\n")
+    return "\n".join(text)
 
 
 def _with_links(page: Path, target: Path) -> str:

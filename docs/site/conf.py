@@ -24,7 +24,9 @@ language = "en"
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_design", "sphinx_copybutton"]
 exclude_patterns: list[str] = []
-nitpicky = False
+smartquotes = False  # `--option` in the text of a help page stays as it is
+add_module_names = False
+toc_object_entries = False
 
 # Markdown as GitHub renders it: `$...$`, blocks of `math`, anchors of headings.
 myst_enable_extensions = ["dollarmath", "colon_fence"]

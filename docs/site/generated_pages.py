@@ -70,7 +70,7 @@ def _first(command: Any) -> str:
 
 
 def _command_text(name: str, command: Any, level: int) -> str:
-    lines = [f"{'#' * level} `cdtool {name}`\n"]
+    lines = [f"{'#' * level} cdtool {name}\n"]
     for paragraph in (command.help or "").strip().split("\n\n"):
         example = re.fullmatch(r"Example: (.*)", " ".join(paragraph.split()))
         lines.append(f"```text\n{example[1]}\n```\n" if example else paragraph.strip() + "\n")
@@ -80,7 +80,7 @@ def _command_text(name: str, command: Any, level: int) -> str:
         rows = [[f"`{item.metavar or item.name.upper()}`", _cell(item.help or "")] for item in arguments]
         lines.append(_table(["argument", "meaning"], rows))
     if options:
-        lines.append(_table(["option", "value", "default", "meaning"], [_option(item) for item in options]))
+        lines.append(_table(["option", "meaning"], [_option(item) for item in options]))
     if name in STATUSES_OF:
         lines.append(f"Exit statuses: {', '.join(str(int(status)) for status in sorted(STATUSES_OF[name]))}"
                      " ([what they mean](index.md#exit-statuses)).\n")  # fmt: skip
@@ -90,10 +90,15 @@ def _command_text(name: str, command: Any, level: int) -> str:
 def _option(item: Any) -> list[str]:
     names = ", ".join(f"`{text}`" for text in (*item.opts, *item.secondary_opts))
     value = "" if item.is_flag else item.metavar or _value(item)
-    default = "" if item.default in (None, False, ()) or callable(item.default) else f"`{item.default}`"
-    repeated = " Repeatable." if item.multiple and "epeat" not in (item.help or "") else ""
-    required = " Required." if item.required else ""
-    return [names, _cell(value), default, _cell((item.help or "") + repeated + required)]
+    text = item.help or ""
+    if item.default not in (None, False, (), "") and not callable(item.default) and "efault" not in text:
+        default = getattr(item.default, "value", item.default)
+        text += f" Default: `{default}`."
+    if item.multiple and "epeat" not in text:
+        text += " Repeatable."
+    if item.required:
+        text += " Required."
+    return [_cell(f"{names} {value}"), _cell(text)]
 
 
 def _value(item: Any) -> str:
@@ -118,19 +123,17 @@ def _python_pages() -> dict[str, str]:
     for name, place in functions.items():
         module, _, attribute = place.partition(":")
         function = getattr(import_module(module), attribute)
-        rows.append([f"[`cdtool.{name}`](functions.md)", _summary(function)])
+        rows.append([f"[`cdtool.{name}`](functions.md#cdtool{name})", _summary(function)])
         # The names of other annotations are imported for type checkers only.
         result = getattr(import_module(function.__module__), str(function.__annotations__.get("return")), None)
         if inspect.isclass(result) and is_dataclass(result):
             returned.setdefault(f"{result.__module__}.{result.__qualname__}", result)
     text = "# Functions of cdtool\n\n"
-    for name, place in functions.items():
-        module, _, attribute = place.partition(":")
-        text += f"## `cdtool.{name}`\n\n" + _directive("autofunction", f"{module}.{attribute}")
+    text += "".join(f"## cdtool.{name}\n\n" + _directive("autofunction", f"cdtool.{name}") for name in functions)
     pages["reference/python/functions"] = text
     text = "# What the functions return\n\n"
     for place, result in returned.items():
-        text += f"## `{result.__qualname__}`\n\n" + _directive("autoclass", place, members=True)
+        text += f"## {result.__qualname__}\n\n" + _directive("autoclass", place, members=True)
     pages["reference/python/results"] = text
     for title, registry, page in (
         ("Detectors", DETECTORS, "detectors"),
@@ -138,15 +141,15 @@ def _python_pages() -> dict[str, str]:
         ("Machines", MACHINES, "machines"),
     ):
         text = f"# {title}\n\n"
-        for name in registry.names(plugins=False) if "plugins" in inspect.signature(registry.names).parameters else registry.names():
+        for name in registry.names(plugins=False):
             item = registry.load(name)
-            text += f"## `{item.__name__}`\n\n" + _directive("autoclass", f"{item.__module__}.{item.__qualname__}", members=True)
+            text += f"## {item.__name__}\n\n" + _directive("autoclass", f"{item.__module__}.{item.__qualname__}", members=True)
         pages[f"reference/python/{page}"] = text
     values = ["cdtool.recording.Series", "cdtool.recording.Recording", "cdtool.detection.Signal", "cdtool.detection.Band",
               "cdtool.detection.Verdict", "cdtool.detection.Alarm"]  # fmt: skip
     text = "# Values\n\nWhat travels between the functions: recordings, signals, bands, verdicts.\n\n"
     for place in (place for place in values if place not in returned):
-        text += f"## `{place.rpartition('.')[2]}`\n\n" + _directive("autoclass", place, members=True)
+        text += f"## {place.rpartition('.')[2]}\n\n" + _directive("autoclass", place, members=True)
     pages["reference/python/values"] = text
     more = [["[Results](results.md)", "what the functions return"], ["[Values](values.md)", "recordings, signals, bands, verdicts"],
             ["[Detectors](detectors.md)", "the detectors as classes, with their gains"],
