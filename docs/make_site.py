@@ -83,7 +83,9 @@ def add_navigation(target: Path, navigation: Mapping[str, Any]) -> None:
         with page.open("a", encoding="utf-8") as file:
             file.write("\n" + _toctree(inside, ""))
     front = (SITE / "front_page.txt").read_text(encoding="utf-8")
-    (target / "index.md").write_text(front + _toctree([f"docs/{item['name']}" for item in sections], ""), encoding="utf-8")
+    (target / "index.md").write_text(
+        front + _toctree([f"docs/{item['name']}" for item in sections], ""), encoding="utf-8"
+    )
 
 
 def _gathered(target: Path, patterns: Iterable[str], given: Sequence[str]) -> list[str]:
@@ -152,7 +154,12 @@ def _with_links(page: Path, target: Path) -> str:
             return match[0]
         file = (page.parent / place).resolve()
         inside = file.is_relative_to(target.resolve())
-        if inside and (file.suffix in (".md", ".png", ".svg") or file.name == "results.schema.json") and file.exists() and file != target.resolve() / "README.md":
+        if (
+            inside
+            and (file.suffix in (".md", ".png", ".svg") or file.name == "results.schema.json")
+            and file.exists()
+            and file != target.resolve() / "README.md"
+        ):
             return match[0]
         relative = file.relative_to(target.resolve()).as_posix() if inside else ""
         if relative == "README.md":

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 project = "cdtool"
 author = "The cdtool authors"
-copyright = "the cdtool authors, Apache-2.0"  # noqa: A001
+copyright = "the cdtool authors, Apache-2.0"
 version = release = os.environ.get("CDTOOL_DOCS_VERSION", "main")
 root_doc = "index"
 language = "en"

@@ -7,10 +7,12 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
+from enum import EnumType
 from importlib import import_module
 from pathlib import Path
-from enum import EnumType
 from typing import Any, get_args, get_origin
+
+from typer.main import get_command
 
 from cdtool import _API
 from cdtool.cli.app import COMMANDS, app
@@ -18,12 +20,15 @@ from cdtool.detectors import DETECTORS
 from cdtool.exit_status import STATUSES, STATUSES_OF
 from cdtool.machines import MACHINES
 from cdtool.thresholds import THRESHOLDS
-from typer.main import get_command
 
 
 def generated_pages(schema: Path) -> dict[str, str]:
     """Return the text of each generated page by its name below docs/, without a suffix."""
-    return {**_cli_pages(), **_python_pages(), "reference/results": _results_page(json.loads(schema.read_text("utf-8")))}
+    return {
+        **_cli_pages(),
+        **_python_pages(),
+        "reference/results": _results_page(json.loads(schema.read_text("utf-8"))),
+    }
 
 
 def _cell(text: str) -> str:
@@ -143,7 +148,9 @@ def _python_pages() -> dict[str, str]:
         text = f"# {title}\n\n"
         for name in registry.names(plugins=False):
             item = registry.load(name)
-            text += f"## {item.__name__}\n\n" + _directive("autoclass", f"{item.__module__}.{item.__qualname__}", members=True)
+            text += f"## {item.__name__}\n\n" + _directive(
+                "autoclass", f"{item.__module__}.{item.__qualname__}", members=True
+            )
         pages[f"reference/python/{page}"] = text
     values = ["cdtool.recording.Series", "cdtool.recording.Recording", "cdtool.detection.Signal", "cdtool.detection.Band",
               "cdtool.detection.Verdict", "cdtool.detection.Alarm"]  # fmt: skip
@@ -185,7 +192,11 @@ def _results_page(schema: Mapping[str, Any]) -> str:
         _fields(schema),
     ]
     for name, part in schema["$defs"].items():
-        lines += [f"## {name}\n", *([_sentence(part["description"]) + "\n"] if part.get("description") else []), _fields(part)]
+        lines += [
+            f"## {name}\n",
+            *([_sentence(part["description"]) + "\n"] if part.get("description") else []),
+            _fields(part),
+        ]
     return "\n".join(lines)
 
 
@@ -218,4 +229,3 @@ def _type(item: Mapping[str, Any]) -> str:
     if kind == "object" and isinstance(item.get("additionalProperties"), Mapping) and item["additionalProperties"]:
         return f"object of {_type(item['additionalProperties'])}"
     return " or ".join(kind) if isinstance(kind, list) else str(kind)
-

@@ -26,7 +26,7 @@ from cdtool.simulation.arm_model import Impact, simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters, Trial
 from cdtool.simulation.arm_recordings import as_recording
 from cdtool.tables import Table
-from tests.data_folder import DATA, UR10E_LOGS
+from tests.data_folder import UR10E_LOGS
 from tests.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
 from tests.robot_model.test_chain import planar_arm
 from tests.synthetic.robot_motion import robot_recording
