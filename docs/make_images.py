@@ -1,6 +1,6 @@
 """Make the images of the docs: python docs/make_images.py
 
-From sample_logs, and from the other real recordings where CDTOOL_DATA (or ../shared/data) contains them; what is skipped is
+From sample_logs, and the other real recordings if CDTOOL_DATA (or ../shared/data) contains them; what is skipped is
 said. An image above 200 kB is an error.
 """
 

@@ -1,17 +1,16 @@
-"""Build the documentation site: copy the pages, add the generated ones, run Sphinx with warnings as errors, check links.
+"""Build the documentation site: copy the pages, add the generated ones, run Sphinx strictly, check the links.
 
     pip install '.[docs]'
     python docs/make_site.py                       # into build/site; open build/site/index.html
     python docs/make_site.py --version 0.1 --switcher ../switcher.json -o site/0.1
 
-`docs/site/navigation.toml` is the navigation. A page that it does not name fails the build, and so does every broken link
-or anchor, inside of the pages and in the HTML files.
+`docs/site/navigation.toml` is the navigation. A page that it does not name fails the build, and so does every warning,
+every broken link or anchor, and every file that a page would load from another host.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import runpy
@@ -185,15 +184,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Build the documentation site.")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "build" / "site")
     parser.add_argument("--version", default="main", help="the version that the site states")
-    parser.add_argument("--switcher", default="", help="URL of the list of versions; default: this version alone")
+    parser.add_argument("--switcher", default="", help="where the list of versions will be, from the site's root")
     parser.add_argument("--external", action="store_true", help="check the links to other sites instead")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "source"
         source.mkdir()
         stage(source)
-        own = [{"name": given.version, "version": given.version, "url": "."}]
-        (source / "_static" / "switcher.json").write_text(json.dumps(own), encoding="utf-8")
         environment = {"CDTOOL_DOCS_VERSION": given.version}
         if given.switcher:
             environment["CDTOOL_DOCS_SWITCHER"] = given.switcher

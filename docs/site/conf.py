@@ -51,13 +51,7 @@ html_show_sourcelink = False
 html_theme_options: dict[str, Any] = {
     "logo": {"text": "cdtool"},
     "header_links_before_dropdown": 5,
-    "navbar_end": ["version-switcher", "theme-switcher"],
-    "switcher": {
-        # Beside the folders of all versions; a build that is opened on its own has only itself.
-        "json_url": os.environ.get("CDTOOL_DOCS_SWITCHER", "_static/switcher.json"),
-        "version_match": version,
-    },
-    "check_switcher": False,
+    "navbar_end": ["theme-switcher"],
     "show_toc_level": 2,
     "show_nav_level": 2,
     "navigation_with_keys": True,
@@ -68,6 +62,10 @@ html_theme_options: dict[str, Any] = {
     "pygments_dark_style": "monokai",
     "back_to_top_button": True,
 }
+if switcher := os.environ.get("CDTOOL_DOCS_SWITCHER"):  # the list of versions, beside their folders
+    html_theme_options["navbar_end"].insert(0, "version-switcher")
+    html_theme_options["switcher"] = {"json_url": switcher, "version_match": version}
+    html_theme_options["check_switcher"] = False
 html_sidebars = {"index": [], "docs/tasks": [], "docs/concepts": [], "docs/reference": [], "docs/gallery": []}
 
 

@@ -122,6 +122,16 @@ def _value(item: Any) -> str:
 # --- Python
 
 
+_VALUES = (
+    "cdtool.recording.Series",
+    "cdtool.recording.Recording",
+    "cdtool.detection.Signal",
+    "cdtool.detection.Band",
+    "cdtool.detection.Verdict",
+    "cdtool.detection.Alarm",
+)
+
+
 def _python_pages() -> dict[str, str]:
     functions = {name: place for name, place in _API.items() if not name.startswith("__")}
     pages, rows, returned = {}, [], dict[str, Any]()
@@ -136,31 +146,21 @@ def _python_pages() -> dict[str, str]:
     text = "# Functions of cdtool\n\n"
     text += "".join(f"## cdtool.{name}\n\n" + _directive("autofunction", f"cdtool.{name}") for name in functions)
     pages["reference/python/functions"] = text
-    text = "# What the functions return\n\n"
-    for place, result in returned.items():
-        text += f"## {result.__qualname__}\n\n" + _directive("autoclass", place, members=True)
-    pages["reference/python/results"] = text
-    for title, registry, page in (
-        ("Detectors", DETECTORS, "detectors"),
-        ("Thresholds", THRESHOLDS, "thresholds"),
-        ("Machines", MACHINES, "machines"),
-    ):
-        text = f"# {title}\n\n"
-        for name in registry.names(plugins=False):
-            item = registry.load(name)
-            text += f"## {item.__name__}\n\n" + _directive(
-                "autoclass", f"{item.__module__}.{item.__qualname__}", members=True
-            )
-        pages[f"reference/python/{page}"] = text
-    values = ["cdtool.recording.Series", "cdtool.recording.Recording", "cdtool.detection.Signal", "cdtool.detection.Band",
-              "cdtool.detection.Verdict", "cdtool.detection.Alarm"]  # fmt: skip
-    text = "# Values\n\nWhat travels between the functions: recordings, signals, bands, verdicts.\n\n"
-    for place in (place for place in values if place not in returned):
-        text += f"## {place.rpartition('.')[2]}\n\n" + _directive("autoclass", place, members=True)
-    pages["reference/python/values"] = text
-    more = [["[Results](results.md)", "what the functions return"], ["[Values](values.md)", "recordings, signals, bands, verdicts"],
-            ["[Detectors](detectors.md)", "the detectors as classes, with their gains"],
-            ["[Thresholds](thresholds.md)", "the thresholds as classes"], ["[Machines](machines.md)", "the models of machines"]]  # fmt: skip
+    pages["reference/python/results"] = "# What the functions return\n\n" + "".join(map(_class_text, returned))
+    for title, registry in (("Detectors", DETECTORS), ("Thresholds", THRESHOLDS), ("Machines", MACHINES)):
+        classes = [registry.load(name) for name in registry.names(plugins=False)]
+        places = [f"{item.__module__}.{item.__qualname__}" for item in classes]
+        pages[f"reference/python/{title.lower()}"] = f"# {title}\n\n" + "".join(map(_class_text, places))
+    about = "What travels between the functions: recordings, signals, bands, verdicts."
+    texts = (_class_text(place) for place in _VALUES if place not in returned)
+    pages["reference/python/values"] = f"# Values\n\n{about}\n\n" + "".join(texts)
+    more = [
+        ["[Results](results.md)", "what the functions return"],
+        ["[Values](values.md)", "recordings, signals, bands, verdicts"],
+        ["[Detectors](detectors.md)", "the detectors as classes, with their gains"],
+        ["[Thresholds](thresholds.md)", "the thresholds as classes"],
+        ["[Machines](machines.md)", "the models of machines"],
+    ]
     pages["reference/python/index"] = (
         "# Python reference\n\nGenerated from the docstrings, whose examples are run as tests. "
         "[Python](../../python.md) is the introduction.\n\n"
@@ -168,6 +168,10 @@ def _python_pages() -> dict[str, str]:
         + _table(["page", "contents"], more)
     )
     return pages
+
+
+def _class_text(place: str) -> str:
+    return f"## {place.rpartition('.')[2]}\n\n" + _directive("autoclass", place, members=True)
 
 
 def _summary(item: Any) -> str:
@@ -209,10 +213,10 @@ def _fields(part: Mapping[str, Any]) -> str:
         return f"Type: {_type(part)}.\n"
     required = set(part.get("required", ()))
     rows = [
-        [f"`{name}`", _type(item), "yes" if name in required else "no", _cell(item.get("description", ""))]
+        [f"`{name}`", _cell(item.get("description", "")), _type(item), "yes" if name in required else "no"]
         for name, item in part["properties"].items()
     ]
-    return _table(["field", "type", "always there", "meaning"], rows)
+    return _table(["field", "meaning", "type", "always there"], rows)
 
 
 def _type(item: Mapping[str, Any]) -> str:

@@ -94,10 +94,10 @@ def test_the_newest_release_is_the_front_page_of_all_versions(tmp_path):
     for name in ("main", "0.9", "0.10"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "index.html").write_text("", encoding="utf-8")
-    assert write_versions(tmp_path) == ["0.10", "0.9", "main"]
+    assert write_versions(tmp_path, "/cdtool/") == ["0.10", "0.9", "main"]
     assert "url=0.10/index.html" in (tmp_path / "index.html").read_text(encoding="utf-8")
     rows = json.loads((tmp_path / "switcher.json").read_text(encoding="utf-8"))
-    assert [(row["version"], row["url"]) for row in rows][0] == ("0.10", "../0.10/")
+    assert (rows[0]["version"], rows[0]["url"]) == ("0.10", "/cdtool/0.10/")
 
 
 def test_equations_are_written_as_github_and_the_site_render_them():
