@@ -27,7 +27,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 SITE = DOCS / "site"
-# Pages outside docs/ that belong to the site, and what pages link to that is no page.
+# Files outside docs/ that pages link to; the Markdown files among them are pages of the site.
 OUTSIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "README.md")
 SAMPLES = ROOT / "sample_logs"
 REPOSITORY = "https://github.com/cdtool/cdtool/blob/main/"
