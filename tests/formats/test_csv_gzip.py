@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import zlib
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +26,7 @@ ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
 
 
+@cache
 def table(rows: int, header: str = "t;i_motor;x\n", encoding: str = "utf-8", line_end: str = "\n") -> bytes:
     """Return a table with a comma as decimal mark, of more than one block from 40,000 rows on."""
     random = np.random.default_rng(4).normal(size=(rows, 2))
