@@ -30,11 +30,13 @@ SITE = DOCS / "site"
 # Files outside docs/ that pages link to; the Markdown files among them are pages of the site.
 OUTSIDE = ("CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "README.md")
 SAMPLES = ROOT / "sample_logs"
-REPOSITORY = "https://github.com/cdtool/cdtool/blob/main/"
 
 
-def stage(target: Path) -> None:
-    """Copy the pages to a new folder, in which Sphinx reads them, with the generated pages and the navigation."""
+def stage(target: Path, source_url: str) -> None:
+    """Copy the pages to a new folder, in which Sphinx reads them, with the generated pages and the navigation.
+
+    `source_url` is where the repository's files are shown, for links to files that are not pages; empty if unknown.
+    """
     shutil.copytree(DOCS, target / "docs", ignore=shutil.ignore_patterns("*.py", "site", "__pycache__", "wording.html"))
     for name in OUTSIDE:
         shutil.copy(ROOT / name, target / name)
@@ -57,7 +59,7 @@ def stage(target: Path) -> None:
         add_navigation(target, tomllib.load(file))
     (target / "README.md").unlink()  # the front page takes its place
     for page in target.rglob("*.md"):
-        page.write_text(_with_links(page, target), encoding="utf-8")
+        page.write_text(_with_links(page, target, source_url), encoding="utf-8")
 
 
 def add_navigation(target: Path, navigation: Mapping[str, Any]) -> None:
@@ -144,8 +146,8 @@ def _pictures(target: Path) -> str:
     return "\n".join(text)
 
 
-def _with_links(page: Path, target: Path) -> str:
-    """Return a page whose links to files that are no part of the site lead to the repository."""
+def _with_links(page: Path, target: Path, source_url: str) -> str:
+    """Return a page whose links to files that are not part of the site lead to the repository, or are text."""
 
     def linked(match: re.Match[str]) -> str:
         text, place, anchor = match["text"], match["place"], match["anchor"] or ""
@@ -164,7 +166,7 @@ def _with_links(page: Path, target: Path) -> str:
         if relative == "README.md":
             return f"{text}({os.path.relpath(target / 'index.md', page.parent)})"
         assert inside and (ROOT / relative).exists(), f"{page.relative_to(target)}: {place} does not exist"
-        return f"{text}({REPOSITORY}{relative}{anchor})"
+        return f"{text}({source_url}{relative}{anchor})" if source_url else text[1:-1]
 
     parts = re.split(r"(^```.*?^```$)", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     links = re.compile(r"(?P<text>!?\[[^\]]*\])\((?P<place>[^)\s#]*)(?P<anchor>#[^)\s]*)?\)")
@@ -185,12 +187,13 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "build" / "site")
     parser.add_argument("--version", default="main", help="the version that the site states")
     parser.add_argument("--switcher", default="", help="where the list of versions will be, from the site's root")
+    parser.add_argument("--source-url", default="", help="where files of the repository are shown; default: no links")
     parser.add_argument("--external", action="store_true", help="check the links to other sites instead")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "source"
         source.mkdir()
-        stage(source)
+        stage(source, given.source_url)
         environment = {"CDTOOL_DOCS_VERSION": given.version}
         if given.switcher:
             environment["CDTOOL_DOCS_SWITCHER"] = given.switcher
