@@ -225,3 +225,13 @@ def test_a_small_log_is_unpacked_at_once_and_a_long_one_is_not(tmp_path):
     assert read_small(small) == table(200)
     _, long = written(tmp_path, table(60_000), "b.csv")
     assert long.stat().st_size < 2 * BLOCK_BYTES and read_small(long) is None
+
+
+def test_a_compressed_log_at_a_url_is_read(tmp_path):
+    fsspec = pytest.importorskip("fsspec")
+    content = (GATE / "stiff" / "03.csv").read_bytes()
+    fsspec.filesystem("memory").pipe("/packed/03.csv.gz", gzip.compress(content))
+    remote = cdtool.read("memory://packed/03.csv.gz", GATE / "machine.toml")
+    local = cdtool.read(GATE / "stiff" / "03.csv", GATE / "machine.toml")
+    assert remote.name == "03"
+    assert remote["torque"].values.tobytes() == local["torque"].values.tobytes()
