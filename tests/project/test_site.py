@@ -48,6 +48,16 @@ def test_the_navigation_names_every_page_once_and_only_pages_that_exist(navigati
     assert not missing, f"add to docs/site/navigation.toml: {sorted(page.name for page in missing)}"
 
 
+def test_the_front_page_begins_as_the_readme():
+    front, readme = (file.read_text(encoding="utf-8") for file in (SITE / "front_page.txt", ROOT / "README.md"))
+    (line,) = re.findall(r"^python3 -m venv .*$", front, re.MULTILINE)
+    assert line in readme
+    (question,) = re.findall(r"^\*\*.*\?\*\*$", front, re.MULTILINE)
+    assert question in readme
+    for page in re.findall(r":link: (\S+)", front):
+        assert (ROOT / f"{page}.md").is_file(), page
+
+
 def test_every_command_and_option_is_on_its_page(pages):
     from typer.main import get_command
 
