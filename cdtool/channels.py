@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from cdtool.errors import ConfigurationError, nearest
+from cdtool.log_names import log_stem
 from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
 from cdtool.short_repr import short_repr
 from cdtool.tables import Table
@@ -60,7 +61,7 @@ class OwnFile:
     def path_for(self, log: Path) -> Path:
         """Return the file that belongs to a log."""
         own = log if log.name else log.resolve()  # "." has no name; a link has its own
-        texts = {"{stem}": own.stem, "{name}": own.name, "{folder}": own.absolute().parent.name}
+        texts = {"{stem}": log_stem(own), "{name}": own.name, "{folder}": own.absolute().parent.name}
         return own.parent / _PLACEHOLDER.sub(lambda match: texts[match[0]], self.pattern)
 
 

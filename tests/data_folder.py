@@ -1,4 +1,4 @@
-"""Location of the real recordings, and the marker of tests that need one."""
+"""Location of the real recordings, and the marker of tests that need one that is not part of the project."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import pytest
 
 _GIVEN = Path(os.environ.get("CDTOOL_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 DATA: Path | None = _GIVEN if _GIVEN.is_dir() else None
+
+# A real arm, whose recordings every checkout has.
+UR10E_LOGS = Path(__file__).resolve().parents[1] / "sample_logs" / "ur10e"
 
 
 def is_present(name: str) -> bool:

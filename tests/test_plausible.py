@@ -21,7 +21,7 @@ from cdtool.recording import MEASURED, Series
 from cdtool.signature_store import read_signature
 from cdtool.workflows.information import info
 from tests.command import cdtool
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS
 
 LOGS = Path(__file__).parents[1] / "sample_logs"
 FOLDERS = (LOGS / "gate", LOGS / "arm" / "trial_1", LOGS / "arm" / "trial_2")
@@ -242,19 +242,14 @@ def test_ranges_survive_json_and_refuse_invalid_values(runs):
         PlausibleRanges.from_dict(values)
 
 
-@needs_data("ur10e/link4.csv")
-def test_no_sample_of_real_contacts_of_a_robot_is_masked(tmp_path):
-    import runpy
-
-    example = runpy.run_path(str(Path(__file__).parents[1] / "docs" / "examples" / "ur10e_collisions.py"))
-    (tmp_path / "machine.toml").write_text(example["machine_toml"](data("ur10e")), encoding="utf-8")
+def test_no_sample_of_real_contacts_of_a_robot_is_masked():
     try:
-        machine = read_machine_file(tmp_path / "machine.toml")
+        machine = read_machine_file(UR10E_LOGS / "machine.toml")
     except Exception as fault:
         pytest.skip(str(fault))
-    ranges = learned_of([read_as_logged(data("ur10e") / "no_torque.csv", machine)])
+    ranges = learned_of([read_as_logged(UR10E_LOGS / "no_torque.csv.gz", machine)])
     for name in ("no_torque", "link4", "ur-static"):
-        log = read_as_logged(data("ur10e") / f"{name}.csv", machine)
+        log = read_as_logged(UR10E_LOGS / f"{name}.csv.gz", machine)
         assert not any(mask.any() for mask in masked(ranges, log).values()), name
 
 

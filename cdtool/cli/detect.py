@@ -19,6 +19,7 @@ from cdtool.cli.options import ForceOption, JsonOption, figure_name
 from cdtool.cli.place import Place, location
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
 from cdtool.exit_status import Fact
+from cdtool.log_names import log_stem
 
 if TYPE_CHECKING:
     from cdtool.dynamics import Machine
@@ -165,7 +166,7 @@ def _plot_names(plot: Path | None, logs: list[Path], *, runs: bool, force: bool)
         return {logs[0]: figure_name(plot, force=force)}
     if plot.suffix:
         raise UsageError(f"--plot names one file for {len(logs)} logs", "give a folder")
-    names = {log: plot / f"{i:03d}_{log.stem}.png" for i, log in enumerate(logs, 1)}
+    names = {log: plot / f"{i:03d}_{log_stem(log)}.png" for i, log in enumerate(logs, 1)}
     if plot.is_dir():
         names = {log: figure_name(path, force=force) for log, path in names.items()}
     return names

@@ -15,6 +15,7 @@ from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, figure_name
 from cdtool.cli.place import Place, location
+from cdtool.log_names import log_stem
 from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def explain(
     else:
         for _, run in runs:
             _show_explained(run)
-    for path in _draw(explained.runs, drawn, log.stem, force=force):
+    for path in _draw(explained.runs, drawn, log_stem(log), force=force):
         if not as_json:
             typer.echo(f"plot written to {plain(path)}")
     leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))

@@ -28,6 +28,7 @@ from cdtool.findings.clocks import ClocksApart, LowerRate
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
+from cdtool.log_names import log_stem
 from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
 from cdtool.remote.remote_path import RemotePath
@@ -68,7 +69,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
                 )
             series[item.channel] = _torque_from_duty(source.path, item, series, channels.speed_low_pass)
     return Recording(
-        name=source.path.stem,
+        name=log_stem(source.path),
         source=str(source.path),
         joints=channels.joints,
         channels=series,

@@ -17,6 +17,7 @@ from cdtool.file_kinds import kind_of
 from cdtool.findings import Finding
 from cdtool.formats import FORMATS
 from cdtool.formats.column_names import OWN_CLOCK, resolve_columns
+from cdtool.formats.csv.gzipped import MAGIC
 from cdtool.formats.csv.text import read_sample
 from cdtool.formats.pieces import PieceRun, Pieces, join_pieces, read_pieces
 from cdtool.formats.source import Format, Source, in_words
@@ -34,6 +35,7 @@ from cdtool.ingest.parts import (
     missing_part_findings,
     named_parts,
 )
+from cdtool.log_names import log_stem, log_suffix
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.plausible import PlausibleRanges
@@ -61,7 +63,7 @@ _KNOWN_CONTENTS = {
 }
 _NEXT_STEPS = {
     "a ZIP archive or an Excel workbook": "unpack the archive, or save the sheet as CSV",
-    "gzip-compressed": "unpack it first, e.g. with gunzip",
+    "gzip-compressed": "only text tables are read compressed; unpack it first, e.g. with gunzip",
     "zstd-compressed": "unpack it first, e.g. with unzstd",
 }
 # UTF-32 first: its mark begins with that of UTF-16.
@@ -76,7 +78,7 @@ _WIDE = {
 def choose_format(path: Path) -> Format:
     """Return the format of a file, by its suffix if its first bytes agree, else by these; raises RecordingError."""
     head = _read_head(path)
-    suffix = path.suffix.lower()
+    suffix = log_suffix(path).lower()
     if suffix == ".toml" and (kind := kind_of(head)):  # its numbers could be read as a table
         raise RecordingError(f"{path}: is not a recording: it is {kind}", "give a log in its place")
     for name in FORMATS.names():  # one by one: usually the first fits, and the others need not be loaded
@@ -193,7 +195,7 @@ def read_as_logged(
 def _read_log_itself(path: Path, machine_file: MachineFile, unread: Literal["error", "loss"]) -> LoggedRecording:
     """Return one log without the channels in files beside it."""
     if not path.is_dir():
-        return read_parts([path], machine_file, path.stem)
+        return read_parts([path], machine_file, log_stem(path))
     if unread == "loss":
         folder = LogFolder.of(path)
         parts, lost = list(folder.filled), list(folder.findings)
@@ -368,7 +370,7 @@ def _read_head(path: Path) -> bytes:
             head = file.read(512)
     except OSError as fault:
         raise RecordingError(f"{path}: cannot be read: {fault.strerror}", "check the file's permissions") from fault
-    if not head:
+    if not head or (head.startswith(MAGIC) and not read_sample(path, 1)):
         raise RecordingError(f"{path}: is empty", "was the recording stopped at once, or the copy cut off?")
     return head
 

@@ -25,6 +25,7 @@ from cdtool.ingest.channel_assembly import assemble_recording, file_digest
 from cdtool.ingest.parts import join_details, join_digests, join_topics, missing_part_findings, with_file_name
 from cdtool.ingest.reading import log_parts, mapped_source
 from cdtool.ingest.run_segments import Rows, Segments, segments_by_id, segments_by_reset
+from cdtool.log_names import log_stem
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
 from cdtool.operations import RunCut
@@ -290,7 +291,7 @@ class _CutLog:
         mark = hashlib.sha256(f"{digest}{_MARK}{name}".encode()).hexdigest()
         part = replace(part, findings=tuple(absent))
         recording = assemble_recording(part, channels, self.machine_file.machine, mark)
-        recording = replace(recording, name=f"{self.path.stem}{_MARK}{name}")
+        recording = replace(recording, name=f"{log_stem(self.path)}{_MARK}{name}")
         factors = {item.channel: item.factor for item in channels.sources if item.duty is None}
         details = in_words(source.details, source.topics)
         return LoggedRecording(recording, factors, channels.speed_low_pass, source.format, details, source.dialect)

@@ -11,6 +11,7 @@ from cdtool.evaluation.results import Skipped
 from cdtool.files import replaced_folder
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.reading import read_as_logged
+from cdtool.log_names import log_stem
 from cdtool.log_section import LogSection
 from cdtool.remote.remote_path import location
 from cdtool.short_repr import short_repr
@@ -111,7 +112,7 @@ def _copy_learned(setup: BenchmarkFile, section: InjectSection, folder: Path) ->
     for group, logs in groups.items():
         for number, log in enumerate(logs, 1):
             recording = read_as_logged(log, setup.machine_file, unread="loss").recording
-            name = f"{group}/{number:03d}_{log.stem}.{section.file_format}"
+            name = f"{group}/{number:03d}_{log_stem(log)}.{section.file_format}"
             provenance = {
                 "source": log.name,
                 "sha256": file_digest(log),

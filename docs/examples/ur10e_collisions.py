@@ -1,19 +1,18 @@
 """UR10e: limits learned from five seconds without contact, applied to three recordings of the real arm.
 
-    python docs/examples/ur10e_collisions.py FOLDER_OF_UR10E
-    python docs/examples/ur10e_collisions.py FOLDER_OF_UR10E --machine ur10e_machine.toml --factor 4 --block 0.25
+    python docs/examples/ur10e_collisions.py
+    python docs/examples/ur10e_collisions.py --detectors momentum --factor 4 --block 0.25
 
-FOLDER_OF_UR10E holds parameters.json, ur10e.urdf, no_torque.csv, link4.csv and ur-static.csv. The page
-docs/real-recordings.md says what the figures prove and what not. Needs the extra cdtool[urdf].
+The recordings are in sample_logs/ur10e. docs/real-recordings.md states what the results prove and what they do not.
+Needs the extra cdtool[urdf].
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
-import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,17 +29,18 @@ from cdtool.pipeline import Detection, detect_operation, run_detector
 from cdtool.recording import Contact, Recording
 from cdtool.thresholds.limit import Limit
 
+FOLDER = Path(__file__).resolve().parents[2] / "sample_logs" / "ur10e"
 DETECTORS = ("momentum", "kalman_momentum", "velocity", "direct", "energy")
-LEARNED_FROM = "no_torque.csv"
-RECORDINGS = (LEARNED_FROM, "link4.csv", "ur-static.csv")
+LEARNED_FROM = "no_torque.csv.gz"
+RECORDINGS = (LEARNED_FROM, "link4.csv.gz", "ur-static.csv.gz")
 
 # Seconds after the first row: an abrupt stop begins there, and what follows is left out.
-JUDGED_UNTIL = {"no_torque.csv": 5.0, "link4.csv": 16.93, "ur-static.csv": math.inf}
+JUDGED_UNTIL = {"no_torque.csv.gz": 5.0, "link4.csv.gz": 16.93, "ur-static.csv.gz": math.inf}
 # Contacts in seconds after the first row. They come from a momentum observer and the eye: no independent labels.
 WINDOWS = {
-    "no_torque.csv": (),
-    "link4.csv": ((3.46, 4.14), (9.67, 9.96), (16.63, 16.93)),
-    "ur-static.csv": ((3.4, 5.7), (11.8, 15.9), (25.6, 31.0), (38.0, 43.0)),
+    "no_torque.csv.gz": (),
+    "link4.csv.gz": ((3.46, 4.14), (9.67, 9.96), (16.63, 16.93)),
+    "ur-static.csv.gz": ((3.4, 5.7), (11.8, 15.9), (25.6, 31.0), (38.0, 43.0)),
 }
 # The windows open at 12 or 15 N m, a lower limit is crossed sooner; a push ends in a twitch of the arm [s].
 BEFORE, AFTER = 0.25, 0.5
@@ -48,33 +48,12 @@ BEFORE, AFTER = 0.25, 0.5
 # Samples of 10 or 12 ms, so that one sample, the default's 9 ms, would be no debounce at all.
 DEBOUNCE = 3
 
-# All five follow a contact with about 50 ms. The Kalman filter: contact_drift / (sigma_torque sqrt(10 ms)) = 20 rad/s.
-GAINS = """
-[detectors.momentum]
-bandwidth = 20.0        # rad/s
-
-[detectors.kalman_momentum]
-sigma_speed = 0.002     # rad/s
-sigma_torque = 20.0     # N m
-contact_drift = 40.0    # N m per sqrt(s)
-
-[detectors.velocity]
-bandwidth = 20.0        # rad/s
-
-[detectors.direct]
-cutoff = 5.0            # Hz
-
-[detectors.energy]
-bandwidth = 20.0        # rad/s
-minimum_speed = 0.03    # rad/s
-"""
-
 CAVEATS = """\
 The windows are no independent labels: they come from a momentum observer and the eye; no force was measured.
 Friction at rest is not known to the model: up to about the Coulomb value of a joint stays in its residual.
 The limits come from five seconds of one fast motion: they know no rest, no creeping, no other pose and no other day.
-Left out: no_torque.csv from 5.00 s and link4.csv from 16.93 s (abrupt stops), columns 19-24 of link4.csv (not the
-target currents). The steps are 10 or 12 ms, 94 to 96 Hz."""
+Left out: no_torque from 5.00 s and link4 from 16.93 s (abrupt stops), columns 19-24 of link4 (not the target
+currents). The steps are 10 or 12 ms, 94 to 96 Hz."""
 
 
 @dataclass(frozen=True)
@@ -84,31 +63,6 @@ class Judged:
     recording: Recording
     detection: Detection
     matching: Matching
-
-
-def machine_toml(folder: Path) -> str:
-    """The machine file of the arm, from the parameters beside its URDF."""
-    values = json.loads((folder / "parameters.json").read_text(encoding="utf-8"))
-    friction = values["friction"]
-    urdf = (folder / values["urdf"]).resolve().as_posix()
-    return f"""[machine]
-type = "urdf_robot"
-name = "ur10e"
-urdf = "{urdf}"
-joints = {json.dumps(values["joints"])}
-home = [0.0, {-math.pi / 2}, 0.0, {-math.pi / 2}, 0.0, 0.0]   # stretched upward
-drive_inertia = {values["drive_inertia"]["value"]}   # kg m2
-viscous_friction = {friction["viscous"]["value"]}   # N m s/rad
-coulomb_friction = {friction["coulomb"]["value"]}   # N m
-coulomb_slope = {friction["tanh_slope"]["value"]}   # s/rad
-constant_force = {friction["offset"]["value"]}   # N m
-
-[channels]
-time = {{ column = 0, unit = "s" }}
-position = {{ columns = [1, 2, 3, 4, 5, 6], unit = "rad" }}
-speed = {{ columns = [7, 8, 9, 10, 11, 12], unit = "rad/s" }}
-torque = {{ columns = [13, 14, 15, 16, 17, 18], unit = "A", scale = {values["torque_gain"]["value"]} }}
-{GAINS}"""
 
 
 def load(folder: Path, name: str, machine: MachineFile) -> Recording:
@@ -186,14 +140,13 @@ def report(judged: Judged) -> None:
     print(f"    false alarms: {len(matching.false_alarms)} ({false}); without contact at most {closest(judged)}")
 
 
-def run(folder: Path, machine_path: Path, factor: float, block: float) -> dict[str, list[Judged]]:
-    """Write the machine file, learn, judge and print; the judged recordings of each detector."""
-    machine_path.write_text(machine_toml(folder), encoding="utf-8")
-    machine = read_machine_file(machine_path)
+def run(folder: Path, detectors: Sequence[str], factor: float, block: float) -> dict[str, list[Judged]]:
+    """Learn, judge and print; return the judged recordings of each detector."""
+    machine = read_machine_file(folder / "machine.toml")
     recordings = {name: load(folder, name, machine) for name in RECORDINGS}
     print(f"limits: mean of the extremes of blocks of {block:g} s, {factor:g} standard deviations further out")
     judged: dict[str, list[Judged]] = {}
-    for name in DETECTORS:
+    for name in detectors:
         detector = machine.detector(name)
         limit = learn_limit(recordings[LEARNED_FROM], machine, detector, factor, block)
         judged[name] = [judge(recording, log, machine, detector, limit) for log, recording in recordings.items()]
@@ -205,17 +158,15 @@ def run(folder: Path, machine_path: Path, factor: float, block: float) -> dict[s
 
 
 def main() -> int:
-    """1 where a momentum observer misses a contact."""
+    """Return 1 if a momentum observer misses a contact."""
     parser = argparse.ArgumentParser(description="Limits from five seconds without contact, on a real UR10e.")
-    parser.add_argument("folder", type=Path, help="folder of the recordings, the URDF and parameters.json")
-    parser.add_argument("--machine", type=Path, help="keep the machine file under this name")
+    parser.add_argument("folder", type=Path, nargs="?", default=FOLDER, help="folder of the recordings")
+    parser.add_argument("--detectors", nargs="+", choices=DETECTORS, default=DETECTORS, help="default: all five")
     parser.add_argument("--factor", type=float, default=Limit().safety_factor, help="standard deviations beyond")
     parser.add_argument("--block", type=float, default=0.5, help="length of a block [s]")
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as work:
-        machine_path = given.machine or Path(work) / "machine.toml"
-        judged = run(given.folder, machine_path, given.factor, given.block)
-    observers = [item for name in ("momentum", "kalman_momentum") for item in judged[name]]
+    judged = run(given.folder, given.detectors, given.factor, given.block)
+    observers = [item for name in ("momentum", "kalman_momentum") for item in judged.get(name, [])]
     return int(any(found.outcome != "detected" for item in observers for found in item.matching.matches))
 
 

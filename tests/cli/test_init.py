@@ -15,7 +15,7 @@ from cdtool.machine_file import read_machine_file
 from cdtool.workflows.information import info
 from cdtool.workflows.init.drafting import init
 from tests.command import cdtool
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS, data, needs_data
 
 LOGS = Path(__file__).parents[2] / "sample_logs"
 
@@ -79,9 +79,8 @@ def test_an_arms_columns_are_grouped_by_joint_and_its_counts_are_scaled_by_its_s
     assert values["channels"]["position"]["scale"] == pytest.approx(right["position"]["scale"], rel=0.02)
 
 
-@needs_data("ur10e/link4.csv")
 def test_columns_without_names_are_recognised_by_their_values(tmp_path):
-    channels = drafted(data("ur10e/link4.csv"), tmp_path)["channels"]
+    channels = drafted(UR10E_LOGS / "link4.csv.gz", tmp_path)["channels"]
     assert channels["position"]["columns"] == [1, 2, 3, 4, 5, 6] and channels["speed"]["columns"] == [
         7,
         8,

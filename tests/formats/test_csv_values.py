@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cdtool.errors import UsageError
 from cdtool.findings.tables import NotNumeric
 from cdtool.formats.csv import Csv, write_csv
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS, data, needs_data
 from tests.noted_times import noted
 
 
@@ -52,12 +52,11 @@ def test_seven_seconds_at_1_khz_are_written_and_read_back(tmp_path):
         np.testing.assert_allclose(source.columns[name].values, values, rtol=0.0, atol=0.5e-6)
 
 
-@needs_data("ur10e")
 @pytest.mark.parametrize(
     ("name", "rows", "width"), [("link4", 1896, 25), ("ur-static", 4259, 31), ("no_torque", 531, 31)]
 )
 def test_the_ur10e_files_without_header_are_read_completely(name, rows, width):
-    path = data("ur10e") / f"{name}.csv"
+    path = UR10E_LOGS / f"{name}.csv.gz"
     source = read(path)
     assert len(source.columns) == width
     table = np.column_stack([column.values for column in source.columns.values()])

@@ -21,7 +21,7 @@ from cdtool.machines.planar_arm import PlanarArm
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recording import BoolArray, FloatArray
 from cdtool.tables import Table
-from tests.data_folder import data
+from tests.data_folder import UR10E_LOGS
 
 FINGERS = {"panda_finger_joint1": 0.0, "panda_finger_joint2": 0.0}
 PANDA_JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
@@ -110,22 +110,22 @@ def planar_arm(**keys: object) -> PlanarArm:
 
 
 # Seconds after the first row, as in docs/examples/ur10e_collisions.py: where an abrupt stop begins, and contacts.
-UR10E_ENDS = {"no_torque.csv": 5.0, "link4.csv": 16.93, "ur-static.csv": math.inf}
+UR10E_ENDS = {"no_torque.csv.gz": 5.0, "link4.csv.gz": 16.93, "ur-static.csv.gz": math.inf}
 _UR10E_CONTACTS = {
-    "no_torque.csv": (),
-    "link4.csv": ((3.46, 4.14), (9.67, 9.96), (16.63, 16.93)),
-    "ur-static.csv": ((3.4, 5.7), (11.8, 15.9), (25.6, 31.0), (38.0, 43.0)),
+    "no_torque.csv.gz": (),
+    "link4.csv.gz": ((3.46, 4.14), (9.67, 9.96), (16.63, 16.93)),
+    "ur-static.csv.gz": ((3.4, 5.7), (11.8, 15.9), (25.6, 31.0), (38.0, 43.0)),
 }
 _BEFORE, _AFTER = 0.25, 0.5
 
 
 def ur10e(folder: Path) -> MachineFile:
     """The machine with the URDF's inertias, and friction and drive inertias as published with it."""
-    values = json.loads(data("ur10e/parameters.json").read_text(encoding="utf-8"))
+    values = json.loads((UR10E_LOGS / "parameters.json").read_text(encoding="utf-8"))
     friction = values["friction"]
     text = f"""[machine]
 type = "urdf_robot"
-urdf = "{data("ur10e/ur10e.urdf").as_posix()}"
+urdf = "{(UR10E_LOGS / "ur10e.urdf").as_posix()}"
 joints = {json.dumps(values["joints"])}
 drive_inertia = {values["drive_inertia"]["value"]}
 viscous_friction = {friction["viscous"]["value"]}
@@ -146,7 +146,7 @@ torque = {{ columns = [13, 14, 15, 16, 17, 18], unit = "A", scale = {values["tor
 
 def ur10e_run(machine: MachineFile, name: str) -> RobotRun:
     """A recording without its stop; torques near contacts are NaN."""
-    recording = cdtool.read(data(f"ur10e/{name}"), machine)
+    recording = cdtool.read(UR10E_LOGS / f"{name}", machine)
     run = robot_run(recording.between(recording.start, recording.start + UR10E_ENDS[name]))
     time = run.time - recording.start
     near: BoolArray = np.zeros(len(run), dtype=np.bool_)

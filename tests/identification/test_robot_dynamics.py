@@ -20,7 +20,6 @@ from cdtool.identification.robot_regressor import Group, regressor_of
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import FloatArray
-from tests.data_folder import needs_data
 from tests.identification.robot_motion import (
     Motion,
     coloured,
@@ -268,7 +267,7 @@ def test_other_machines_other_joints_and_no_motion_are_refused() -> None:
 def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[CoupledMachine, RobotRun, RobotRun, RobotRun]:
     pytest.importorskip("pinocchio")
     file = ur10e(tmp_path_factory.mktemp("ur10e"))
-    names = ("no_torque.csv", "link4.csv", "ur-static.csv")
+    names = ("no_torque.csv.gz", "link4.csv.gz", "ur-static.csv.gz")
     first, second, third = (ur10e_run(file, name) for name in names)
     machine = file.machine
     assert isinstance(machine, CoupledMachine)
@@ -281,7 +280,6 @@ def moving_error(run: RobotRun, torque: FloatArray, joint: int) -> float:
     return float(np.sqrt(np.nanmean(error**2)))
 
 
-@needs_data("ur10e")
 def test_friction_that_grows_with_gravity_halves_the_error_of_shoulder_and_elbow(arm) -> None:
     machine, learned, other, _ = arm
     plain, load = (identify_robot([learned], machine, RobotParameters(load_friction=item)) for item in (False, True))
@@ -290,7 +288,6 @@ def test_friction_that_grows_with_gravity_halves_the_error_of_shoulder_and_elbow
     assert errors[1] < errors[0]
 
 
-@needs_data("ur10e")
 def test_five_seconds_of_the_ur10e_do_not_determine_its_base_parameters(arm) -> None:
     machine, learned, _, _ = arm
     fit = identify_robot([learned], machine, RobotParameters(inertial=True))
@@ -301,7 +298,6 @@ def test_five_seconds_of_the_ur10e_do_not_determine_its_base_parameters(arm) -> 
     assert found.numbers["condition_number"] > 50.0
 
 
-@needs_data("ur10e")
 def test_a_log_at_rest_identifies_nothing(arm) -> None:
     machine, _, _, static = arm
     with pytest.raises(IdentificationError, match="no joint moves"):

@@ -15,7 +15,6 @@ from cdtool.identification.robot_excitation import (
     plan_robot_motion,
 )
 from cdtool.identification.robot_run import RobotRun
-from tests.data_folder import needs_data
 from tests.identification.robot_motion import Motion, coloured, fourier, planar_arm, ur10e, ur10e_run
 
 ARM = planar_arm(coulomb_slope=50.0)
@@ -95,11 +94,10 @@ def test_the_planned_motion_shows_the_links_of_an_arm_that_the_logged_one_does_n
         assert not base_set_is_missing(motion.run(ARM, 0.05 * coloured(seed, motion.position.shape, 5.0)), ARM)
 
 
-@needs_data("ur10e")
 def test_the_planned_motion_shows_the_links_of_the_ur10e_that_its_recording_does_not(tmp_path) -> None:
     pytest.importorskip("pinocchio")
     file = ur10e(tmp_path)
-    run = ur10e_run(file, "no_torque.csv")
+    run = ur10e_run(file, "no_torque.csv.gz")
     motions = measure_joint_motion([run], file.machine)
     plan = plan_robot_motion(motions, 36)
     assert plan is not None

@@ -14,7 +14,7 @@ from cdtool.identification.updated_urdf import updated_urdf
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_reader import read_urdf
 from cdtool.recording import FloatArray
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS
 from tests.synthetic.robots import JOINTS, six_joint_urdf
 
 pytest.importorskip("pinocchio")
@@ -131,9 +131,8 @@ def test_broken_xml_and_another_robot_are_refused(tmp_path: Path) -> None:
         updated_urdf(FIXED.replace('"swing"', '"other"'), tree)
 
 
-@needs_data("ur10e")
 def test_the_urdf_of_a_real_robot_comes_back(tmp_path: Path) -> None:
-    text = data("ur10e/ur10e.urdf").read_text(encoding="utf-8")
+    text = (UR10E_LOGS / "ur10e.urdf").read_text(encoding="utf-8")
     names = tuple(f"joint{i}" for i in range(1, 7))
     tree = heavier(read(tmp_path, text, names))
     np.testing.assert_allclose(bodies(read(tmp_path, updated_urdf(text, tree), names)), bodies(tree), atol=1e-12)

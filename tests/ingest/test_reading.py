@@ -9,7 +9,7 @@ from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.reading import choose_format, read_parts, read_recording, survey
 from cdtool.machine_file import read_machine_file
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS
 from tests.formats.conftest import TOPICS
 
 ROWS = "t,i_motor,n_motor\n" + "".join(f"{10 * i},{i},{i + 1}\n" for i in range(20))
@@ -130,7 +130,6 @@ def test_parts_with_different_columns_are_refused(log, machine):
         read_parts(parts, machine(), "run").on_load_side(machine().machine)
 
 
-@needs_data("ur10e")
 def test_a_six_joint_arm_logged_without_a_header_is_read_by_column_numbers(machine):
     joints = [f"joint{i}" for i in range(1, 7)]
     found = machine(
@@ -143,7 +142,7 @@ def test_a_six_joint_arm_logged_without_a_header_is_read_by_column_numbers(machi
         """,
         f'[machine]\ntype = "rotary_axis"\nname = "arm"\ncoordinates = "load"\njoints = {joints}\nload_inertia = 1.0\n',
     )
-    recording = read_recording(data("ur10e") / "link4.csv", found)
+    recording = read_recording(UR10E_LOGS / "link4.csv.gz", found)
     assert recording["torque"].values.shape == (1896, 6)
     assert recording.joints == tuple(joints)
     assert recording.duration == pytest.approx(19.72, abs=0.05)

@@ -26,7 +26,7 @@ from cdtool.simulation.arm_model import Impact, simulate_arm_run
 from cdtool.simulation.arm_parameters import ArmParameters, Trial
 from cdtool.simulation.arm_recordings import as_recording
 from cdtool.tables import Table
-from tests.data_folder import DATA, needs_data
+from tests.data_folder import UR10E_LOGS
 from tests.robot_model.arm_as_model import arm_as_model, arm_obstacle, arm_point
 from tests.robot_model.test_chain import planar_arm
 from tests.synthetic.robot_motion import robot_recording
@@ -258,14 +258,12 @@ def test_a_log_that_begins_in_motion_is_followed_from_its_first_sample(robot: Ur
 UR10E = ("joint1", "joint2", "joint3", "joint4", "joint5", "joint6")
 
 
-@needs_data("ur10e")
 def test_a_point_that_was_beyond_the_obstacle_before_meets_it_at_the_contact_only() -> None:
     """A real motion in which the tool crosses every plane several times, without a rest between."""
-    assert DATA is not None
     keys = {"urdf": "ur10e.urdf", "joints": list(UR10E), "drive_inertia": [0.0, 3.7434, 0.0, 0.0708, 0.2342, 0.4365]}
     keys |= {"viscous_friction": 10.0, "coulomb_friction": 5.0, "coulomb_slope": 50.0}
-    machine = UrdfRobot.from_table(Table(keys, str(DATA / "ur10e" / "machine.toml"), "machine."))
-    table = np.loadtxt(DATA / "ur10e" / "no_torque.csv", delimiter=",", usecols=range(19))
+    machine = UrdfRobot.from_table(Table(keys, str(UR10E_LOGS / "machine.toml"), "machine."))
+    table = np.loadtxt(UR10E_LOGS / "no_torque.csv.gz", delimiter=",", usecols=range(19))
     series = {
         name: Series(table[:, 0] - table[0, 0], table[:, first : first + 6], machine.load_units[name])
         for name, first in (("position", 1), ("speed", 7), ("torque", 13))

@@ -11,7 +11,7 @@ import pytest
 
 from cdtool.errors import ConfigurationError
 from cdtool.machines.urdf_reader import read_urdf
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS
 
 needs_pinocchio = pytest.mark.skipif(find_spec("pinocchio") is None, reason="pinocchio is not installed (cdtool[urdf])")
 
@@ -140,9 +140,8 @@ def test_a_joint_without_an_axis_moves_about_x(tmp_path):
 
 
 @needs_pinocchio
-@needs_data("ur10e")
 def test_an_arm_with_identified_and_slightly_unphysical_inertias_is_as_in_pinocchio():
-    assert_as_in_pinocchio(data("ur10e/ur10e.urdf"), [f"joint{k}" for k in (1, 2, 3, 4, 5, 6)])
+    assert_as_in_pinocchio(UR10E_LOGS / "ur10e.urdf", [f"joint{k}" for k in (1, 2, 3, 4, 5, 6)])
 
 
 def robots() -> Path:

@@ -27,7 +27,7 @@ from cdtool.recording import CHANNELS
 from cdtool.units import UNITS
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from tests.command import Outcome, cdtool
-from tests.data_folder import DATA, needs_data
+from tests.data_folder import DATA, UR10E_LOGS, needs_data
 from tests.project.pages import (
     DOCS,
     FENCE,
@@ -60,6 +60,7 @@ COMMANDS = {
     "docs/containers.md": 2,
     "docs/init.md": 2,
     "docs/first-log.md": 6,
+    "docs/ur10e-tutorial.md": 6,
 }
 EXAMPLES = {
     "docs/python.md": 13,
@@ -222,17 +223,27 @@ def the_thesis_rule_alarms_in_every_impact_free_run() -> None:
         assert [item["verdict"] for item in found] == ["alarm"] * 40, detector
 
 
+def the_alarms_of_the_tutorial_are_as_stated() -> None:
+    text = (DOCS / "ur10e-tutorial.md").read_text(encoding="utf-8")
+    limits = ("-d", "gm", "--limit", "31.8,29.2,11.3,3.2,2.6,2.9", "--debounce", "3", "--json")
+    log = UR10E_LOGS / "link4.csv.gz"
+    (found,) = json.loads(cdtool("detect", log, "-m", UR10E_LOGS / "machine.toml", *limits).out)
+    stated = re.findall(r"^\| ([\d.]+) s \| joint (\d) \| ([\d.]+) \|", text, re.MULTILINE)
+    rows = [(f"{a['time_s']:.3f}", a["joint"].removeprefix("joint"), a["time_s"] - 3262.867) for a in found["alarms"]]
+    assert [(time, joint, f"{late:.2f}") for time, joint, late in rows] == stated
+
+
 def the_alarms_in_the_real_recordings_are_as_stated() -> None:
     assert DATA is not None
     text = (DOCS / "real-recordings.md").read_text(encoding="utf-8")
     limits = ("-d", "pt", "--limit", "33,inf,53,inf,inf,inf", "--debounce", "2")
     limits = ("-m", "docs/examples/ur10e.toml", *limits, "--json")
-    link4 = json.loads(cdtool("detect", DATA / "ur10e" / "link4.csv", *limits).out)
+    link4 = json.loads(cdtool("detect", UR10E_LOGS / "link4.csv.gz", *limits).out)
     times = [f"{alarm['time_s'] - 3262.867:.3f}" for alarm in link4[0]["alarms"]]
     assert times == ["3.576", "4.208", "9.702", "9.712", "16.628", "16.958"]
     assert all(time in text for time in times)
-    free = json.loads(cdtool("detect", DATA / "ur10e" / "no_torque.csv", *limits).out)
-    static = json.loads(cdtool("detect", DATA / "ur10e" / "ur-static.csv", *limits).out)
+    free = json.loads(cdtool("detect", UR10E_LOGS / "no_torque.csv.gz", *limits).out)
+    static = json.loads(cdtool("detect", UR10E_LOGS / "ur-static.csv.gz", *limits).out)
     assert (len(free[0]["alarms"]), len(static[0]["alarms"])) == (2, 0)
     emps = ("-m", "docs/examples/emps.toml", "--operations", "motion", "--json")
     learned, limit = {1, 2}, {0}
@@ -272,11 +283,12 @@ CLAIMS: dict[str, Callable[[], None]] = {
     "docs/benchmark-file.md": the_results_file_has_the_fields_of_the_page,
     "docs/choosing.md": choosing_says_what_the_runs_gave,
     "docs/signature.md": the_thesis_rule_alarms_in_every_impact_free_run,
+    "docs/ur10e-tutorial.md": the_alarms_of_the_tutorial_are_as_stated,
     "docs/real-recordings.md": the_alarms_in_the_real_recordings_are_as_stated,
 }
 
 
-RECORDINGS = ("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat", "ur10e/link4.csv")
+RECORDINGS = ("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat")
 
 
 def page_with_its_recordings(page: Path) -> object:

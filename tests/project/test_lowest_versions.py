@@ -30,7 +30,7 @@ def test_every_dependency_is_pinned_to_its_lower_bound():
 
 
 def test_extras_and_the_extras_that_they_name_are_pinned_too():
-    others = ("all", "test", "dev", "benchmarks", "s3test", "release")
+    others = ("all", "test", "dev", "benchmarks", "docs", "s3test", "release")
     named = [name for name in PROJECT["optional-dependencies"] if name not in others]
     of_extras = {distribution(text) for name in named for text in PROJECT["optional-dependencies"][name]}
     assert set(pins("all")) == {distribution(text) for text in PROJECT["dependencies"]} | of_extras

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from cdtool.pipeline import detect_operation
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.signature.fitting import fit_operations
 from tests.command import cdtool as run
-from tests.data_folder import DATA, needs_data
+from tests.data_folder import DATA, UR10E_LOGS, needs_data
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 CONTACTS = ((3.46, 4.14), (9.67, 9.96), (16.63, 17.08))
@@ -77,12 +78,11 @@ def test_four_strokes_per_direction_require_force(tmp_path):
     assert done.status == 0 and done.err.count("fewer than 10") == 2
 
 
-@needs_data("ur10e/link4.csv")
 def test_the_contacts_of_the_arm_are_found_in_the_torques_of_two_joints():
-    log = DATA / "ur10e" / "link4.csv"
+    log = UR10E_LOGS / "link4.csv.gz"
     arguments = ("-m", EXAMPLES / "ur10e.toml", "-d", "pt", "--limit", "33,inf,53,inf,inf,inf", "--debounce", 2)
     (values,) = json.loads(run("detect", log, *arguments, "--json").out)
-    first_row = float(log.read_text().split(",", 1)[0])
+    first_row = float(gzip.decompress(log.read_bytes()).split(b",", 1)[0])
     alarms = [(alarm["time_s"] - first_row, alarm["joint"]) for alarm in values["alarms"]]
     for start, end in CONTACTS:
         assert any(start - 0.02 <= time <= end for time, _ in alarms), (start, alarms)
@@ -91,8 +91,7 @@ def test_the_contacts_of_the_arm_are_found_in_the_torques_of_two_joints():
     assert outside == pytest.approx([4.208], abs=0.02)
 
 
-@needs_data("ur10e/link4.csv")
 def test_a_missing_inertia_is_reported_by_the_detector_that_needs_it():
-    log = DATA / "ur10e" / "link4.csv"
+    log = UR10E_LOGS / "link4.csv.gz"
     done = run("detect", log, "-m", EXAMPLES / "ur10e.toml", "-d", "gm", "--limit", "30")
     assert done.status == 2 and "load_inertia" in done.err

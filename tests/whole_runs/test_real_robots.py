@@ -6,6 +6,8 @@ import json
 import math
 import re
 import runpy
+import shutil
+import tomllib
 from importlib.metadata import PackageNotFoundError, files
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +20,7 @@ from cdtool.errors import CdtoolError
 from cdtool.machine_file import read_machine_file
 from cdtool.operations import operations_of
 from cdtool.pipeline import run_detector
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS, data, needs_data
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "ur10e_collisions.py"
 DETECTORS = ("momentum", "kalman_momentum", "velocity", "direct", "energy")
@@ -27,7 +29,6 @@ PANDA = tuple(f"panda_joint{k}" for k in range(1, 8))
 # Length before the abrupt stop and the last contact [s].
 CONTACT_FREE_END = {"no_torque": 5.0, "link4": 16.4, "ur-static": math.inf}
 
-needs_arm = needs_data("ur10e/parameters.json")
 pytestmark = pytest.mark.skipif(find_spec("pinocchio") is None, reason="pinocchio is not installed (cdtool[urdf])")
 
 
@@ -51,14 +52,25 @@ def example():
 
 
 @pytest.fixture(scope="module")
-def arm(example, tmp_path_factory):
-    path = tmp_path_factory.mktemp("arm") / "machine.toml"
-    path.write_text(example["machine_toml"](data("ur10e")), encoding="utf-8")
-    return path
+def arm():
+    return UR10E_LOGS / "machine.toml"
+
+
+def test_the_machine_file_has_the_published_parameters(arm):
+    values = json.loads((UR10E_LOGS / "parameters.json").read_text(encoding="utf-8"))
+    file, friction = tomllib.loads(arm.read_text(encoding="utf-8")), values["friction"]
+    machine = file["machine"]
+    assert (machine["joints"], machine["urdf"]) == (values["joints"], values["urdf"])
+    assert machine["drive_inertia"] == values["drive_inertia"]["value"]
+    assert machine["viscous_friction"] == friction["viscous"]["value"]
+    assert machine["coulomb_friction"] == friction["coulomb"]["value"]
+    assert machine["coulomb_slope"] == friction["tanh_slope"]["value"]
+    assert machine["constant_force"] == friction["offset"]["value"]
+    assert file["channels"]["torque"]["scale"] == values["torque_gain"]["value"]
 
 
 def read(name, machine):
-    return cdtool.read(data("ur10e") / f"{name}.csv", machine)
+    return cdtool.read(UR10E_LOGS / f"{name}.csv.gz", machine)
 
 
 def motion_of(recording):
@@ -74,7 +86,6 @@ def forward_euler_observer(time, net_force, momentum, gain):
     return residual
 
 
-@needs_arm
 @pytest.mark.parametrize("name", ["no_torque", "link4", "ur-static"])
 def test_the_reference_observer_of_the_data_follows_from_the_machines_terms(arm, name):
     import pinocchio as pin
@@ -82,9 +93,9 @@ def test_the_reference_observer_of_the_data_follows_from_the_machines_terms(arm,
     recording = read(name, arm)
     machine = read_machine_file(arm).machine
     position, speed, torque = motion_of(recording)
-    values = json.loads((data("ur10e") / "parameters.json").read_text(encoding="utf-8"))
+    values = json.loads((UR10E_LOGS / "parameters.json").read_text(encoding="utf-8"))
     part = {key: np.array(item["value"]) for key, item in values["friction"].items() if key not in ("formula", "sign")}
-    model = pin.buildModelFromUrdf(str(data("ur10e") / "ur10e.urdf"))
+    model = pin.buildModelFromUrdf(str(UR10E_LOGS / "ur10e.urdf"))
     model.armature = np.array(values["drive_inertia"]["value"])
     model_data = model.createData()
     momentum, net_force = np.empty_like(speed), np.empty_like(speed)
@@ -104,7 +115,6 @@ def test_the_reference_observer_of_the_data_follows_from_the_machines_terms(arm,
     assert forward_euler_observer(time, ours_net, ours, gain) == pytest.approx(reference, abs=1e-9)
 
 
-@needs_arm
 @pytest.mark.parametrize("name", ["no_torque", "link4", "ur-static"])
 @pytest.mark.parametrize(("gain", "share"), [(20.0, 0.1), (2.0, 0.04), ((27.0, 15.0, 15.0, 27.0, 27.0, 12.0), 0.12)])
 def test_the_momentum_residual_is_the_reference_observers_with_the_sign_turned(arm, name, gain, share):
@@ -123,7 +133,6 @@ def test_the_momentum_residual_is_the_reference_observers_with_the_sign_turned(a
     assert np.sqrt(np.mean(difference**2)) < share * np.sqrt(np.mean(reference[before_the_stop] ** 2))
 
 
-@needs_arm
 def test_at_rest_model_and_currents_agree_for_the_shoulder(arm):
     position, _, torque = motion_of(read("ur-static", arm))
     gravity = read_machine_file(arm).machine.gravity(position).mean(axis=0)
@@ -131,7 +140,6 @@ def test_at_rest_model_and_currents_agree_for_the_shoulder(arm):
     assert torque.mean(axis=0)[1] == pytest.approx(-44.1, abs=0.05)
 
 
-@needs_arm
 def test_joints_named_in_another_order_with_their_columns_give_the_same_residual(arm, tmp_path):
     order = [3, 0, 5, 1, 4, 2]
 
@@ -139,6 +147,7 @@ def test_joints_named_in_another_order_with_their_columns_give_the_same_residual
         items = listed[1].split(", ")
         return f"[{', '.join(items[k] for k in order)}]"
 
+    shutil.copy(UR10E_LOGS / "ur10e.urdf", tmp_path)
     text = re.sub(r"\[([^\[\]]+(?:, [^\[\]]+){5})\]", reordered, arm.read_text(encoding="utf-8"))
     (tmp_path / "turned.toml").write_text(text, encoding="utf-8")
     plain, turned = read_machine_file(arm), read_machine_file(tmp_path / "turned.toml")
@@ -148,7 +157,6 @@ def test_joints_named_in_another_order_with_their_columns_give_the_same_residual
         assert signals[1] == pytest.approx(signals[0][:, order], abs=1e-9)
 
 
-@needs_arm
 @pytest.mark.parametrize(
     ("right", "wrong", "message"),
     [
@@ -160,31 +168,29 @@ def test_joints_named_in_another_order_with_their_columns_give_the_same_residual
 def test_mismatched_joints_and_columns_are_refused(arm, tmp_path, right, wrong, message):
     text = arm.read_text(encoding="utf-8")
     assert right in text
+    shutil.copy(UR10E_LOGS / "ur10e.urdf", tmp_path)
     (tmp_path / "wrong.toml").write_text(text.replace(right, wrong), encoding="utf-8")
     with pytest.raises(CdtoolError, match=message):
         read("link4", tmp_path / "wrong.toml")
 
 
 @pytest.fixture(scope="module")
-def judged(example, tmp_path_factory):
+def judged(example):
     """The results of the example: each detector on no_torque, link4 and ur-static."""
-    path = tmp_path_factory.mktemp("judged") / "machine.toml"
-    return example["run"](data("ur10e"), path, factor=5.5, block=0.5)
+    return example["run"](UR10E_LOGS, example["DETECTORS"], factor=5.5, block=0.5)
 
 
-@needs_arm
 @pytest.mark.parametrize("name", ["momentum", "kalman_momentum", "velocity", "direct"])
 def test_every_contact_of_the_arm_is_found_with_limits_from_five_seconds_without_one(judged, example, name):
     _, moving, resting = judged[name]
     assert (len(moving.matching.matches), len(resting.matching.matches)) == (3, 4)
-    for item, log in ((moving, "link4.csv"), (resting, "ur-static.csv")):
+    for item, log in ((moving, "link4.csv.gz"), (resting, "ur-static.csv.gz")):
         for match, (start, end) in zip(item.matching.matches, example["WINDOWS"][log], strict=True):
             assert match.outcome == "detected"
             assert start - 0.11 <= match.alarm.time - item.recording.start <= end
             assert match.alarm.joint == "joint3"
 
 
-@needs_arm
 @pytest.mark.parametrize(
     ("name", "count"), [("momentum", 1), ("kalman_momentum", 1), ("velocity", 3), ("direct", 0), ("energy", 0)]
 )
@@ -200,7 +206,6 @@ def test_false_alarms_come_only_from_a_wrist_that_stands_still(judged, name, cou
         assert abs(speed.values[np.searchsorted(speed.time, alarm.time), alarm.column]) < 1e-3
 
 
-@needs_arm
 def test_the_energy_observer_misses_slow_contacts_and_is_not_assessable_at_rest(judged):
     _, moving, resting = judged["energy"]
     assert [match.outcome for match in moving.matching.matches] == ["missed"] * 3
@@ -208,7 +213,6 @@ def test_the_energy_observer_misses_slow_contacts_and_is_not_assessable_at_rest(
     assert resting.detection.statistic.valid.mean() < 0.01
 
 
-@needs_arm
 def test_the_table_of_the_page_matches_the_example(judged):
     text = (EXAMPLE.parents[1] / "real-recordings.md").read_text(encoding="utf-8")
     for name, (_, moving, resting) in judged.items():
@@ -226,14 +230,13 @@ def test_the_table_of_the_page_matches_the_example(judged):
         assert int(not_assessable) == round(100.0 * (1.0 - resting.detection.statistic.valid.mean()))
 
 
-@needs_arm
 def test_smaller_limits_bring_false_alarms_and_larger_ones_miss_contacts(example, arm):
     machine = read_machine_file(arm)
     detector = machine.detector("momentum")
-    recordings = {name: example["load"](data("ur10e"), name, machine) for name in example["RECORDINGS"]}
+    recordings = {name: example["load"](UR10E_LOGS, name, machine) for name in example["RECORDINGS"]}
     counts = []
     for factor in (3.0, 4.0, 5.5, 8.0):
-        limit = example["learn_limit"](recordings["no_torque.csv"], machine, detector, factor, 0.5)
+        limit = example["learn_limit"](recordings["no_torque.csv.gz"], machine, detector, factor, 0.5)
         found = [example["judge"](item, name, machine, detector, limit) for name, item in recordings.items()]
         missed = sum(match.outcome == "missed" for item in found for match in item.matching.matches)
         counts.append((missed, sum(len(item.matching.false_alarms) for item in found)))

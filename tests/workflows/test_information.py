@@ -14,7 +14,7 @@ from cdtool.findings.clocks import AssumedClock, BackwardStamps, Gap, SampleGaps
 from cdtool.findings.motion import AccelerometerFit, JointsSwapped
 from cdtool.recording import Recording, Series
 from cdtool.workflows.log_checks.log_findings import accelerometer_findings
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS, data, needs_data
 from tests.noted_times import noted
 
 
@@ -67,9 +67,8 @@ def test_the_real_clock_of_a_wide_robot_log_is_found():
     assert info.channels[0].rate_hz == pytest.approx(25.0, rel=0.05)
 
 
-@needs_data("ur10e/no_torque.csv")
 def test_a_log_without_a_header_has_a_clock_too():
-    info = cdtool.info(data("ur10e/no_torque.csv"))
+    info = cdtool.info(UR10E_LOGS / "no_torque.csv.gz")
     assert info.channels[3].rate_hz == pytest.approx(100.0)
     assert info.channels[3].duration_s == pytest.approx(5.664)
 
@@ -102,7 +101,6 @@ position = { columns = ["ORDER", "q3"], unit = "rad" }
     ]
 
 
-@needs_data("ur10e/no_torque.csv")
 def test_the_right_columns_of_a_real_robot_are_not_suspected(tmp_path):
     machine = tmp_path / "machine.toml"
     columns = "[channels]\ntime = { column = 0, unit = 's' }\nposition = { columns = [POSE], unit = 'rad' }\n"
@@ -111,7 +109,7 @@ def test_the_right_columns_of_a_real_robot_are_not_suspected(tmp_path):
     told = {}
     for order in ("1, 2, 3, 4, 5, 6", "2, 1, 3, 4, 5, 6"):
         machine.write_text(names + columns.replace("POSE", order))
-        info = cdtool.info(data("ur10e/no_torque.csv"), machine=machine)
+        info = cdtool.info(UR10E_LOGS / "no_torque.csv.gz", machine=machine)
         told[order] = sum(isinstance(item.fact, JointsSwapped) for item in info.findings)
     assert told == {"1, 2, 3, 4, 5, 6": 0, "2, 1, 3, 4, 5, 6": 2}
 

@@ -19,6 +19,7 @@ from cdtool.channels import ChannelMap, TablePins, TimeSource
 from cdtool.columns import Column
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
+from cdtool.formats.csv.gzipped import open_text
 from cdtool.formats.groups import PREFIX
 from cdtool.formats.pieces import Pieces
 from cdtool.formats.source import Source
@@ -37,10 +38,10 @@ _HEAD = 1 << 16
 
 @dataclass(frozen=True)
 class Csv:
-    """Text tables: separator, header, decimal mark and encoding are detected from the first lines, or pinned."""
+    """Text tables, also compressed with gzip: separator, header, decimal mark and encoding are detected or pinned."""
 
     name: ClassVar[str] = "csv"
-    suffixes: ClassVar[tuple[str, ...]] = (".csv", ".txt", ".tsv", ".dat", ".lvm")
+    suffixes: ClassVar[tuple[str, ...]] = (".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".lvm")
     sniffs_any_text: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
@@ -195,11 +196,11 @@ def write_csv(path: Path, columns: Mapping[str, FloatArray], formats: Mapping[st
 
 def written_origin(path: Path) -> float:
     """Return the origin [s] that the head of a text table states; 0 if it does not state one."""
-    with path.open("rb") as file:
-        head = file.read(len(_MARK))
+    with open_text(path) as file:
+        head = file.read(len(_MARK)) or b""
         if head != _MARK:  # the usual case
             return 0.0
-        head += file.read(_HEAD - len(_MARK))
+        head += file.read(_HEAD - len(_MARK)) or b""
     lines = takewhile(lambda line: line.startswith(_MARK), head.splitlines())
     written = next((line.removeprefix(_KEY) for line in lines if line.startswith(_KEY)), b"0")
     try:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.east_asian import east_asian
-from cdtool.formats.csv.text import UNIT_BYTES, Text
+from cdtool.formats.csv.gzipped import is_gzipped, measure
+from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
 _MARKS = (
@@ -76,7 +77,7 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
             f"{path}: line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
         )
-    size, padding = _without_padding(path, content, UNIT_BYTES.get(encoding, 1))
+    size, padding, end = _without_padding(path, content, UNIT_BYTES.get(encoding, 1))
     stream = sample[mark : max(size, mark)]
     if encoding in UNIT_BYTES:
         try:
@@ -98,7 +99,7 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     line_end = b"\n" if b"\n" in inner or b"\r" not in inner else b"\r"
     if b"\r" not in inner and b"\n" not in stream and b"\r" in stream:
         line_end = b"\r"
-    return Text(path, encoding, mark, size, padding, line_end, content), stream
+    return Text(path, encoding, mark, size, padding, line_end, content, end), stream
 
 
 def _by_mark(sample: bytes) -> tuple[str | None, int]:
@@ -143,12 +144,31 @@ def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
         ) from fault
 
 
-def _without_padding(path: Path, known: bytes | None, unit: int) -> tuple[int, int]:
-    """Return the byte where the text ends, and the number of NUL bytes after it; `known` are the bytes of the file."""
-    total = path.stat().st_size if known is None else len(known)
+def _without_padding(path: Path, known: bytes | None, unit: int) -> tuple[int, int, tuple[int, bytes] | None]:
+    """Return the byte where the text ends, the number of NUL bytes after it, and the end that has been read.
+
+    `known` are the bytes of the file. The last bytes of a compressed file, and where they start, are kept: they are
+    read several times, each of which would decompress the whole file.
+    """
     if known is not None and not known.endswith(b"\0"):
-        return total, 0
-    end = total
+        return len(known), 0, None
+    kept = None
+    if known is None and is_gzipped(path):
+        total, end, last = measure(path, SAMPLE_BYTES)
+        kept = (total - len(last), last)
+    else:
+        total, end = _measure(path, known)
+    if unit > 1:  # the upper bytes of the last character are NUL too
+        mark = total % unit
+        end = min(total, end + (mark - end) % unit)
+    return end, total - end, kept
+
+
+def _measure(path: Path, known: bytes | None) -> tuple[int, int]:
+    """Return the size of a file, and its size without the NUL bytes at its end."""
+    if known is not None:
+        return len(known), len(known.rstrip(b"\0"))
+    total = end = path.stat().st_size
     with path.open("rb") as file:
         while end > 0:
             start = max(0, end - (1 << 16))
@@ -157,7 +177,4 @@ def _without_padding(path: Path, known: bytes | None, unit: int) -> tuple[int, i
             end = start + content
             if content:
                 break
-    if unit > 1:  # the upper bytes of the last character are NUL too
-        mark = total % unit
-        end = min(total, end + (mark - end) % unit)
-    return end, total - end
+    return total, end

@@ -1,7 +1,8 @@
 """Read the bytes of a text file (encoding, line ends, NUL bytes at the end) and its lines in blocks.
 
-UTF-16 and UTF-32 are recoded to UTF-8 while reading; in any other encoding the bytes of a number are ASCII, and nothing
-is recoded. The result is called the stream: bytes without a byte order mark.
+The bytes of a file that is compressed with gzip are those of the text in it (`gzipped.py`). UTF-16 and UTF-32 are
+recoded to UTF-8 while reading; in any other encoding the bytes of a number are ASCII, and nothing is recoded. The
+result is called the stream: bytes without a byte order mark.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from io import BytesIO
+from io import BytesIO, RawIOBase
 from itertools import count
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError
+from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -36,7 +37,8 @@ UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 class Text:
     """The encoding of a text file. The byte order mark has `mark` bytes; `padding` NUL bytes start at byte `size`.
 
-    `content` are the bytes of a file of at most one block, which is read once.
+    `content` are the bytes of a file of at most one block, which is read once. `end` are the last bytes of a longer
+    file that is compressed, and the byte where they start.
     """
 
     path: Path
@@ -46,6 +48,7 @@ class Text:
     padding: int
     line_end: bytes
     content: bytes | None = field(default=None, repr=False, compare=False)
+    end: tuple[int, bytes] | None = field(default=None, repr=False, compare=False)
 
     @property
     def recoded(self) -> bool:
@@ -60,9 +63,11 @@ class Text:
         """Return bytes of the file."""
         if self.content is not None:
             return self.content[start:end]
-        with self.path.open("rb") as file:
+        if self.end is not None and start >= self.end[0]:
+            return self.end[1][start - self.end[0] : end - self.end[0]]
+        with open_text(self.path) as file:
             file.seek(start)
-            return file.read(end - start)
+            return file.read(end - start) or b""
 
     def chunks(self) -> Iterator[bytes]:
         """Yield the stream in pieces that may end within a line; raises RecordingError if it cannot be decoded."""
@@ -127,8 +132,8 @@ class Text:
         if left[0]:
             yield bytearray(left[0] + self.line_end * AFTER), len(left[0])
 
-    def _open(self) -> BinaryIO:
-        return self.path.open("rb") if self.content is None else BytesIO(self.content)
+    def _open(self) -> RawIOBase | BytesIO:
+        return open_text(self.path) if self.content is None else BytesIO(self.content)
 
     def _filled(self, offset: int, most: int, before: Callable[[], bytes] = bytes) -> Iterator[tuple[bytearray, int]]:
         """Yield the stream from `offset` in buffers, with the size of their content; each starts with `before()`."""
@@ -146,7 +151,7 @@ class Text:
                 yield bytearray(memoryview(self.content)[self.mark + offset : self.size]), left
             return
         ring = [bytearray(2 * most + AFTER) for _ in range(RING if left > most else 1)]
-        with self.path.open("rb", buffering=0) as file:
+        with open_text(self.path) as file:
             file.seek(self.mark + offset)
             for turn in count():
                 if left <= 0:
@@ -164,15 +169,18 @@ class Text:
 
 def read_sample(path: Path, most: int = SAMPLE_BYTES) -> bytes:
     """Return the first bytes of a file, in which its dialect is detected; raises RecordingError."""
-    with _readable(path), path.open("rb") as file:
-        return file.read(most)
+    with _readable(path), open_text(path) as file:
+        return file.read(most) or b""
 
 
 def read_small(path: Path) -> bytes | None:
     """Return the bytes of a file of at most one block; None for a larger file. Raises RecordingError."""
-    with _readable(path), path.open("rb", buffering=0) as file:
-        size = os.fstat(file.fileno()).st_size
-        content = file.readall() if size <= BLOCK_BYTES else None
+    with _readable(path):
+        with path.open("rb", buffering=0) as file:
+            size = os.fstat(file.fileno()).st_size
+            content = file.readall() if size <= BLOCK_BYTES else None
+        if is_gzipped(path) if content is None else content.startswith(MAGIC):
+            content = read_sample(path, BLOCK_BYTES + 1)
     return content if content is None or len(content) <= BLOCK_BYTES else None
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from cdtool.errors import CdtoolError, UsageError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.identification.estimate import IdentificationError
+from cdtool.log_names import log_stem
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import FloatArray
 from cdtool.remote.remote_path import location
@@ -376,7 +377,7 @@ def _periods(logs: Sequence[Path]) -> list[tuple[str, tuple[Path, ...]]]:
         return []
     edges = [round(number * len(logs) / count) for number in range(count + 1)]
     parts = [tuple(logs[first:end]) for first, end in pairwise(edges)]
-    return [(f"{part[0].stem} to {part[-1].stem}", part) for part in parts]
+    return [(f"{log_stem(part[0])} to {log_stem(part[-1])}", part) for part in parts]
 
 
 def _by_day(named: Mapping[str, Sequence[Path]], machine_file: MachineFile, skipped: list[Skipped]) -> list[_Group]:

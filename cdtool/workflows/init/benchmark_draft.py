@@ -15,6 +15,7 @@ from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, RecordingError
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.onset_rule import OnsetRule
+from cdtool.log_names import log_stem, log_suffix
 from cdtool.machine_file import MachineFile
 from cdtool.operations import operations_of
 from cdtool.pipeline import run_detector
@@ -187,7 +188,7 @@ def _groups(impacts: Sequence[_Log], folder: Path) -> list[str]:
     groups: dict[str, list[_Log]] = {}
     for log in impacts:
         place = log.path.resolve().parent.name
-        name = place if by_folder else _NUMBER.sub("", log.path.stem) or place
+        name = place if by_folder else _NUMBER.sub("", log_stem(log.path)) or place
         groups.setdefault(re.sub(r"\W+", "_", name).strip("_") or "impacts", []).append(log)
     lines = []
     for name, members in groups.items():
@@ -255,9 +256,9 @@ def patterns(logs: Sequence[Path], folder: Path) -> list[str]:
     found: list[str] = []
     by_place: dict[tuple[Path, str], list[Path]] = {}
     for log in logs:
-        by_place.setdefault((log.parent, log.suffix), []).append(log)
+        by_place.setdefault((log.parent, log_suffix(log)), []).append(log)
     for (parent, suffix), members in by_place.items():
-        stems = {_NUMBER.sub("", path.stem) for path in members}
+        stems = {_NUMBER.sub("", log_stem(path)) for path in members}
         stem = stems.pop() if len(stems) == 1 else None
         candidates = [f"*{suffix}", *([f"{stem}*{suffix}"] if stem else [])]
         wanted = {path.resolve() for path in members}

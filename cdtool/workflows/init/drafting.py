@@ -19,6 +19,7 @@ from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.source import Format, Source
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
+from cdtool.log_names import log_stem
 from cdtool.machine_file import read_machine_file
 from cdtool.remote.remote_path import location
 from cdtool.short_repr import short_repr
@@ -267,7 +268,9 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
     left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
-    return Draft(log.stem, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words)
+    return Draft(
+        log_stem(log), log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words
+    )
 
 
 def _words(findings: Sequence[Finding]) -> tuple[UnreadWord, ...]:

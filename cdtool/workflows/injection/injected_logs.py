@@ -26,6 +26,7 @@ from cdtool.injection.assumption import Assumption, DriveBeyond, SlewBeyond, ass
 from cdtool.injection.axis_contact import Doubt, InjectedContact
 from cdtool.injection.injected_recording import injected_recording
 from cdtool.injection.robot_contact import RobotLog
+from cdtool.log_names import log_stem
 from cdtool.log_section import Mark
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile
@@ -136,7 +137,7 @@ class _Work:
             for group, (obstacle, assumption) in groups:
                 try:
                     contact = at.contact(run, obstacle.obstacle, time, self.section.duration, assumption)
-                    file = f"{group}/{number + 1:03d}_{log.stem}_{digits(mark.value)}{mark.unit}"
+                    file = f"{group}/{number + 1:03d}_{log_stem(log)}_{digits(mark.value)}{mark.unit}"
                     case, machine_toml = self._write(file, log, logged.recording, group, obstacle, mark, contact)
                     cases.append(case)
                 except RecordingError as fault:

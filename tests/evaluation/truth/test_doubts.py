@@ -12,7 +12,7 @@ from cdtool.evaluation.truth.doubts import follows_torque, truth_findings
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.findings.truth import FollowsTorque, ForceLeft, RestLevelShifted
 from cdtool.recording import FloatArray, Recording, Series
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS
 
 RULE = OnsetRule(above=20.0, back_to=8.0)
 TIME = np.arange(6000) * 1e-3
@@ -81,11 +81,10 @@ def test_a_force_next_to_nothing_that_stays_to_the_end_of_the_log_is_named():
     assert warnings_of(log(press(TIME) + noise(2.0, 1), torque)) == []
 
 
-@needs_data("ur10e")
 @pytest.mark.parametrize("joint", [0, 1, 2])
 def test_of_a_real_arm_a_force_made_from_a_motor_current_is_named(joint):
     """UR10e pushed by hand, one sample per 10 and 12 ms: the "force" is the shoulder's or elbow's own torque."""
-    table = np.loadtxt(data("ur10e") / "ur-static.csv", delimiter=",")
+    table = np.loadtxt(UR10E_LOGS / "ur-static.csv.gz", delimiter=",")
     time, current = table[:, 0] - table[0, 0], table[:, 13:19]
     force = 10.0 * current[:, joint] + np.random.default_rng(1).normal(0.0, 0.5, len(time))
     channels = {"force": Series(time, force, "N"), "torque": Series(time, current, "N m")}

@@ -24,7 +24,7 @@ from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.strict_json import strict_json
 from cdtool.workflows.identification.identifying import IdentifiedMachine
 from cdtool.workflows.identification.identifying_robot import LoadedRuns
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS
 from tests.identification.robot_motion import (
     PANDA_JOINTS,
     Motion,
@@ -296,15 +296,14 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> tuple[IdentifiedMachine, P
     folder = tmp_path_factory.mktemp("ur10e")
     ur10e(folder)
     target = folder / "identified.toml"
-    return cdtool.identify([data("ur10e/no_torque.csv")], folder / "machine.toml", target), folder
+    return cdtool.identify([UR10E_LOGS / "no_torque.csv.gz"], folder / "machine.toml", target), folder
 
 
-@needs_data("ur10e")
 def test_the_ur10e_is_predicted_at_least_as_well_as_by_the_published_friction(real) -> None:
     """Learned from no_torque.csv with its stop; chosen on it alone, checked on two other recordings."""
     _, folder = real
     old, new = (read_machine_file(folder / name) for name in ("machine.toml", "identified.toml"))
-    for name in ("link4.csv", "ur-static.csv"):
+    for name in ("link4.csv.gz", "ur-static.csv.gz"):
         run = ur10e_run(old, name)
         motion = run.position, run.speed, run.acceleration()
         before, after = (
@@ -312,11 +311,10 @@ def test_the_ur10e_is_predicted_at_least_as_well_as_by_the_published_friction(re
             for file in (old, new)
         )
         assert (after <= before * (1.0 + 1e-9)).all()
-        if name == "link4.csv":
+        if name == "link4.csv.gz":
             assert after[0] < 0.8 * before[0]
 
 
-@needs_data("ur10e")
 def test_the_ur10e_keeps_its_inertias_and_shows_friction_that_grows_with_gravity(real) -> None:
     done, _ = real
     (found,) = done.robot.inertias.not_identifiable

@@ -27,7 +27,7 @@ from cdtool.workflows.identification.robot_evidence import (
     robot_evidence,
 )
 from tests.command import cdtool as command
-from tests.data_folder import data, needs_data
+from tests.data_folder import UR10E_LOGS
 from tests.identification.robot_motion import channels_of, coloured, fourier, planar_arm, ur10e, write_log
 from tests.synthetic.robots import JOINTS, six_joint_urdf, urdf_robot
 
@@ -148,12 +148,13 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, Any]]
     pytest.importorskip("pinocchio")
     folder = tmp_path_factory.mktemp("ur10e")
     ur10e(folder)
-    done = command("identify", data("ur10e/no_torque.csv"), "-m", folder / "machine.toml", "-o", folder / "ur10e.json")
+    done = command(
+        "identify", UR10E_LOGS / "no_torque.csv.gz", "-m", folder / "machine.toml", "-o", folder / "ur10e.json"
+    )
     assert done.status == 0, done.err
     return done.out, json.loads((folder / "ur10e.json").read_text(encoding="utf-8"))
 
 
-@needs_data("ur10e")
 def test_the_residuals_of_the_ur10e_are_those_that_chose_its_friction(
     real: tuple[str, dict[str, Any]],
 ) -> None:
@@ -167,7 +168,6 @@ def test_the_residuals_of_the_ur10e_are_those_that_chose_its_friction(
         assert decision["form"] in ("friction", "friction_alone")
 
 
-@needs_data("ur10e")
 def test_the_command_states_what_the_ur10e_does_not_show(real: tuple[str, dict[str, Any]]) -> None:
     out, values = real
     (line,) = [line for line in out.splitlines() if "full set of base parameters" in line]

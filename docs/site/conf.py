@@ -1,0 +1,118 @@
+"""Settings of Sphinx for the site; `docs/make_site.py` copies the pages, adds the generated ones, and runs Sphinx."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from docutils.utils.math import latex2mathml
+from sphinx.application import Sphinx
+from sphinx.errors import SphinxError
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+project = "cdtool"
+author = "The cdtool authors"
+copyright = "the cdtool authors, Apache-2.0"
+version = release = os.environ.get("CDTOOL_DOCS_VERSION", "main")
+root_doc = "index"
+language = "en"
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_design", "sphinx_copybutton"]
+exclude_patterns: list[str] = []
+smartquotes = False  # `--option` in the text of a help page stays as it is
+add_module_names = False
+toc_object_entries = False
+
+# Markdown as GitHub renders it: `$...$`, blocks of `math`, anchors of headings.
+myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_fence_as_directive = ["math"]
+myst_heading_anchors = 5
+myst_dmath_double_inline = True
+html_math_renderer = "mathml"
+
+autodoc_typehints = "none"  # numpydoc states the types in words
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+
+html_theme = "pydata_sphinx_theme"
+html_title = "cdtool"
+html_static_path = ["_static"]
+html_css_files = ["style.css"]
+html_context = {"default_mode": "auto"}
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options: dict[str, Any] = {
+    "logo": {"text": "cdtool"},
+    "header_links_before_dropdown": 5,
+    "navbar_end": ["theme-switcher"],
+    "show_toc_level": 2,
+    "show_nav_level": 2,
+    "navigation_with_keys": True,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "secondary_sidebar_items": ["page-toc"],
+    "pygments_light_style": "tango",
+    "pygments_dark_style": "monokai",
+    "back_to_top_button": True,
+}
+if switcher := os.environ.get("CDTOOL_DOCS_SWITCHER"):  # the list of versions, beside their folders
+    html_theme_options["navbar_end"].insert(0, "version-switcher")
+    html_theme_options["switcher"] = {"json_url": switcher, "version_match": version}
+    html_theme_options["check_switcher"] = False
+html_sidebars = {"index": [], "docs/tasks": [], "docs/concepts": [], "docs/reference": [], "docs/gallery": []}
+
+
+def mathml(translator: Any, node: nodes.Node, *, block: bool) -> None:
+    """Write an equation as MathML, which browsers render themselves: no script, no font or file from elsewhere."""
+    text = node.astext()
+    try:
+        equation = latex2mathml.tex2mathml(text, as_block=block)
+    except Exception as fault:
+        raise SphinxError(f"{translator.builder.current_docname}: equation not understood: {fault}: {text}") from fault
+    translator.body.append(f'<div class="equation">{equation}</div>' if block else equation)
+    raise nodes.SkipNode
+
+
+def plain_rst(app: Sphinx, what: str, name: str, item: object, options: object, lines: list[str]) -> None:
+    """Turn the docstrings' single backticks and marks into what reStructuredText understands as code and text."""
+    del app, what, name, item, options
+    turned, in_example, before = list[str](), False, ""
+    for line in lines:
+        in_example = line.lstrip().startswith(">>>") or (in_example and bool(line.strip()))
+        # An indented block after a paragraph is an equation or a listing.
+        if line.startswith("    ") and turned and not turned[-1].strip() and before[:1] not in ("", " ", "*"):
+            turned += ["::", ""]
+            before = ""
+        in_block = line.startswith("    ") and before == ""
+        before = before if not line.strip() or in_block else line
+        turned.append(line if in_example or in_block else _as_rst(line))
+    lines[:] = turned
+
+
+def _as_rst(line: str) -> str:
+    bullet, text = (line[:2], line[2:]) if line.startswith("* ") else ("", line)
+    parts = re.split(r"(``[^`]*``|`[^`]*`)", text)
+    for i, part in enumerate(parts):
+        if i % 2:
+            parts[i] = f"``{part.strip('`')}``"
+        else:
+            parts[i] = re.sub(r"(?<!\\)([*|])", r"\\\1", re.sub(r"(?<=\w)_(?=\W|$)", r"\\_", part))
+    return bullet + "".join(parts)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the renderer of equations, and the reader of docstrings before numpydoc's."""
+    app.add_html_math_renderer(
+        "mathml",
+        (lambda self, node: mathml(self, node, block=False), None),
+        (lambda self, node: mathml(self, node, block=True), None),
+    )
+    app.connect("autodoc-process-docstring", plain_rst, priority=100)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

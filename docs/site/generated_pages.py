@@ -1,0 +1,235 @@
+"""Pages of the site that are generated from the code: commands, Python functions, fields of the results."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import is_dataclass
+from enum import EnumType
+from importlib import import_module
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+from typer.main import get_command
+
+from cdtool import _API
+from cdtool.cli.app import COMMANDS, app
+from cdtool.detectors import DETECTORS
+from cdtool.exit_status import STATUSES, STATUSES_OF
+from cdtool.machines import MACHINES
+from cdtool.thresholds import THRESHOLDS
+
+
+def generated_pages(schema: Path) -> dict[str, str]:
+    """Return the text of each generated page by its name below docs/, without a suffix."""
+    return {
+        **_cli_pages(),
+        **_python_pages(),
+        "reference/results": _results_page(json.loads(schema.read_text("utf-8"))),
+    }
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines) + "\n"
+
+
+# --- commands
+
+
+def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Yield a command and its subcommands, each with its name on the command line."""
+    yield name, command
+    for below, part in getattr(command, "commands", {}).items():
+        yield from _commands(part, f"{name} {below}")
+
+
+def _cli_pages() -> dict[str, str]:
+    root: Any = get_command(app)
+    pages, rows = {}, []
+    for name in COMMANDS:
+        command = root.commands[name]
+        parts = list(_commands(command, name))
+        text = "".join(_command_text(of, part, level=1 + (i > 0)) for i, (of, part) in enumerate(parts))
+        pages[f"reference/cli/{name}"] = text
+        rows += [[f"[`cdtool {of}`]({name}.md{'#cdtool-' + of.replace(' ', '-') if i else ''})", _first(part)]
+                 for i, (of, part) in enumerate(parts)]  # fmt: skip
+    statuses = _table(["status", "meaning"], [[f"{int(key)}", _cell(str(text))] for key, text in STATUSES.items()])
+    pages["reference/cli/index"] = (
+        "# Commands\n\nGenerated from the options of the commands; `cdtool COMMAND --help` shows the same.\n\n"
+        + _table(["command", "what it does"], rows)
+        + "## Exit statuses\n\n"
+        + statuses
+    )
+    return pages
+
+
+def _first(command: Any) -> str:
+    return _cell((command.help or "").strip().split("\n\n")[0])
+
+
+def _command_text(name: str, command: Any, level: int) -> str:
+    lines = [f"{'#' * level} cdtool {name}\n"]
+    for paragraph in (command.help or "").strip().split("\n\n"):
+        example = re.fullmatch(r"Example: (.*)", " ".join(paragraph.split()))
+        lines.append(f"```text\n{example[1]}\n```\n" if example else paragraph.strip() + "\n")
+    arguments = [item for item in command.params if item.param_type_name == "argument"]
+    options = [item for item in command.params if item.param_type_name == "option" and not item.hidden]
+    if arguments:
+        rows = [[f"`{item.metavar or item.name.upper()}`", _cell(item.help or "")] for item in arguments]
+        lines.append(_table(["argument", "meaning"], rows))
+    if options:
+        lines.append(_table(["option", "meaning"], [_option(item) for item in options]))
+    if name in STATUSES_OF:
+        lines.append(f"Exit statuses: {', '.join(str(int(status)) for status in sorted(STATUSES_OF[name]))}"
+                     " ([what they mean](index.md#exit-statuses)).\n")  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _option(item: Any) -> list[str]:
+    names = ", ".join(f"`{text}`" for text in (*item.opts, *item.secondary_opts))
+    value = "" if item.is_flag else item.metavar or _value(item)
+    text = item.help or ""
+    if item.default not in (None, False, (), "") and not callable(item.default) and "efault" not in text:
+        default = getattr(item.default, "value", item.default)
+        text += f" Default: `{default}`."
+    if item.multiple and "epeat" not in text:
+        text += " Repeatable."
+    if item.required:
+        text += " Required."
+    return [_cell(f"{names} {value}"), _cell(text)]
+
+
+def _value(item: Any) -> str:
+    """Return what an option expects; typer keeps its type as an annotation, older versions as a type of click."""
+    described = getattr(item, "type_descriptor", None)
+    kind = described.annotation if described is not None else item.type
+    if get_origin(kind) in (list, tuple):
+        kind = get_args(kind)[0]
+    choices = list(kind) if isinstance(kind, EnumType) else getattr(kind, "choices", None)
+    if choices:
+        return ", ".join(f"`{getattr(each, 'value', each)}`" for each in choices)
+    name = getattr(kind, "name", None) or getattr(kind, "__name__", "")
+    return {"int": "number", "integer": "number", "float": "number", "str": "text", "text": "text"}.get(name, "file")
+
+
+# --- Python
+
+
+_VALUES = (
+    "cdtool.recording.Series",
+    "cdtool.recording.Recording",
+    "cdtool.detection.Signal",
+    "cdtool.detection.Band",
+    "cdtool.detection.Verdict",
+    "cdtool.detection.Alarm",
+)
+
+
+def _python_pages() -> dict[str, str]:
+    functions = {name: place for name, place in _API.items() if not name.startswith("__")}
+    pages, rows, returned = {}, [], dict[str, Any]()
+    for name, place in functions.items():
+        module, _, attribute = place.partition(":")
+        function = getattr(import_module(module), attribute)
+        rows.append([f"[`cdtool.{name}`](functions.md#cdtool{name})", _summary(function)])
+        # The names of other annotations are imported for type checkers only.
+        result = getattr(import_module(function.__module__), str(function.__annotations__.get("return")), None)
+        if inspect.isclass(result) and is_dataclass(result):
+            returned.setdefault(f"{result.__module__}.{result.__qualname__}", result)
+    text = "# Functions of cdtool\n\n"
+    text += "".join(f"## cdtool.{name}\n\n" + _directive("autofunction", f"cdtool.{name}") for name in functions)
+    pages["reference/python/functions"] = text
+    pages["reference/python/results"] = "# What the functions return\n\n" + "".join(map(_class_text, returned))
+    for title, registry in (("Detectors", DETECTORS), ("Thresholds", THRESHOLDS), ("Machines", MACHINES)):
+        classes = [registry.load(name) for name in registry.names(plugins=False)]
+        places = [f"{item.__module__}.{item.__qualname__}" for item in classes]
+        pages[f"reference/python/{title.lower()}"] = f"# {title}\n\n" + "".join(map(_class_text, places))
+    about = "What travels between the functions: recordings, signals, bands, verdicts."
+    texts = (_class_text(place) for place in _VALUES if place not in returned)
+    pages["reference/python/values"] = f"# Values\n\n{about}\n\n" + "".join(texts)
+    more = [
+        ["[Results](results.md)", "what the functions return"],
+        ["[Values](values.md)", "recordings, signals, bands, verdicts"],
+        ["[Detectors](detectors.md)", "the detectors as classes, with their gains"],
+        ["[Thresholds](thresholds.md)", "the thresholds as classes"],
+        ["[Machines](machines.md)", "the models of machines"],
+    ]
+    pages["reference/python/index"] = (
+        "# Python reference\n\nGenerated from the docstrings, whose examples are run as tests. "
+        "[Python](../../python.md) is the introduction.\n\n"
+        + _table(["function", "what it does"], rows)
+        + _table(["page", "contents"], more)
+    )
+    return pages
+
+
+def _class_text(place: str) -> str:
+    return f"## {place.rpartition('.')[2]}\n\n" + _directive("autoclass", place, members=True)
+
+
+def _summary(item: Any) -> str:
+    return _cell((inspect.getdoc(item) or "").split("\n\n")[0])
+
+
+def _directive(kind: str, place: str, *, members: bool = False) -> str:
+    options = "\n   :members:" if members else ""
+    return f"```{{eval-rst}}\n.. {kind}:: {place}{options}\n```\n\n"
+
+
+# --- fields of the results
+
+
+def _results_page(schema: Mapping[str, Any]) -> str:
+    lines = [
+        "# Fields of results.json\n",
+        "Generated from the [JSON schema](../results.schema.json), which a program can check a file against. "
+        "[Benchmark file](../benchmark-file.md) explains the most important fields.\n",
+        f"{schema['title']}.\n",
+        "## The file\n",
+        _fields(schema),
+    ]
+    for name, part in schema["$defs"].items():
+        lines += [
+            f"## {name}\n",
+            *([_sentence(part["description"]) + "\n"] if part.get("description") else []),
+            _fields(part),
+        ]
+    return "\n".join(lines)
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _fields(part: Mapping[str, Any]) -> str:
+    if "properties" not in part:
+        return f"Type: {_type(part)}.\n"
+    required = set(part.get("required", ()))
+    rows = [
+        [f"`{name}`", _cell(item.get("description", "")), _type(item), "yes" if name in required else "no"]
+        for name, item in part["properties"].items()
+    ]
+    return _table(["field", "meaning", "type", "always there"], rows)
+
+
+def _type(item: Mapping[str, Any]) -> str:
+    if "$ref" in item:
+        name = item["$ref"].rpartition("/")[2]
+        return f"[{name}](#{name.lower()})"
+    if "const" in item or "enum" in item:
+        return " or ".join(f"`{json.dumps(value)}`" for value in item.get("enum", [item.get("const")]))
+    if "anyOf" in item or "oneOf" in item:
+        return " or ".join(map(_type, item.get("anyOf", item.get("oneOf", []))))
+    kind = item.get("type", "any")
+    if kind == "array" and isinstance(item.get("items"), Mapping):
+        return f"list of {_type(item['items'])}"
+    if kind == "object" and isinstance(item.get("additionalProperties"), Mapping) and item["additionalProperties"]:
+        return f"object of {_type(item['additionalProperties'])}"
+    return " or ".join(kind) if isinstance(kind, list) else str(kind)

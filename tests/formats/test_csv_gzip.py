@@ -1,0 +1,237 @@
+"""Text tables that are compressed with gzip are read as the tables in them, bounded, and errors are one line."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import subprocess
+import sys
+import zlib
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.errors import RecordingError
+from cdtool.formats.csv.text import BLOCK_BYTES
+from cdtool.formats.pieces import join_pieces
+from cdtool.ingest.reading import choose_format, log_pieces, survey
+from tests.command import cdtool as command
+from tests.noted_times import note
+
+ROOT = Path(__file__).parents[2]
+GATE = ROOT / "sample_logs" / "gate"
+
+
+@cache
+def table(rows: int, header: str = "t;i_motor;x\n", encoding: str = "utf-8", line_end: str = "\n") -> bytes:
+    """Return a table with a comma as decimal mark, of more than one block from 40,000 rows on."""
+    random = np.random.default_rng(4).normal(size=(rows, 2))
+    lines = (f"{k / 1000:.3f};{a:.9f};{b:.12f}".replace(".", ",") for k, (a, b) in enumerate(random))
+    return (header + "".join(line + "\n" for line in lines)).replace("\n", line_end).encode(encoding)
+
+
+def written(folder: Path, content: bytes, name: str = "a.csv") -> tuple[Path, Path]:
+    """Write a table as it is, and compressed in a folder of its own; return both paths."""
+    plain, packed = folder / name, folder / f"{name}.gz"
+    plain.write_bytes(content)
+    packed.write_bytes(gzip.compress(content, 6, mtime=0))
+    return plain, packed
+
+
+def assert_same(left, right) -> None:
+    assert list(left.columns) == list(right.columns) and left.columns
+    for name, column in left.columns.items():
+        assert column.values.tobytes() == right.columns[name].values.tobytes()
+        assert column.unit == right.columns[name].unit
+    assert [str(item) for item in left.findings] == [str(item) for item in right.findings]
+    assert (left.origin, left.details, left.dialect) == (right.origin, right.details, right.dialect)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(table(200), id="small"),
+        pytest.param(table(60_000), id="several blocks"),
+        pytest.param(table(60_000)[:-9], id="unfinished last line"),
+        pytest.param(table(60_000) + bytes(3000), id="NUL bytes at the end"),
+        pytest.param(table(60_000) + b"\n\n \n", id="blank lines at the end"),
+        pytest.param(table(60_000) + b"End of file;;\n", id="footer"),
+        pytest.param(table(40_000, encoding="utf-16"), id="UTF-16"),
+        pytest.param(table(60_000, line_end="\r"), id="carriage returns"),
+        pytest.param(table(60_000, header=""), id="no header"),
+        pytest.param(b"# cdtool: origin_s: 12.5\n" + table(60_000), id="stated origin"),
+    ],
+)
+def test_a_compressed_table_is_read_as_the_table_in_it(content, tmp_path):
+    plain, packed = written(tmp_path, content)
+    assert_same(survey(plain), survey(packed))
+    assert_same(join_pieces(log_pieces(plain), sort=False), join_pieces(log_pieces(packed), sort=False))
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.CSV", "a.txt", "a.tsv", "a.dat", "a", "a.csv.1"])
+def test_a_compressed_table_is_recognised_by_content_and_not_by_name(name, tmp_path):
+    _, packed = written(tmp_path, table(200), name)
+    assert choose_format(packed).name == "csv"
+    renamed = packed.rename(tmp_path / "log.csv")
+    assert choose_format(renamed).name == "csv"
+
+
+def test_members_that_were_appended_to_each_other_are_one_table(tmp_path):
+    content = table(60_000)
+    plain, packed = written(tmp_path, content)
+    cuts = (0, 5, 70_001, 1_400_000, len(content))
+    parts = (content[start:end] for start, end in pairwise(cuts))
+    packed.write_bytes(b"".join(map(gzip.compress, parts)))
+    assert_same(survey(plain), survey(packed))
+
+
+def test_every_command_reads_a_compressed_log(tmp_path):
+    log = GATE / "stiff" / "03.csv"
+    packed = tmp_path / "03.csv.gz"
+    packed.write_bytes(gzip.compress(log.read_bytes()))
+    machine = GATE / "machine.toml"
+    plain_alarms = json.loads(command("detect", log, "-m", machine, "-d", "gm", "--limit", 400, "--json").out)
+    alarms = json.loads(command("detect", packed, "-m", machine, "-d", "gm", "--limit", 400, "--json").out)
+    assert alarms[0]["alarms"] == plain_alarms[0]["alarms"] and alarms[0]["alarms"]
+    done = command("info", packed, "-m", machine)
+    assert done.status == 0 and "csv" in done.out
+    assert command("convert", packed, tmp_path / "03.mcap", "-m", machine).status == 0
+    assert cdtool.read(packed, machine).name == "03"
+    done = command("init", packed, "-o", tmp_path / "draft.toml")
+    assert done.status in (0, 1) and (tmp_path / "draft.toml").exists()
+
+
+def test_a_benchmark_and_its_draft_name_compressed_logs_by_a_pattern(tmp_path):
+    for group in ("free", "stiff"):
+        (tmp_path / group).mkdir()
+        for log in (GATE / group).glob("*.csv"):
+            (tmp_path / group / f"{log.name}.gz").write_bytes(gzip.compress(log.read_bytes(), 1))
+    done = command("init", *sorted(tmp_path.glob("*/*.csv.gz")), "-o", tmp_path / "study")
+    draft = (tmp_path / "study" / "benchmark.toml").read_text(encoding="utf-8")
+    assert done.status in (0, 1) and '"../free/*.csv.gz"' in draft and '"../stiff/*.csv.gz"' in draft
+    results = []
+    for folder, end in ((GATE, ""), (tmp_path, ".gz")):
+        text = f"""
+machine = "{(GATE / "machine.toml").as_posix()}"
+detectors = ["gm"]
+[learn]
+logs = ["{folder.as_posix()}/free/*.csv{end}"]
+[impacts.stiff]
+logs = ["{folder.as_posix()}/stiff/*.csv{end}"]
+[signature]
+force = true
+[onset]
+above_n = 20.0
+back_to_n = 8.0
+"""
+        (tmp_path / f"benchmark{end}.toml").write_text(text, encoding="utf-8")
+        target = tmp_path / f"results{end}.json"
+        assert command("benchmark", tmp_path / f"benchmark{end}.toml", "-o", target, "--force").status in (0, 1)
+        results.append(json.loads(target.read_text(encoding="utf-8")))
+    plain, packed = ([(row["latency_ms"], row["force_at_alarm_n"]) for row in item["contacts"]] for item in results)
+    assert plain == packed and len(plain) == 2
+
+
+@pytest.mark.parametrize("rows", [200, 60_000], ids=["small", "several blocks"])
+@pytest.mark.parametrize("kept", [0.02, 0.5, 0.999], ids=["beginning", "half", "nearly all"])
+def test_a_truncated_file_is_one_line(rows, kept, tmp_path):
+    _, packed = written(tmp_path, table(rows))
+    content = packed.read_bytes()
+    packed.write_bytes(content[: int(len(content) * kept) + 1])
+    with pytest.raises(RecordingError, match=r"a\.csv\.gz: truncated: its gzip data have no end") as fault:
+        survey(packed)
+    assert "copy it again" in fault.value.hint
+    done = command("info", packed)
+    assert done.status == 2 and done.err.count("\n") == 1 and "Traceback" not in done.err
+
+
+@pytest.mark.parametrize("rows", [200, 60_000], ids=["small", "several blocks"])
+@pytest.mark.parametrize("place", [0.3, 0.9, -5], ids=["early", "late", "checksum"])
+def test_a_damaged_file_is_one_line(rows, place, tmp_path):
+    _, packed = written(tmp_path, table(rows))
+    content = bytearray(packed.read_bytes())
+    at = place if place < 0 else int(len(content) * place)
+    for byte in range(at, at + 4 if at > 0 else 0):
+        content[byte] ^= 0xFF
+    packed.write_bytes(content)
+    with pytest.raises(RecordingError, match=r"a\.csv\.gz: (damaged|truncated): its gzip data"):
+        survey(packed)
+
+
+def test_bytes_after_the_end_are_damage(tmp_path):
+    _, packed = written(tmp_path, table(200))
+    packed.write_bytes(packed.read_bytes() + b"more than that")
+    with pytest.raises(RecordingError, match=r"a\.csv\.gz: damaged: its gzip data"):
+        survey(packed)
+
+
+def test_what_is_compressed_but_no_table_is_named(tmp_path):
+    for name, content in (("a.csv.gz", b"{}"), ("a.mcap.gz", b"\x89MCAP0\r\n" + bytes(100)), ("b.gz", bytes(2000))):
+        (tmp_path / name).write_bytes(gzip.compress(content))
+        with pytest.raises(RecordingError, match="is not a recording: it is gzip-compressed") as fault:
+            survey(tmp_path / name)
+        assert "unpack it first" in fault.value.hint
+    (tmp_path / "a.csv.gz").write_bytes(gzip.compress(b""))
+    with pytest.raises(RecordingError, match=r"a\.csv\.gz: is empty"):
+        survey(tmp_path / "a.csv.gz")
+
+
+CHILD = """
+import json, resource, sys, time
+from pathlib import Path
+from cdtool.errors import RecordingError
+from cdtool.ingest.reading import survey
+
+bomb, plain = map(Path, sys.argv[1:])
+survey(plain)
+before, start = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+try:
+    survey(bomb)
+    message = "was read"
+except RecordingError as fault:
+    message = str(fault)
+more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+print(json.dumps([time.process_time() - start, more, message]))
+"""
+
+
+def test_a_bomb_is_refused_without_filling_the_memory(tmp_path):
+    pytest.importorskip("resource")
+    block = b"0,0,0\n" * 170_000
+    packer = zlib.compressobj(9, wbits=-15)
+    piece = packer.compress(block) + packer.flush(zlib.Z_FULL_FLUSH)
+    header = b"\x1f\x8b\x08\0\0\0\0\0\0\x03"
+    bomb = tmp_path / "bomb.csv.gz"
+    bomb.write_bytes(header + piece * (10_000_000 // len(piece)))
+    assert 9_000_000 < bomb.stat().st_size <= 10_000_010
+    plain, _ = written(tmp_path, table(60_000))
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, str(bomb), str(plain)], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    seconds, more, message = json.loads(done.stdout)
+    assert message.startswith(f"{bomb}: unpacks to ") and ": refused (" in message and "\n" not in message
+    assert more < 64  # MiB
+    note(seconds, 15.0)
+
+
+def test_a_small_log_is_unpacked_at_once_and_a_long_one_is_not(tmp_path):
+    from cdtool.formats.csv.text import read_small
+
+    _, small = written(tmp_path, table(200))
+    assert read_small(small) == table(200)
+    _, long = written(tmp_path, table(60_000), "b.csv")
+    assert long.stat().st_size < 2 * BLOCK_BYTES and read_small(long) is None
+
+
+def test_a_compressed_log_at_a_url_is_read(tmp_path):
+    fsspec = pytest.importorskip("fsspec")
+    content = (GATE / "stiff" / "03.csv").read_bytes()
+    fsspec.filesystem("memory").pipe("/packed/03.csv.gz", gzip.compress(content))
+    remote = cdtool.read("memory://packed/03.csv.gz", GATE / "machine.toml")
+    local = cdtool.read(GATE / "stiff" / "03.csv", GATE / "machine.toml")
+    assert remote.name == "03"
+    assert remote["torque"].values.tobytes() == local["torque"].values.tobytes()
