@@ -135,6 +135,9 @@ TimeoutOption = Annotated[
 RetriesOption = Annotated[
     int, typer.Option("--retries", min=0, help="How often a log that took too long or ended its worker is tried again.")
 ]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print the verdict and what is not met; no tables, no progress.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 

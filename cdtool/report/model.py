@@ -196,7 +196,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
     return Model(
         headline=results.conclusion.headline,
         counts=counts_text(evaluated),
-        tone=_tone(results),
+        tone=headline_tone(results),
         scope=tuple(part for part in scope if part),
         reasons=results.conclusion.reasons,
         left_out=f"{counted(lost, 'entry')} of data left out or lost" if lost else "",
@@ -260,7 +260,8 @@ def _groups_note(evaluated: Evaluated) -> str:
     return f"Plotted are the {len(plotted)} of {len(every)} groups with the largest share of missed contacts."
 
 
-def _tone(results: Results) -> str:
+def headline_tone(results: Results) -> str:
+    """Return whether the headline is good, bad or unknown; empty if nothing was required."""
     conclusion = results.conclusion
     if conclusion.outcome == "violated":
         return "bad"
