@@ -37,7 +37,12 @@ if TYPE_CHECKING:
 def benchmark(
     file: Annotated[
         Place,
-        typer.Argument(parser=location, help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE"),
+        typer.Argument(
+            parser=location,
+            help="Benchmark file (TOML); see docs/benchmark-file.md.",
+            metavar="FILE",
+            autocompletion=completions.files(".toml"),
+        ),
     ],
     output: OutputOption = None,
     force: ForceOption = False,

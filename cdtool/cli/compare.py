@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import columns_to_fill, leave, plain, table
 from cdtool.cli.options import ForceOption, JsonOption
 from cdtool.cli.place import Place, location
@@ -23,10 +24,22 @@ _SHOWN = 10
 
 def compare(
     old: Annotated[
-        Place, typer.Argument(parser=location, help="results.json or results.parquet of the old build.", metavar="OLD")
+        Place,
+        typer.Argument(
+            parser=location,
+            help="results.json or results.parquet of the old build.",
+            metavar="OLD",
+            autocompletion=completions.files(".json", ".parquet"),
+        ),
     ],
     new: Annotated[
-        Place, typer.Argument(parser=location, help="results.json or results.parquet of the new build.", metavar="NEW")
+        Place,
+        typer.Argument(
+            parser=location,
+            help="results.json or results.parquet of the new build.",
+            metavar="NEW",
+            autocompletion=completions.files(".json", ".parquet"),
+        ),
     ],
     level: Annotated[
         float, typer.Option("--level", help="Family-wise error rate: chance of any wrong 'worse' or 'better'.")

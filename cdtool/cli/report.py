@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import plain, print_skipped
 from cdtool.cli.options import ForceOption, OutputOption, QuietOption
 from cdtool.cli.place import Place, location
@@ -16,7 +17,12 @@ from cdtool.cli.written_reports import show_results, write_reports
 def report(
     results: Annotated[
         Place,
-        typer.Argument(parser=location, help="results.json or results.parquet of a benchmark.", metavar="RESULTS"),
+        typer.Argument(
+            parser=location,
+            help="results.json or results.parquet of a benchmark.",
+            metavar="RESULTS",
+            autocompletion=completions.files(".json", ".parquet"),
+        ),
     ],
     output: OutputOption = None,
     force: ForceOption = False,

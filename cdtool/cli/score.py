@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import print_skipped, progress
 from cdtool.cli.options import (
     ClusterOption,
@@ -29,11 +30,18 @@ def score(
             parser=location,
             help="CSV with columns recording, time_s and, for several detectors, detector.",
             metavar="TRIGGERS",
+            autocompletion=completions.files(".csv"),
         ),
     ],
     benchmark: Annotated[
         Place,
-        typer.Option("--benchmark", "-b", parser=location, help="Benchmark file: recordings, contacts and rules."),
+        typer.Option(
+            "--benchmark",
+            "-b",
+            parser=location,
+            help="Benchmark file: recordings, contacts and rules.",
+            autocompletion=completions.files(".toml"),
+        ),
     ],
     output: OutputOption = None,
     force: ForceOption = False,

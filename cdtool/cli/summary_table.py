@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cdtool.cli.colour import Toned
-from cdtool.cli.console import fits_terminal, leave, number, plain, say, table
+from cdtool.cli.console import fits_terminal, leave, number, say, table
 from cdtool.cli.truth_shown import show_truth
 from cdtool.exit_status import Fact
 from cdtool.plain_text import counted
@@ -247,16 +247,16 @@ def _show_bounds(evaluated: Evaluated) -> None:
         clean = [item for item in items if item.contacts and not item.missed and not math.isnan(item.missed_at_most)]
         if clean:
             least = max(item.missed_at_most for item in clean)
-            typer.echo(f"{plain(group)}: 0 missed ({_named(clean, items)}) means at most {100.0 * least:.2g} % (95 %)")
+            say(f"{group}: 0 missed ({_named(clean, items)}) means at most {100.0 * least:.2g} % (95 %)")
         quiet = [item for item in items if not item.contacts and not item.false_alarms and item.watched]
         if quiet:
             rate = max(item.at_most_per_operation for item in quiet)
             who = _named(quiet, items)
-            typer.echo(f"{plain(group)}: 0 false alarms ({who}) means at most {rate:.2g} per operation (95 %)")
+            say(f"{group}: 0 false alarms ({who}) means at most {rate:.2g} per operation (95 %)")
 
 
 def _named(some: Sequence[Summary], of: Sequence[Summary]) -> str:
-    return "all detectors" if len(some) == len(of) else plain(", ".join(item.detector for item in some))
+    return "all detectors" if len(some) == len(of) else ", ".join(item.detector for item in some)
 
 
 def _show_forces(results: Any) -> None:
@@ -268,10 +268,11 @@ def _show_forces(results: Any) -> None:
         counts = ", ".join(
             f"{verdicts.count(word)} {word.replace('_', ' ')}" for word in ("pass", "fail", "not_assessable")
         )
-        typer.echo(f"force, {plain(group)}, {plain(profile)}: {counts}")
+        say(f"force, {group}, {profile}: {counts}", tone="bad" if "fail" in verdicts else "")
     for where, item in rows:
         reason = f": {item.reason}" if item.reason else ""
         verdict = item.verdict.replace("_", " ")
-        typer.echo(f"force, {plain(where)}, {plain(item.profile)}: {verdict} ({plain(item.note)}){plain(reason)}")
+        tone = "bad" if item.verdict == "fail" else ""
+        say(f"force, {where}, {item.profile}: {verdict} ({item.note}){reason}", tone=tone)
     if results.forces:
-        typer.echo("force verdicts are evidence about the recordings, not a certificate")
+        say("force verdicts are evidence about the recordings, not a certificate")

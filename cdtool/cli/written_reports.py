@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
     from cdtool.report.writers.base import Report
 
+# Shorter waits do not need a bar [s].
+AFTER_S = 1.0
+
 
 def write_reports(
     report: Report, targets: Sequence[Path], *, force: bool, quiet: bool, inputs: Sequence[Path] = ()
@@ -24,7 +27,7 @@ def write_reports(
     """Write all reports and return what to show; a bar until the last figure is written. Raises CdtoolError."""
     from cdtool.report.outputs import write_outputs
 
-    with nullcontext() if quiet or not targets else late_progress("writing reports") as advance:
+    with nullcontext() if quiet or not targets else late_progress("writing reports", AFTER_S) as advance:
         return write_outputs(report, targets, force=force, inputs=inputs, progress=advance)
 
 
