@@ -145,7 +145,7 @@ def _of_force(items: Sequence[Summary]) -> list[tuple[Column, Callable[[Summary]
 
 
 def comparisons_table(evaluated: Evaluated) -> Table:
-    """Return every pair of detectors on the contacts that both could assess."""
+    """Return the pairs of detectors on the contacts that both could assess, as far as a difference could be shown."""
     results, without = evaluated.results, _without_difference(evaluated.comparisons)
     fields: Fields[tuple[Comparison, str]] = (
         (Column("group", choice=True), lambda pair: name_cell(pair[0].group)),
@@ -159,7 +159,7 @@ def comparisons_table(evaluated: Evaluated) -> Table:
         (Column("missed only by second", numeric=True), lambda pair: count_cell(pair[0].only_second_missed)),
         (Column("p of misses", numeric=True), lambda pair: _p(pair[0].missed_p)),
     )
-    pairs = list(zip(evaluated.comparisons, without, strict=True))
+    pairs = [pair for pair in zip(evaluated.comparisons, without, strict=True) if pair[1] != _TOO_FEW]
     return tabulate("comparisons", "Pairs of detectors on the same contacts", fields, pairs, "contacts")
 
 
@@ -185,6 +185,16 @@ def differences_note(evaluated: Evaluated) -> str:
     of = "" if few == len(comparisons) else f" in {few} of them"
     too_few = f" There are {_TOO_FEW}{of}; recordings of one campaign count as one." if few else ""
     return f"{pairs}; {how}.{none}{too_few}"
+
+
+def too_few_note(evaluated: Evaluated) -> str:
+    """Return how many pairs of detectors could not have shown a difference, which are in no table; empty if none."""
+    few = _without_difference(evaluated.comparisons).count(_TOO_FEW)
+    if not few:
+        return ""
+    of = "" if few == len(evaluated.comparisons) else f" {few} of"
+    pairs = counted(len(evaluated.comparisons), "pair")
+    return f"No difference can be shown between{of} {pairs} of detectors: there are too few recordings of the same contacts."
 
 
 def calibration_table(results: Results) -> Table:
