@@ -48,17 +48,28 @@ function makeForces(data, viewer) {
   makeForceLegend(host, data, detectors);
 }
 
+/** Show the headings of tables as text or as buttons: on later pages a browser repeats headings without buttons. */
+function headingsForPrint() {
+  const buttons = [...document.querySelectorAll("th button")];
+  const words = buttons.map((button) => document.createTextNode(button.textContent));
+  buttons.forEach((button, i) => button.replaceWith(words[i]));
+  return () => buttons.forEach((button, i) => words[i].replaceWith(button));
+}
+
 /** Print collapsed parts, all rows of long tables, and the trigger plots of failed recordings too. */
 function completeForPrint(data, viewer, paged) {
-  let folded = [];
+  let folded = [],
+    restoreHeadings = () => {};
   addEventListener("beforeprint", () => {
     folded = [...document.querySelectorAll("details:not([open])")];
     for (const part of folded) part.open = true;
     for (const table of paged) table.printing(true);
+    restoreHeadings = headingsForPrint();
     if (viewer) printFailed(data, data.failed.map(viewer.traceAt));
   });
   addEventListener("afterprint", () => {
     for (const part of folded) part.open = false;
+    restoreHeadings();
     for (const table of paged) table.printing(false);
     if (viewer) printFailed(data, []);
   });
