@@ -30,6 +30,7 @@ from cdtool.report.tables.results import (
     limits_table,
     part_of,
     results_table,
+    short_results_table,
     too_few_note,
 )
 from cdtool.report.tables.worst_cases import worst_cases_table
@@ -104,6 +105,11 @@ _NOTES = {
         "the detected contacts with its 95 % interval; the median where fewer than ten were detected with or without "
         "the change. After each value: that of the unchanged machine. These recordings count in no other statistic, "
         "and in no limit that does not name them."
+    ),
+    "short_results": (
+        "Median with its 95 % interval if there are enough contacts; missed contacts count as later than all others. "
+        "“At most”: one-sided 95 % bound. Force at alarm: median of the detected contacts. All other values are in “All "
+        "results” below."
     ),
     "provenance": "All results with all their digits, and the hash of every recording, are in results.json.",
 }
@@ -180,6 +186,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         attention_table(results, failed),
         limits_table(results, met=False),
         limits_table(results, met=True),
+        short_results_table(summaries),
         results_table(results, summaries),
         kinds_table(results, evaluated.kinds),
         conditions_table(evaluated),
