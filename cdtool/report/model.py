@@ -108,8 +108,8 @@ _NOTES = {
     ),
     "short_results": (
         "Median with its 95 % interval if there are enough contacts; missed contacts count as later than all others. "
-        "“At most”: one-sided 95 % bound. Force at alarm: median of the detected contacts. All other values are in “All "
-        "results” below."
+        "“At most”: one-sided 95 % bound. Force at alarm: median of the detected contacts. All other values are in "
+        "“All results” below."
     ),
     "provenance": "All results with all their digits, and the hash of every recording, are in results.json.",
 }
