@@ -115,7 +115,7 @@ def _figure(evaluated: Evaluated) -> Figure:
     names = [label(item.detector, 28) for item in summaries]
     axis = _axis_of(list(marks.values()))
     explained = _explained(summaries, list(marks.values()), axis)
-    bottom = 0.33 + 0.175 * len(explained.splitlines())
+    bottom = 0.325 + 0.175 * len(explained.splitlines())
     margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, bottom)
     heights = [_PANEL + _ROW * len(rows[group]) for group in groups]
     figure, panels = stacked_panels(margins.left + 4.4 + margins.right, heights, margins, gap=0.36)
