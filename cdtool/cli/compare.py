@@ -136,8 +136,8 @@ def _show(found: BuildComparison) -> None:
     typer.echo()
     for rows_alike in _alike(found.rows):
         first = rows_alike[0]
-        names = ", ".join(shorten(row.detector, 2 * _LONGEST_DETECTOR) for row in rows_alike)
-        _say(f"{shorten(first.group, 2 * _LONGEST_GROUP)}, {names}: {first.words}", _TONES.get(first.outcome, ""))
+        alike = ", ".join(shorten(row.detector, 2 * _LONGEST_DETECTOR) for row in rows_alike)
+        _say(f"{shorten(first.group, 2 * _LONGEST_GROUP)}, {alike}: {first.words}", _TONES.get(first.outcome, ""))
     typer.echo()
     for item in found.changed[:_SHOWN]:
         _say(f"differs: {item.key}: {item.old}, now {item.new}")

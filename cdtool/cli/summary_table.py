@@ -92,7 +92,7 @@ def show_table(evaluated: Evaluated) -> None:
 def _detector_table(
     columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[Any]], short: Mapping[str, str]
 ) -> set[str]:
-    """Print a table with a detector in its second column; return those shown by their short names for lack of width."""
+    """Print a table with a detector in its second column; return those that have their short names in it."""
     used = set() if fits_terminal(columns, rows) else {row[1] for row in rows} & set(short)
     table(columns, [[row[0], short[row[1]] if row[1] in used else row[1], *row[2:]] for row in rows])
     return used

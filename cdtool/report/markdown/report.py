@@ -18,7 +18,7 @@ _LIMITS_NAMED = 5
 _REASONS_NAMED = 4
 _LONGEST_NAME = 40
 _LONGEST_OUTCOME = 160
-# The model's tables with all other figures, collapsed because they are wider than a comment.
+# The model's tables with all other results, collapsed because they are wider than a comment.
 _DETAILS = ("kinds", "conditions", "injected", "points")
 # The model's tables below the results, collapsed; its tables of the provenance follow.
 _FOLDED = (
