@@ -16,17 +16,20 @@ from cdtool.cli.options import (
     JobsOption,
     JsonOption,
     OutputOption,
+    QuietOption,
     RetriesOption,
     TimeoutOption,
     listed,
 )
 from cdtool.cli.place import Place, location
-from cdtool.cli.summary_table import finish, show_conclusion, show_table
+from cdtool.cli.summary_table import finish
+from cdtool.cli.written_reports import show_results, write_reports
 from cdtool.errors import UsageError
 from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
     from cdtool.evaluation.evaluated import Evaluated
+    from cdtool.workflows.benchmark.stored_outcomes import StoreReport
     from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.store.use import StoreUse
 
@@ -34,7 +37,12 @@ if TYPE_CHECKING:
 def benchmark(
     file: Annotated[
         Place,
-        typer.Argument(parser=location, help="Benchmark file (TOML); see docs/benchmark-file.md.", metavar="FILE"),
+        typer.Argument(
+            parser=location,
+            help="Benchmark file (TOML); see docs/benchmark-file.md.",
+            metavar="FILE",
+            autocompletion=completions.files(".toml"),
+        ),
     ],
     output: OutputOption = None,
     force: ForceOption = False,
@@ -70,6 +78,7 @@ def benchmark(
         bool, typer.Option("--retry-failed", help="With --store: read again what could not be read.")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list which recordings would be computed.")] = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
@@ -79,7 +88,7 @@ def benchmark(
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
     from cdtool.evaluation.results_file import to_json
-    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.outputs import check_outputs
     from cdtool.report.writers.base import Report
     from cdtool.workflows.benchmark.benchmark import benchmark as run
     from cdtool.workflows.execution.workers import Workers
@@ -94,7 +103,7 @@ def benchmark(
         return
     targets = output or []
     check_outputs(targets, force=force)
-    with progress("benchmark") as advance:
+    with progress("benchmark", quiet=quiet) as advance:
         done = run(
             file,
             detectors=_named(detectors),
@@ -103,19 +112,23 @@ def benchmark(
             store=use,
             progress=advance,
         )
-    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
+    report = Report(done.evaluated, done.traces)
+    written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
         typer.echo(to_json(done.results), nl=False)
     else:
-        _show_agreement(done.evaluated)
-        show_conclusion(done.evaluated)
-        show_table(done.evaluated)
-        if done.stored is not None:
-            typer.echo(f"store: {counted(done.stored.computed, 'recording')} computed, {done.stored.reused} as stored")
-        for path in written:
-            typer.echo(f"written: {plain(path)}")
+        if not quiet:
+            _show_agreement(done.evaluated)
+        show_results(done.evaluated, written, quiet=quiet, more=_stored(done.stored))
     finish(done.evaluated)
+
+
+def _stored(outcomes: StoreReport | None) -> list[str]:
+    """Return how many recordings were computed, if outcomes are kept in a store."""
+    if outcomes is None:
+        return []
+    return [f"store: {counted(outcomes.computed, 'recording')} computed, {outcomes.reused} as stored"]
 
 
 def _show_agreement(evaluated: Evaluated) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.cli.console import columns_to_fill, leave, plain, table
+from cdtool.cli import completions
+from cdtool.cli.colour import coloured, shows_colour
+from cdtool.cli.console import columns_to_fill, fits_terminal, leave, plain, table
 from cdtool.cli.options import ForceOption, JsonOption
 from cdtool.cli.place import Place, location
 from cdtool.exit_status import Fact
@@ -16,17 +19,32 @@ from cdtool.plain_text import shorten
 if TYPE_CHECKING:
     from cdtool.evaluation.builds.comparison import BuildComparison
     from cdtool.evaluation.builds.questions import Figure
+    from cdtool.evaluation.builds.rows import BuildRow
 
 _LONGEST_GROUP, _LONGEST_DETECTOR = 11, 17
 _SHOWN = 10
+# The colours of outcomes.
+_TONES = {"worse": "bad", "mixed": "bad", "better": "good", "inconclusive": "unknown"}
 
 
 def compare(
     old: Annotated[
-        Place, typer.Argument(parser=location, help="results.json or results.parquet of the old build.", metavar="OLD")
+        Place,
+        typer.Argument(
+            parser=location,
+            help="results.json or results.parquet of the old build.",
+            metavar="OLD",
+            autocompletion=completions.files(".json", ".parquet"),
+        ),
     ],
     new: Annotated[
-        Place, typer.Argument(parser=location, help="results.json or results.parquet of the new build.", metavar="NEW")
+        Place,
+        typer.Argument(
+            parser=location,
+            help="results.json or results.parquet of the new build.",
+            metavar="NEW",
+            autocompletion=completions.files(".json", ".parquet"),
+        ),
     ],
     level: Annotated[
         float, typer.Option("--level", help="Family-wise error rate: chance of any wrong 'worse' or 'better'.")
@@ -84,6 +102,7 @@ def compare(
 
 def _show(found: BuildComparison) -> None:
     """Print what is missing from one file, the numbers, each row in words, the differences, and the verdict."""
+    from cdtool.detectors import DETECTORS
     from cdtool.report.comparison_model import both, contacts_of, ranges_of
     from cdtool.report.few_contacts import EXPLAINED
     from cdtool.report.number_text import NOTHING
@@ -105,13 +124,20 @@ def _show(found: BuildComparison) -> None:
         )
         for row in found.rows
     ]
-    table(columns, [[cell.replace(NOTHING, "-") for cell in row] for row in rows])
+    cells = [[cell.replace(NOTHING, "-") for cell in row] for row in rows]
+    short = {} if fits_terminal(columns, cells) else {name: brief for brief, name in DETECTORS.short_names.items()}
+    table(columns, [[row[0], short.get(row[1], row[1]), *row[2:]] for row in cells])
+    used = {name: short[name] for name in dict.fromkeys(row.detector for row in found.rows) if name in short}
+    if used:
+        _say("; ".join(f"{brief}: {name}" for name, brief in used.items()))
     _say("old / new; contacts: the same number in both unless two are given; n.a.: not assessable")
     if any(row.few for row in found.rows):
         _say(EXPLAINED)
     typer.echo()
-    for row in found.rows:
-        _say(f"{shorten(row.group, 2 * _LONGEST_GROUP)}, {shorten(row.detector, 2 * _LONGEST_DETECTOR)}: {row.words}")
+    for rows_alike in _alike(found.rows):
+        first = rows_alike[0]
+        alike = ", ".join(shorten(row.detector, 2 * _LONGEST_DETECTOR) for row in rows_alike)
+        _say(f"{shorten(first.group, 2 * _LONGEST_GROUP)}, {alike}: {first.words}", _TONES.get(first.outcome, ""))
     typer.echo()
     for item in found.changed[:_SHOWN]:
         _say(f"differs: {item.key}: {item.old}, now {item.new}")
@@ -119,10 +145,18 @@ def _show(found: BuildComparison) -> None:
         _say(f"differs: and {len(found.changed) - _SHOWN} more settings")
     for note in found.notes:
         _say(note)
-    _say(found.words)
+    _say(found.words, _TONES.get(found.verdict, ""))
 
 
-def _say(text: str) -> None:
+def _alike(rows: Sequence[BuildRow]) -> list[list[BuildRow]]:
+    """Return the rows of each group with the same words: they are printed once."""
+    found: dict[tuple[str, str], list[BuildRow]] = {}
+    for row in rows:
+        found.setdefault((row.group, row.words), []).append(row)
+    return list(found.values())
+
+
+def _say(text: str, tone: str = "") -> None:
     """Print a sentence in lines that fit the terminal; longer names are split over several lines."""
-    for line in wrap(plain(text), columns_to_fill(), subsequent_indent="  "):
-        typer.echo(line)
+    for line in wrap(plain(text), columns_to_fill(), subsequent_indent="  ", break_on_hyphens=False):
+        typer.echo(coloured(line, tone), color=shows_colour())

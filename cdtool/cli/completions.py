@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 
 Complete = Callable[[str], list[str]]
+
+# So many folders, each the only entry of the one above, are entered at once.
+_DEEPEST = 20
 
 
 def detectors(incomplete: str) -> list[str]:
@@ -16,8 +20,12 @@ def detectors(incomplete: str) -> list[str]:
 
 def detector_list(incomplete: str) -> list[str]:
     """Return the completions of the last name of a comma-separated list of detectors."""
-    before, comma, last = incomplete.rpartition(",")
-    return [f"{before}{comma}{name}" for name in detectors(last) if name not in before.split(",")]
+    return _last_of_list(incomplete, detectors)
+
+
+def threshold_list(incomplete: str) -> list[str]:
+    """Return the completions of the last name of a comma-separated list of thresholds."""
+    return _last_of_list(incomplete, thresholds)
 
 
 def thresholds(incomplete: str) -> list[str]:
@@ -58,6 +66,45 @@ def alignments(incomplete: str) -> list[str]:
 def one_of(known: Iterable[str]) -> Complete:
     """Return the completion of one of the known values."""
     return lambda incomplete: _beginning(incomplete, known)
+
+
+def files(*suffixes: str) -> Complete:
+    """Return the completion of files with these suffixes and of folders; a folder without a choice is entered.
+
+    Nothing for an address such as s3://: a network is not asked while a key is pressed. Without a match a shell
+    completes any file.
+    """
+    return lambda incomplete: [] if "://" in incomplete else _paths(incomplete, suffixes)
+
+
+def _paths(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
+    for _ in range(_DEEPEST):
+        folder, separator, typed = incomplete.rpartition("/")
+        base = f"{folder}{separator}"
+        try:
+            with os.scandir(base or ".") as entries:
+                found = [
+                    f"{base}{entry.name}{'/' * _is_folder(entry, suffixes)}"
+                    for entry in entries
+                    if entry.name.startswith(typed) and (typed.startswith(".") or not entry.name.startswith("."))
+                    if entry.name.lower().endswith(suffixes) or entry.is_dir()
+                ]
+        except OSError:
+            return []
+        if len(found) != 1 or not found[0].endswith("/"):
+            return sorted(found)
+        incomplete = found[0]
+    return [incomplete]
+
+
+def _is_folder(entry: os.DirEntry[str], suffixes: tuple[str, ...]) -> bool:
+    """Return whether a folder is entered; results.parquet is named as it is."""
+    return entry.is_dir() and not entry.name.lower().endswith(suffixes)
+
+
+def _last_of_list(incomplete: str, complete: Complete) -> list[str]:
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in complete(last) if name not in before.split(",")]
 
 
 def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:

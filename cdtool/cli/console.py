@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cdtool.cli.colour import coloured, shows_colour, style_of
 from cdtool.errors import CdtoolError
 from cdtool.exit_status import Fact, status_of
 from cdtool.plain_text import LINE_LENGTH, counted, one_line, shorten, shorten_names
@@ -127,8 +128,8 @@ def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
     return facts
 
 
-def say(text: str, indent: str = "") -> None:
-    """Print a sentence to stdout in lines that fit the terminal; names are not split."""
+def say(text: str, indent: str = "", tone: str = "") -> None:
+    """Print a sentence to stdout in lines that fit the terminal; names are not split. `tone`: its colour."""
     lines = fill(
         plain(text),
         columns_to_fill(),
@@ -137,7 +138,7 @@ def say(text: str, indent: str = "") -> None:
         break_long_words=False,
         break_on_hyphens=False,
     )
-    typer.echo(lines)
+    typer.echo(coloured(lines, tone), color=shows_colour())
 
 
 def columns_to_fill() -> int:
@@ -148,7 +149,7 @@ def columns_to_fill() -> int:
 
 
 def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], title: str = "") -> None:
-    """Print a table: columns as (heading, "left" or "right"); cells are plain text; an empty column is left out.
+    """Print a table: columns as (heading, "left" or "right"); cells are text or `Toned`; an empty column is left out.
 
     The first left-aligned columns name a row. Columns that do not fit follow below, with the names repeated.
     """
@@ -159,33 +160,46 @@ def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], 
     kept = [i for i in range(len(columns)) if not rows or any(str(row[i]) for row in rows)]
     shown = [columns[i] for i in kept]
     cells = [[plain(row[i]) for i in kept] for row in rows]
-    first = next((i for i, (_, side) in enumerate(shown) if side == "right"), len(shown))
-    widths = [
-        column_width(heading, side, [row[i] for row in cells], i < first) for i, (heading, side) in enumerate(shown)
-    ]
-    # A pipe or a log file has no width: columns are neither folded nor moved there.
-    is_terminal = sys.stdout.isatty()
-    width = (
-        max(shutil.get_terminal_size().columns, _NARROWEST)
-        if is_terminal
-        else max(_PIPE, sum(item.needed + _GAP for item in widths))
-    )
+    styles = [[style_of(row[i]) for i in kept] for row in rows]
+    widths = _widths(shown, cells)
+    width = _room(widths)
     for number, block in enumerate(column_blocks(widths, width)):
         made: Table = RichTable(
             box=None, title=title or None, title_justify="left", title_style="bold", padding=(0, _GAP, 0, 0)
         )
-        fits = sum(widths[i].needed + _GAP for i in block) <= width
+        made.pad_edge = False
+        fits = sum(widths[i].needed + _GAP for i in block) <= width + _GAP
         for i in block:
             heading, side = shown[i]
             is_right = side == "right"
             made.add_column(
                 heading, justify="right" if is_right else "left", overflow="fold", no_wrap=fits and _stays(widths[i])
             )
-        for row in cells:
-            made.add_row(*(Text(row[i]) for i in block))
+        for row, looks in zip(cells, styles, strict=True):
+            made.add_row(*(Text(row[i], style=looks[i]) for i in block))
         if number:
             typer.echo()
-        Console(width=width, highlight=False).print(made)
+        Console(width=width, highlight=False, no_color=not shows_colour()).print(made)
+
+
+def fits_terminal(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]]) -> bool:
+    """Return whether `table` shows all columns side by side; always without a terminal."""
+    widths = _widths(columns, [[plain(cell) for cell in row] for row in rows])
+    return len(column_blocks(widths, _room(widths))) == 1
+
+
+def _widths(columns: Sequence[tuple[str, str]], cells: Sequence[Sequence[str]]) -> list[ColumnWidth]:
+    first = next((i for i, (_, side) in enumerate(columns) if side == "right"), len(columns))
+    return [
+        column_width(heading, side, [row[i] for row in cells], i < first) for i, (heading, side) in enumerate(columns)
+    ]
+
+
+def _room(widths: Sequence[ColumnWidth]) -> int:
+    """Return the width of the terminal. A pipe or a log file has none: columns are neither folded nor moved there."""
+    if sys.stdout.isatty():
+        return max(shutil.get_terminal_size().columns, _NARROWEST)
+    return max(_PIPE, sum(item.needed + _GAP for item in widths))
 
 
 def _stays(column: ColumnWidth) -> bool:
@@ -202,13 +216,13 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 @contextmanager
-def progress(what: str, *, pulses: bool = False) -> Iterator[Progress | None]:
-    """Show a progress bar on stderr; yield None and draw nothing if stderr is not a terminal.
+def progress(what: str, *, pulses: bool = False, quiet: bool = False) -> Iterator[Progress | None]:
+    """Show a progress bar on stderr; yield None and draw nothing if stderr is not a terminal, or if `quiet`.
 
     `pulses`: it moves while the total is unknown, drawn by a thread. Otherwise it is drawn only as the work advances:
     with another thread in this process, the processes of --jobs could not be forked (workflows/execution/processes.py).
     """
-    if not sys.stderr.isatty():
+    if quiet or not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
@@ -266,7 +280,7 @@ def column_blocks(columns: Sequence[ColumnWidth], width: int) -> list[list[int]]
             continue
         if not made or column.needed + _GAP > room:
             made.append(list(names))
-            room = width - base
+            room = width + _GAP - base  # no gap follows the last column
         made[-1].append(i)
         room -= column.needed + _GAP
     return made or [list(names)]

@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 def coverage(
     file: Annotated[
         Place,
-        typer.Argument(parser=location, help="Benchmark file with a section [inject]; see docs/injection.md."),
+        typer.Argument(
+            parser=location,
+            help="Benchmark file with a section [inject]; see docs/injection.md.",
+            autocompletion=completions.files(".toml"),
+        ),
     ],
     output: Annotated[
         list[Place] | None,

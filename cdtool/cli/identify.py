@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
 from cdtool.cli.options import ForceOption, JobsOption, JsonOption
 from cdtool.cli.place import Place, location
@@ -34,7 +35,12 @@ def identify(
     logs: Annotated[
         list[str], typer.Argument(help="Impact-free logs; patterns such as free/*.csv are allowed.", metavar="LOGS...")
     ],
-    machine: Annotated[Place, typer.Option("--machine", "-m", parser=location, help="Machine file.")],
+    machine: Annotated[
+        Place,
+        typer.Option(
+            "--machine", "-m", parser=location, help="Machine file.", autocompletion=completions.files(".toml")
+        ),
+    ],
     output: Annotated[
         list[Place] | None,
         typer.Option(

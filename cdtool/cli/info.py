@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import leave_with, number, plain, print_error, print_json, table, with_findings
 from cdtool.cli.options import JsonOption
 from cdtool.cli.place import Place, location
@@ -22,7 +23,13 @@ def info(
     ],
     machine: Annotated[
         Place | None,
-        typer.Option("--machine", "-m", parser=location, help="Machine file: map the channels and check them."),
+        typer.Option(
+            "--machine",
+            "-m",
+            parser=location,
+            help="Machine file: map the channels and check them.",
+            autocompletion=completions.files(".toml"),
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
 from cdtool.cli.options import ClusterOption, JobsOption, JsonOption, RetriesOption, TimeoutOption
 from cdtool.cli.place import Place, location
@@ -15,11 +16,20 @@ from cdtool.plain_text import counted
 def inject(
     file: Annotated[
         Place,
-        typer.Argument(parser=location, help="Benchmark file with a section [inject]; see docs/injection.md."),
+        typer.Argument(
+            parser=location,
+            help="Benchmark file with a section [inject]; see docs/injection.md.",
+            autocompletion=completions.files(".toml"),
+        ),
     ],
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Output folder, new or empty.")],
     file_format: Annotated[
-        str | None, typer.Option("--format", help="csv, mcap, parquet, feather, h5, mf4 or tdms; csv has one clock.")
+        str | None,
+        typer.Option(
+            "--format",
+            help="csv, mcap, parquet, feather, h5, mf4 or tdms; csv has one clock.",
+            autocompletion=completions.one_of(("csv", "mcap", "parquet", "feather", "h5", "mf4", "tdms")),
+        ),
     ] = None,
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,

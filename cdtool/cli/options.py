@@ -16,10 +16,24 @@ if TYPE_CHECKING:
     from cdtool.log_section import LogSection
 
 MachineOption = Annotated[
-    Place, typer.Option("--machine", "-m", parser=location, help="Machine file (TOML); see docs/machine-file.md.")
+    Place,
+    typer.Option(
+        "--machine",
+        "-m",
+        parser=location,
+        help="Machine file (TOML); see docs/machine-file.md.",
+        autocompletion=completions.files(".toml"),
+    ),
 ]
 MachineUnlessBenchmarkOption = Annotated[
-    Place | None, typer.Option("--machine", "-m", parser=location, help="Machine file (TOML); not with --benchmark.")
+    Place | None,
+    typer.Option(
+        "--machine",
+        "-m",
+        parser=location,
+        help="Machine file (TOML); not with --benchmark.",
+        autocompletion=completions.files(".toml"),
+    ),
 ]
 OperationsOption = Annotated[
     str,
@@ -46,7 +60,14 @@ HysteresisOption = Annotated[
 ]
 LatchOption = Annotated[bool | None, typer.Option("--latch/--no-latch", help="Keep an alarm until its operation ends.")]
 SignatureOption = Annotated[
-    Place | None, typer.Option("--signature", "-s", parser=location, help="Signature file from cdtool learn-signature.")
+    Place | None,
+    typer.Option(
+        "--signature",
+        "-s",
+        parser=location,
+        help="Signature file from cdtool learn-signature.",
+        autocompletion=completions.files(".json"),
+    ),
 ]
 LimitOption = Annotated[
     str, typer.Option("--limit", help="Fixed limit of |signal| instead: one value, or one per joint, as 40,inf,40.")
@@ -71,6 +92,7 @@ BenchmarkOption = Annotated[
         "-b",
         parser=location,
         help="Benchmark file: machine, threshold, onset, window and all other settings are read from it.",
+        autocompletion=completions.files(".toml"),
     ),
 ]
 OnsetAboveOption = Annotated[
@@ -92,7 +114,12 @@ OnsetSeparationOption = Annotated[
 ]
 LabelsOption = Annotated[
     Place | None,
-    typer.Option("--labels", parser=location, help="Label file (CSV) with the contacts; replaces the load cell."),
+    typer.Option(
+        "--labels",
+        parser=location,
+        help="Label file (CSV) with the contacts; replaces the load cell.",
+        autocompletion=completions.files(".csv"),
+    ),
 ]
 LabelsClockOption = Annotated[
     Literal["recording", "source"] | None,
@@ -134,6 +161,9 @@ TimeoutOption = Annotated[
 ]
 RetriesOption = Annotated[
     int, typer.Option("--retries", min=0, help="How often a log that took too long or ended its worker is tried again.")
+]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print the verdict and what is not met; no tables, no progress.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import plain, print_json
 from cdtool.cli.options import JsonOption, listed
 from cdtool.cli.place import Place, location
@@ -23,13 +24,18 @@ def plan(
     source: Annotated[
         Place | None,
         typer.Option(
-            "--from", parser=location, help="Take the standard deviation from results.json of an earlier test."
+            "--from",
+            parser=location,
+            help="Take the standard deviation from results.json of an earlier test.",
+            autocompletion=completions.files(".json", ".parquet"),
         ),
     ] = None,
     detectors: Annotated[
         str,
         typer.Option(
-            "--detectors", help="With --from: the two detectors to compare, as feekf,gm; unpaired: one or two."
+            "--detectors",
+            help="With --from: the two detectors to compare, as feekf,gm; unpaired: one or two.",
+            autocompletion=completions.detector_list,
         ),
     ] = "",
     group: Annotated[str, typer.Option("--group", help="With --from: the group of impacts.")] = "",

@@ -6,19 +6,27 @@ from typing import Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import plain, print_skipped
-from cdtool.cli.options import ForceOption, OutputOption
+from cdtool.cli.options import ForceOption, OutputOption, QuietOption
 from cdtool.cli.place import Place, location
-from cdtool.cli.summary_table import finish, show_conclusion, show_table
+from cdtool.cli.summary_table import finish
+from cdtool.cli.written_reports import show_results, write_reports
 
 
 def report(
     results: Annotated[
         Place,
-        typer.Argument(parser=location, help="results.json or results.parquet of a benchmark.", metavar="RESULTS"),
+        typer.Argument(
+            parser=location,
+            help="results.json or results.parquet of a benchmark.",
+            metavar="RESULTS",
+            autocompletion=completions.files(".json", ".parquet"),
+        ),
     ],
     output: OutputOption = None,
     force: ForceOption = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Write the reports of a benchmark again, without its recordings.
 
@@ -27,7 +35,7 @@ def report(
 
     Example: cdtool report results.json -o report.html -o summary.md -o junit.xml
     """
-    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.outputs import check_outputs
     from cdtool.report.writers.base import Report
     from cdtool.workflows.reporting import load_report
 
@@ -36,10 +44,7 @@ def report(
     evaluated, traces, note = load_report(results)
     if note:
         typer.echo(f"note: {plain(note)}", err=True)
-    written = write_outputs(Report(evaluated, traces), targets, force=force)
+    written = write_reports(Report(evaluated, traces), targets, force=force, quiet=quiet)
     print_skipped(evaluated.results.skipped, evaluated.results.findings)
-    show_conclusion(evaluated)
-    show_table(evaluated)
-    for path in written:
-        typer.echo(f"written: {plain(path)}")
+    show_results(evaluated, written, quiet=quiet)
     finish(evaluated)

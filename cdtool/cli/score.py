@@ -6,18 +6,21 @@ from typing import Annotated, Literal
 
 import typer
 
-from cdtool.cli.console import plain, print_skipped, progress
+from cdtool.cli import completions
+from cdtool.cli.console import print_skipped, progress
 from cdtool.cli.options import (
     ClusterOption,
     ForceOption,
     JobsOption,
     JsonOption,
     OutputOption,
+    QuietOption,
     RetriesOption,
     TimeoutOption,
 )
 from cdtool.cli.place import Place, location
-from cdtool.cli.summary_table import finish, show_conclusion, show_table
+from cdtool.cli.summary_table import finish
+from cdtool.cli.written_reports import show_results, write_reports
 
 
 def score(
@@ -27,11 +30,18 @@ def score(
             parser=location,
             help="CSV with columns recording, time_s and, for several detectors, detector.",
             metavar="TRIGGERS",
+            autocompletion=completions.files(".csv"),
         ),
     ],
     benchmark: Annotated[
         Place,
-        typer.Option("--benchmark", "-b", parser=location, help="Benchmark file: recordings, contacts and rules."),
+        typer.Option(
+            "--benchmark",
+            "-b",
+            parser=location,
+            help="Benchmark file: recordings, contacts and rules.",
+            autocompletion=completions.files(".toml"),
+        ),
     ],
     output: OutputOption = None,
     force: ForceOption = False,
@@ -48,6 +58,7 @@ def score(
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
     retries: RetriesOption = 1,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Score the trigger times of any controller or program by the same rules as `cdtool benchmark`.
@@ -55,7 +66,7 @@ def score(
     Example: cdtool score triggers.csv --benchmark sample_logs/gate/benchmark.toml -o report.html
     """
     from cdtool.evaluation.results_file import to_json
-    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.outputs import check_outputs
     from cdtool.report.writers.base import Report
     from cdtool.workflows.execution.workers import Workers
     from cdtool.workflows.score_triggers import score as run
@@ -63,16 +74,14 @@ def score(
     workers = Workers(jobs, timeout, retries, cluster)
     targets = output or []
     check_outputs(targets, force=force)
-    with progress("scoring") as advance:
+    with progress("scoring", quiet=quiet) as advance:
         done = run(triggers, benchmark, clock=clock, listed_only=listed_only, workers=workers, progress=advance)
     results = done.evaluated.results
-    written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
+    report = Report(done.evaluated, done.traces)
+    written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
     print_skipped(results.skipped, results.findings)
     if as_json:
         typer.echo(to_json(results), nl=False)
     else:
-        show_conclusion(done.evaluated)
-        show_table(done.evaluated)
-        for path in written:
-            typer.echo(f"written: {plain(path)}")
+        show_results(done.evaluated, written, quiet=quiet)
     finish(done.evaluated)

@@ -54,7 +54,13 @@ def _signature() -> None:
 
 
 FileArgument = Annotated[
-    Place, typer.Argument(parser=location, help="Signature file from cdtool learn-signature.", metavar="SIGNATURE")
+    Place,
+    typer.Argument(
+        parser=location,
+        help="Signature file from cdtool learn-signature.",
+        metavar="SIGNATURE",
+        autocompletion=completions.files(".json"),
+    ),
 ]
 CutOption = Annotated[
     str | None,

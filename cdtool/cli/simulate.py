@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from cdtool.cli import completions
 from cdtool.cli.console import plain, print_json, progress
 from cdtool.cli.options import JsonOption
 from cdtool.cli.place import Place, location
@@ -35,7 +36,14 @@ HoldoutOption = Annotated[int, typer.Option("--holdout", min=0, max=_MOST, help=
 StiffOption = Annotated[int, typer.Option("--stiff", min=0, max=_MOST, help="Impacts on the bare load cell.")]
 SoftOption = Annotated[int, typer.Option("--soft", min=0, max=_MOST, help="Impacts with a rubber bumper.")]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same bytes.")]
-FormatOption = Annotated[str, typer.Option("--format", help="csv, mcap, or mixed (two logs per group as MCAP).")]
+FormatOption = Annotated[
+    str,
+    typer.Option(
+        "--format",
+        help="csv, mcap, or mixed (two logs per group as MCAP).",
+        autocompletion=completions.one_of(_FORMATS),
+    ),
+]
 ReferenceOption = Annotated[
     bool, typer.Option("--reference/--no-reference", help="Also log the references: speed, and torque or position.")
 ]

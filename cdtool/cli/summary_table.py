@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cdtool.cli.console import leave, number, plain, say, table
+from cdtool.cli.colour import Toned
+from cdtool.cli.console import fits_terminal, leave, number, say, table
 from cdtool.cli.truth_shown import show_truth
 from cdtool.exit_status import Fact
 from cdtool.plain_text import counted
@@ -43,6 +44,7 @@ def show_table(evaluated: Evaluated) -> None:
     from cdtool.evaluation.conclusion import partly_unassessed
     from cdtool.evaluation.results import onset_words
     from cdtool.report.few_contacts import explained, latency_columns
+    from cdtool.report.tables.results import part_of
 
     shown = latency_columns(evaluated.summaries)
     bounded = any(item.few and not math.isnan(item.median.low) for item in evaluated.summaries)
@@ -50,11 +52,14 @@ def show_table(evaluated: Evaluated) -> None:
     columns = [("group", "left"), ("detector", "left")]
     names = (*(headings[name] for name in shown), "n", "missed", "n.a.", "false\nalarms", "ops")
     columns += [(name, "right") for name in names]
-    table(columns, [_row(item, shown) for item in evaluated.summaries])
+    short = part_of(evaluated.results.provenance, "short_names")
+    used = _detector_table(columns, [_row(item, shown) for item in evaluated.summaries], short)
     if evaluated.kinds:
-        _show_kinds(evaluated.kinds)
+        used |= _show_kinds(evaluated.kinds, short)
     if evaluated.conditions:
-        _show_conditions(evaluated)
+        used |= _show_conditions(evaluated, short)
+    if used:
+        say("; ".join(f"{short[name]}: {name}" for name in evaluated.results.detectors if name in used))
     provenance = evaluated.results.provenance
     # Mean and spread are those of the detected contacts.
     *most, last = (name for name in shown if name in ("median", "range", "P95"))
@@ -84,17 +89,27 @@ def show_table(evaluated: Evaluated) -> None:
     _show_forces(evaluated.results)
 
 
-def _show_kinds(kinds: Sequence[Summary]) -> None:
+def _detector_table(
+    columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[Any]], short: Mapping[str, str]
+) -> set[str]:
+    """Print a table with a detector in its second column; return those that have their short names in it."""
+    used = set() if fits_terminal(columns, rows) else {row[1] for row in rows} & set(short)
+    table(columns, [[row[0], short[row[1]] if row[1] in used else row[1], *row[2:]] for row in rows])
+    return used
+
+
+def _show_kinds(kinds: Sequence[Summary], short: Mapping[str, str]) -> set[str]:
     """Print one row per detector and kind of contact; false alarms belong to no kind."""
     from cdtool.report.few_contacts import latency_columns
 
     shown = latency_columns(kinds)
     columns = [("group/kind", "left"), ("detector", "left")]
     columns += [(name, "right") for name in (*(_HEADINGS[name] for name in shown), "n", "missed", "n.a.")]
-    table(columns, [_row(item, shown)[:-2] for item in kinds])
+    typer.echo()
+    return _detector_table(columns, [_row(item, shown)[:-2] for item in kinds], short)
 
 
-def _show_conditions(evaluated: Evaluated) -> None:
+def _show_conditions(evaluated: Evaluated, short: Mapping[str, str]) -> set[str]:
     """Print one row per changed condition and detector, each value with that of the unchanged machine in brackets."""
     from cdtool.report.tables.conditions import conditions_table
 
@@ -104,32 +119,37 @@ def _show_conditions(evaluated: Evaluated) -> None:
         for column in found.columns
     ]
     rows = [[_with_unchanged(cell) for cell in row] for row in found.rows]
-    table([columns[1], columns[0], *columns[2:]], [[row[1], row[0], *row[2:]] for row in rows])
+    names = [row[0].text for row in found.rows]
+    ordered = [[row[1], name, *row[2:]] for row, name in zip(rows, names, strict=True)]
+    typer.echo()
+    used = _detector_table([columns[1], columns[0], *columns[2:]], ordered, short)
     say(
         "changed conditions, in brackets the unchanged machine; alarming: impact-free operations with a false alarm; "
         "ms: mean latency, or the median where fewer than ten contacts were detected; n.a.: not assessable"
     )
+    return used
 
 
-def _with_unchanged(cell: Cell) -> str:
+def _with_unchanged(cell: Cell) -> Toned | str:
     """Return the text of a cell and, in brackets, the value of the unchanged machine."""
     before = next((detail.removeprefix(_UNCHANGED) for detail in cell.details if detail.startswith(_UNCHANGED)), "")
-    return f"{cell.text} ({before})" if before else cell.text
+    text = f"{cell.text} ({before})" if before else cell.text
+    return Toned(text, cell.tone) if cell.tone else text
 
 
 def show_conclusion(evaluated: Evaluated) -> None:
     """Print the conclusion, then limits, force profiles and contacts with a problem."""
-    from cdtool.report.model import counts_text
+    from cdtool.report.model import counts_text, headline_tone
 
     conclusion = evaluated.results.conclusion
-    say(conclusion.headline)
+    tone = headline_tone(evaluated.results)
+    say(conclusion.headline, tone=tone)
     say(counts_text(evaluated), indent="  ")
     for reason in conclusion.reasons[:_SHOWN]:
-        say(reason, indent="  ")
+        say(reason, indent="  ", tone="unknown" if tone == "unknown" else "bad")
     if len(conclusion.reasons) > _SHOWN:
         typer.echo(f"  and {len(conclusion.reasons) - _SHOWN} more")
     _show_limits(evaluated)
-    typer.echo()
 
 
 def _show_limits(evaluated: Evaluated) -> None:
@@ -143,7 +163,8 @@ def _show_limits(evaluated: Evaluated) -> None:
     for item in failed[:_SHOWN]:
         name = f"{item.detector}.{item.group}.{item.figure}"
         outcome = item.outcome.replace("_", " ")
-        say(f"limit {outcome}: {name}: {item.reason} (limit {item.limit})", indent="  ")
+        tone = "bad" if item.outcome == "violated" else "unknown"
+        say(f"limit {outcome}: {name}: {item.reason} (limit {item.limit})", indent="  ", tone=tone)
     if len(failed) > _SHOWN:
         typer.echo(f"  limits not met: and {len(failed) - _SHOWN} more")
 
@@ -162,8 +183,8 @@ def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
         item.detector,
         *(_latency(item, column) for column in shown),
         item.detected,
-        item.missed if item.assessable else "-",
-        item.not_assessable,
+        _counted(item.missed, "bad") if item.assessable else "-",
+        _counted(item.not_assessable, "unknown"),
         _false_alarms(item),
         item.operations,
     )
@@ -194,9 +215,14 @@ def _what(item: CalibrationResult) -> str:
     return "false alarms in" if item.budget.endswith("h") else "alarming of"
 
 
-def _false_alarms(item: Summary) -> int | str:
+def _false_alarms(item: Summary) -> Toned | int | str:
     """Return the false alarms, or a dash if the detector could not assess anything."""
-    return item.false_alarms if item.watched else "-"
+    return _counted(item.false_alarms, "bad") if item.watched else "-"
+
+
+def _counted(count: int, tone: str) -> Toned | int:
+    """Return a number that has a tone unless it is 0."""
+    return Toned(count, tone) if count else 0
 
 
 def interval(item: Interval) -> str:
@@ -221,16 +247,16 @@ def _show_bounds(evaluated: Evaluated) -> None:
         clean = [item for item in items if item.contacts and not item.missed and not math.isnan(item.missed_at_most)]
         if clean:
             least = max(item.missed_at_most for item in clean)
-            typer.echo(f"{plain(group)}: 0 missed ({_named(clean, items)}) means at most {100.0 * least:.2g} % (95 %)")
+            say(f"{group}: 0 missed ({_named(clean, items)}) means at most {100.0 * least:.2g} % (95 %)")
         quiet = [item for item in items if not item.contacts and not item.false_alarms and item.watched]
         if quiet:
             rate = max(item.at_most_per_operation for item in quiet)
             who = _named(quiet, items)
-            typer.echo(f"{plain(group)}: 0 false alarms ({who}) means at most {rate:.2g} per operation (95 %)")
+            say(f"{group}: 0 false alarms ({who}) means at most {rate:.2g} per operation (95 %)")
 
 
 def _named(some: Sequence[Summary], of: Sequence[Summary]) -> str:
-    return "all detectors" if len(some) == len(of) else plain(", ".join(item.detector for item in some))
+    return "all detectors" if len(some) == len(of) else ", ".join(item.detector for item in some)
 
 
 def _show_forces(results: Any) -> None:
@@ -242,10 +268,11 @@ def _show_forces(results: Any) -> None:
         counts = ", ".join(
             f"{verdicts.count(word)} {word.replace('_', ' ')}" for word in ("pass", "fail", "not_assessable")
         )
-        typer.echo(f"force, {plain(group)}, {plain(profile)}: {counts}")
+        say(f"force, {group}, {profile}: {counts}", tone="bad" if "fail" in verdicts else "")
     for where, item in rows:
         reason = f": {item.reason}" if item.reason else ""
         verdict = item.verdict.replace("_", " ")
-        typer.echo(f"force, {plain(where)}, {plain(item.profile)}: {verdict} ({plain(item.note)}){plain(reason)}")
+        tone = "bad" if item.verdict == "fail" else ""
+        say(f"force, {where}, {item.profile}: {verdict} ({item.note}){reason}", tone=tone)
     if results.forces:
-        typer.echo("force verdicts are evidence about the recordings, not a certificate")
+        say("force verdicts are evidence about the recordings, not a certificate")

@@ -22,7 +22,12 @@ _SHOWN = 110
 
 def tune(
     file: Annotated[
-        Place, typer.Argument(parser=location, help="Benchmark file with [learn] and [impacts] or [inject].")
+        Place,
+        typer.Argument(
+            parser=location,
+            help="Benchmark file with [learn] and [impacts] or [inject].",
+            autocompletion=completions.files(".toml"),
+        ),
     ],
     false_alarm_budget: Annotated[
         str,
@@ -43,13 +48,27 @@ def tune(
     ] = None,
     thresholds: Annotated[
         str | None,
-        typer.Option("--thresholds", help="Thresholds to try, as signature,glr. Default: all."),
+        typer.Option(
+            "--thresholds",
+            help="Thresholds to try, as signature,glr. Default: all.",
+            autocompletion=completions.threshold_list,
+        ),
     ] = None,
     objective: Annotated[
-        str, typer.Option("--objective", help="latency (mean), p95, or force (mean force at the alarm).")
+        str,
+        typer.Option(
+            "--objective",
+            help="latency (mean), p95, or force (mean force at the alarm).",
+            autocompletion=completions.one_of(("latency", "p95", "force")),
+        ),
     ] = "latency",
     impacts: Annotated[
-        str | None, typer.Option("--impacts", help="real, injected or both, if the file has both kinds.")
+        str | None,
+        typer.Option(
+            "--impacts",
+            help="real, injected or both, if the file has both kinds.",
+            autocompletion=completions.one_of(("real", "injected", "both")),
+        ),
     ] = None,
     worse_at_most: Annotated[
         float, typer.Option("--worse-at-most", min=0.0, help="Share by which a group may get worse than by default.")

@@ -12,8 +12,10 @@ from cdtool.evaluation.builds.rows import BuildRow
 from cdtool.report.few_contacts import EXPLAINED
 from cdtool.report.model import NO_CERTIFICATE
 from cdtool.report.number_text import NOTHING, number
-from cdtool.report.table import Cell, Column, Fields, Table, name_cell, tabulate
+from cdtool.report.table import Cell, Column, Fields, Table, name_cell, shown, tabulate
 
+_TONES = {"worse": "bad", "mixed": "bad", "inconclusive": "unknown"}
+_MOST_CHANGES = 10
 _MEANS = ("latency_ms", "force_at_alarm_n")
 _HOW_TO_READ = (
     "Two values are old / new. Contacts: the same ones in both, unless there are two numbers. Latency is a mean (of "
@@ -25,9 +27,14 @@ _HOW_TO_READ = (
 
 @dataclass(frozen=True)
 class ComparisonModel:
-    """The plain values of a comparison. Texts from files are unchanged: renderers escape them."""
+    """The plain values of a comparison. Texts from files are unchanged: renderers escape them.
+
+    `changes`: what is shown to be worse or better, a sentence per detector and group, the first ten.
+    """
 
     verdict: str
+    short_results: Table
+    changes: Sequence[str]
     results: Table
     changed: Table
     how_to_read: Sequence[str]
@@ -41,6 +48,7 @@ def comparison_model(comparison: BuildComparison) -> ComparisonModel:
         f"{100.0 * comparison.relevant_change:g} %."
     )
     few = any(row.few for row in comparison.rows)
+    changed_rows = [row for row in comparison.rows if row.outcome in ("worse", "mixed", "better")]
     changed: Fields[tuple[str, str, str]] = (
         (Column("setting"), lambda item: Cell(item[0])),
         (Column("old"), lambda item: Cell(item[1])),
@@ -49,6 +57,9 @@ def comparison_model(comparison: BuildComparison) -> ComparisonModel:
     only = (("old", comparison.only_old), ("new", comparison.only_new))
     return ComparisonModel(
         verdict=comparison.words,
+        short_results=_short_table(comparison.rows),
+        changes=[f"{shown(row.group)}, {shown(row.detector)}: {row.words}" for row in changed_rows[:_MOST_CHANGES]]
+        + ([f"and {len(changed_rows) - _MOST_CHANGES} more changes"] if len(changed_rows) > _MOST_CHANGES else []),
         results=_results_table(comparison.rows, few),
         changed=tabulate(
             "changed",
@@ -87,6 +98,20 @@ def contacts_of(row: BuildRow) -> str:
     if not row.old_contacts and not row.new_contacts:
         return NOTHING
     return str(row.pairs) if row.paired else f"{row.old_contacts} / {row.new_contacts}"
+
+
+def _short_table(rows: Sequence[BuildRow]) -> Table:
+    """Return the rows in seven columns, which fit a pull request; the result in one word."""
+    fields: Fields[BuildRow] = (
+        (Column("group"), lambda row: name_cell(row.group)),
+        (Column("detector"), lambda row: name_cell(row.detector)),
+        (Column("latency ms"), lambda row: Cell(both(row, "latency_ms"))),
+        (Column("missed"), lambda row: Cell(both(row, "missed"))),
+        (Column("false alarms"), lambda row: Cell(both(row, "false_alarms"))),
+        (Column("force at alarm N"), lambda row: Cell(both(row, "force_at_alarm_n"))),
+        (Column("result", choice=True), lambda row: Cell(row.outcome, tone=_TONES.get(row.outcome, ""))),
+    )
+    return tabulate("short_results", "", fields, rows)
 
 
 def _results_table(rows: Sequence[BuildRow], few: bool) -> Table:

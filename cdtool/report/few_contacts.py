@@ -5,12 +5,14 @@ Conventions: a column that no row fills is left out. All tables and plots use th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Final, Literal
 
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
+from cdtool.report.number_text import number
 
 LatencyColumn = Literal["mean", "std", "median", "range", "P95"]
 
@@ -46,6 +48,19 @@ def latency_interval(item: Summary, column: LatencyColumn) -> Interval | None:
 def draws_no_interval(item: Summary) -> bool:
     """Return whether a plot shows the median without a bar: below ten contacts, or if it has no interval."""
     return item.assessable < FEWEST or bool(item.median.reason)
+
+
+def open_end(item: Summary) -> tuple[float, str] | None:
+    """Return where a latency without an upper end begins [ms], and it in words; None if a plot shows both ends.
+
+    Missed contacts leave the interval of the median open or, below ten contacts, the range if the median is not
+    reached: "≥ 25.0 (n = 4)". Nothing is drawn where no contact was detected.
+    """
+    if draws_no_interval(item):
+        least = item.min_ms if item.median.value == math.inf else math.nan
+    else:
+        least = item.median.low if item.median.high == math.inf else math.nan
+    return (least, f"≥ {number(least)} (n = {item.assessable})") if math.isfinite(least) else None
 
 
 def grouped(rows: Iterable[Summary]) -> bool:

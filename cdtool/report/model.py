@@ -17,6 +17,7 @@ from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
 from cdtool.report.table import Log, Table
 from cdtool.report.tables import forces, recordings
+from cdtool.report.tables.attention import attention_table, failed_recordings
 from cdtool.report.tables.conditions import conditions_table
 from cdtool.report.tables.injected import injected_table
 from cdtool.report.tables.provenance import provenance_tables
@@ -29,6 +30,8 @@ from cdtool.report.tables.results import (
     limits_table,
     part_of,
     results_table,
+    short_results_table,
+    too_few_note,
 )
 from cdtool.report.tables.worst_cases import worst_cases_table
 
@@ -41,6 +44,7 @@ AXES = {
     "force": "force [N]",
 }
 TITLES = {
+    "attention": "What needs attention",
     "limits": "Limits",
     "results": "Results",
     "latency": "Latency of each contact",
@@ -65,8 +69,8 @@ _LONGEST = 200
 _NOTES = {
     "latency": (
         "Each mark is a contact. Open marks: missed contacts, at the time up to which an alarm would have counted. "
-        "Vertical line and bar: median and, with ten or more contacts, its interval; dotted if its end is not "
-        "reached."
+        "Vertical line and bar: median and, with ten or more contacts, its interval; “≥”: missed contacts leave it "
+        "without an upper end."
     ),
     "survival": (
         "Share of the assessable contacts still undetected at a time after the onset (Kaplan–Meier); lower and "
@@ -81,8 +85,7 @@ _NOTES = {
         "Paired: the same contacts, as far as both detectors could assess them. Latency: over the contacts that both "
         "detected, with its 95 % interval from ten or more recordings or campaigns. The p are corrected by Holm over "
         "all tests of a group; a difference is shown if its p is below 0.05. “No difference shown” is not a proof of "
-        "none. “Too few recordings”: no latencies could have resulted in a p below 0.05; recordings of one campaign "
-        "count as one."
+        "none."
     ),
     "force": (
         "Load cell as it was read, over the time since the onset; verdicts use the force corrected for its reading at "
@@ -103,14 +106,19 @@ _NOTES = {
         "the change. After each value: that of the unchanged machine. These recordings count in no other statistic, "
         "and in no limit that does not name them."
     ),
+    "short_results": (
+        "Median with its 95 % interval if there are enough contacts; missed contacts count as later than all others. "
+        "“At most”: one-sided 95 % bound. Force at alarm: median of the detected contacts. All other values are in "
+        "“All results” below."
+    ),
     "provenance": "All results with all their digits, and the hash of every recording, are in results.json.",
 }
 
 _NOTES_OF_MANY = {
     "latency": (
         "Bars: number of contacts in each class of latency, by detector; the highest bar of each has the same height. "
-        "Vertical line and bar below: median and its interval; dotted if its end is not reached. A missed contact has "
-        "no latency."
+        "Vertical line and bar below: median and its interval; “≥”: missed contacts leave it without an upper end. A "
+        "missed contact has no latency."
     ),
 }
 _ALL_OF_THEM = (
@@ -134,7 +142,8 @@ class Model:
 
     `tone` of the headline is good, bad, unknown, or empty if nothing was required. `scope`: version, machine, number of
     detectors and recordings. `left_out`: how much data was left out or lost, empty if none. `tables`: by name, those
-    with rows; `groups`: the results of each group with its name; `notes`: how to read each part.
+    with rows; `groups`: the results of each group with its name; `failed`: the recordings that need attention, the
+    worst first (of very many, those that are listed); `notes`: how to read each part.
     """
 
     headline: str
@@ -147,6 +156,7 @@ class Model:
     groups: tuple[tuple[str, Table], ...]
     provenance: tuple[Table, ...]
     profiles: Mapping[str, ProfileText]
+    failed: tuple[Log, ...]
     notes: Mapping[str, str]
 
     def first_reasons(self, most: int) -> list[str]:
@@ -163,6 +173,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
     results, summaries = evaluated.results, evaluated.summaries
     many = is_many(results)
     cases, counts = worst_cases_table(results, traced) if many else (None, "")
+    failed = [] if many else failed_recordings(results)
     provenance = results.provenance
     version = provenance.get("tool_version")
     scope = (
@@ -172,8 +183,10 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         counted(len(results.recordings), "recording"),
     )
     tables = (
+        attention_table(results, failed),
         limits_table(results, met=False),
         limits_table(results, met=True),
+        short_results_table(summaries),
         results_table(results, summaries),
         kinds_table(results, evaluated.kinds),
         conditions_table(evaluated),
@@ -196,7 +209,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
     return Model(
         headline=results.conclusion.headline,
         counts=counts_text(evaluated),
-        tone=_tone(results),
+        tone=headline_tone(results),
         scope=tuple(part for part in scope if part),
         reasons=results.conclusion.reasons,
         left_out=f"{counted(lost, 'entry')} of data left out or lost" if lost else "",
@@ -204,12 +217,14 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         groups=tuple((group, results_table(results, items, group)) for group, items in groups.items()),
         provenance=tuple(provenance_tables(results)),
         profiles=_profiles(results),
+        failed=tuple(dict.fromkeys(_bad_logs(cases) if cases else (item.log for item in failed))),
         notes={
             **_NOTES,
             **(_NOTES_OF_MANY if many else {}),
             "groups": _groups_note(evaluated) if many else "",
             "cases": f"{counts} {_ALL_OF_THEM}" if many else "",
             "results": _results_note(evaluated),
+            "too_few": too_few_note(evaluated),
             "differences": differences_note(evaluated) if evaluated.comparisons else "",
         },
     )
@@ -244,6 +259,11 @@ def counts_text(evaluated: Evaluated) -> str:
     return f"{contacts} with {counted(len(results.detectors), 'detector')}: {outcomes}; {alarms}"
 
 
+def _bad_logs(cases: Table) -> list[Log]:
+    """Return the recordings of the listed cases with a bad outcome."""
+    return [log for log, cell in zip(cases.logs, cases.cells("outcome"), strict=True) if cell.tone == "bad"]
+
+
 def _of_unchanged(results: Results) -> Sequence[ContactResult]:
     """Return the contacts of the unchanged machine."""
     if not results.conditions:
@@ -260,7 +280,8 @@ def _groups_note(evaluated: Evaluated) -> str:
     return f"Plotted are the {len(plotted)} of {len(every)} groups with the largest share of missed contacts."
 
 
-def _tone(results: Results) -> str:
+def headline_tone(results: Results) -> str:
+    """Return whether the headline is good, bad or unknown; empty if nothing was required."""
     conclusion = results.conclusion
     if conclusion.outcome == "violated":
         return "bad"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -52,10 +52,12 @@ def write_outputs(
     force: bool = False,
     inputs: Sequence[Path] = (),
     subject: Subject = "benchmark",
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
     """Write every target and return what to show: the files, and of a folder its report. Raises CdtoolError.
 
     `report` is what the writers of the subject write. `inputs` were read and are never overwritten, `force` or not.
+    `progress` is called with the number of files and kinds of figures written, and of all of them.
     """
     folders = [target for target in targets if target.is_dir()]
     in_folder = [writer.in_folder for writer in own_writers(subject) if writer.in_folder]
@@ -64,13 +66,39 @@ def write_outputs(
     if targets and isinstance(report, Report):
         report = replace(report, traces=as_read(report.traces))
     written = []
+    step = _steps(progress, sum(_folder_steps(report) if _is_folder(target, subject) else 1 for target in targets))
     for target in targets:
         if _is_folder(target, subject):
-            written.append(_write_folder(report, target, force=force))
+            written.append(_write_folder(report, target, force=force, step=step))
         else:
             _write_file(_writer_of(target, subject), report, target)
             written.append(target)
+            step()
     return written
+
+
+def _steps(progress: Callable[[int, int], None] | None, total: int) -> Callable[[], None]:
+    """Return a function that reports one more of `total` steps at each call."""
+    done = 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, total)
+
+    return step
+
+
+def _folder_steps(report: Report) -> int:
+    """Return how many kinds of figures and files are written into a folder."""
+    from cdtool.report.plots.folder_figures import FOLDER_FIGURES
+
+    return len(FOLDER_FIGURES) + len(_writers_in_folder(report))
+
+
+def _writers_in_folder(report: Report) -> list[Writer[Any]]:
+    return [writer for writer in own_writers("benchmark") if writer.in_folder and writer.has_content(report)]
 
 
 def _write_file(writer: Writer[Any], report: Any, target: Path) -> None:
@@ -102,15 +130,15 @@ def _has_folders(subject: Subject) -> bool:
     return any(writer.in_folder for writer in own_writers(subject))
 
 
-def _write_folder(report: Report, target: Path, *, force: bool) -> Path:
+def _write_folder(report: Report, target: Path, *, force: bool, step: Callable[[], None]) -> Path:
     """Write all reports and figures, and replace the folder by them as a whole."""
     from cdtool.report.plots.folder_figures import write_figures
 
     with replaced_folder(target, lambda old: _whole_report(old, force=force)) as folder:
-        report = replace(report, images=tuple(write_figures(report, folder)))
-        for writer in own_writers("benchmark"):
-            if writer.in_folder and writer.has_content(report):
-                writer.write(report, folder / writer.in_folder)
+        report = replace(report, images=tuple(write_figures(report, folder, step)))
+        for writer in _writers_in_folder(report):
+            writer.write(report, folder / writer.in_folder)
+            step()
     return target / "report.html"
 
 

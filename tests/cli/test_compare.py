@@ -118,8 +118,11 @@ def test_markdown_has_a_row_per_detector_and_group_with_its_words(written, tmp_p
     text = (tmp_path / "compare.md").read_text(encoding="utf-8")
     assert text.startswith("**cdtool compare: worse")
     rows = [line for line in text.splitlines() if line.startswith("| stiff | ")]
-    assert len(rows) == 2 and {line.count(" | ") for line in rows} == {8}
-    assert rows[0].endswith("more force at the alarm by 50.0 N (50.0 to 50.0) |") and "slower by 5.0 ms" in rows[0]
+    assert [line.count(" | ") for line in rows] == [6, 6, 8, 8], "narrow ones, then folded ones"
+    assert rows[0].endswith("| **worse** |") and rows[1].endswith("| no change shown |")
+    assert rows[2].endswith("more force at the alarm by 50.0 N (50.0 to 50.0) |") and "slower by 5.0 ms" in rows[2]
+    shown = text[: text.index("<details>")]
+    assert "\n\nstiff, momentum: " in shown and "slower by 5.0 ms" in shown
     assert "| debounce\\_samples | 9 | 14 |" in text or "| debounce_samples | 9 | 14 |" in text
     assert "not a certificate" in text and "“No change shown” does not mean that there is no change" in text
 
@@ -239,3 +242,12 @@ def test_a_missing_detector_is_named_at_the_top_and_in_the_verdict(written, tmp_
     words = "only in old: detector pure_torque"
     assert words in " ".join(done.out.split()).rpartition("no change shown")[2]
     assert words in (tmp_path / "c.md").read_text(encoding="utf-8").replace("\\", "").splitlines()[0]
+
+
+def test_detectors_of_a_group_with_the_same_words_share_a_sentence(written):
+    names = ("momentum", "pure_torque", "direct")
+    same = {(name, group): LATENCIES for name in names for group in ("stiff", "soft")}
+    done = cdtool("compare", written("old.json", build_results(same)), written("new.json", build_results(same)))
+    lines = " ".join(done.out.split())
+    assert "stiff, momentum, pure_torque, direct: no change shown: both files contain the same results" in lines
+    assert lines.count("direct: no change shown") == 2

@@ -14,6 +14,9 @@ from cdtool.cli.app import app
 from cdtool.detectors import DETECTORS
 from cdtool.operations import HOW_TO_CUT
 from cdtool.thresholds import THRESHOLDS
+from cdtool.tuning.objective import Goal
+from cdtool.workflows.tuning.tuning import IMPACTS
+from cdtool.workflows.written_files import WRITERS
 
 
 def completed(*words):
@@ -64,7 +67,58 @@ def test_every_registered_name_is_a_completion():
         (("learn-signature", "--align", "p"), ["position"]),
         (("signature", "update", "--operations", "m"), ["motion"]),
         (("list", "KIND", "w"), ["writers"]),
+        (("tune", "--thresholds", "signature,gl"), ["signature,glr"]),
+        (("tune", "--objective", "p"), ["p95"]),
+        (("plan", "--detectors", "feekf,g"), ["feekf,gm"]),
+        (("simulate", "gate", "--format", "mi"), ["mixed"]),
     ],
 )
 def test_other_values_are_completed(words, expected):
     assert completed(*words) == expected
+
+
+def test_values_that_are_listed_by_hand_are_those_that_the_commands_accept():
+    assert completed("tune", "--objective", "") == [item.value for item in Goal]
+    assert completed("tune", "--impacts", "") == list(IMPACTS)
+    assert {f".{name}" for name in completed("inject", "--format", "")} == set(WRITERS) - {".hdf5"}
+
+
+def test_a_benchmark_file_is_completed_by_its_suffix(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("benchmark.toml", "bench.csv", ".hidden.toml"):
+        (tmp_path / name).touch()
+    (tmp_path / "beam").mkdir()
+    assert completed("benchmark", "FILE", "be") == ["beam/", "benchmark.toml"]
+    assert completed("benchmark", "FILE", "") == ["beam/", "benchmark.toml"], "no hidden file"
+    assert completed("benchmark", "FILE", "s3://b") == []
+    assert completed("benchmark", "FILE", "none/b") == []
+
+
+def test_a_folder_without_a_choice_is_entered(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sample_logs" / "gate").mkdir(parents=True)
+    (tmp_path / "sample_logs" / "gate" / "results.json").touch()
+    (tmp_path / "sample_logs" / "gate" / "results.parquet").mkdir()
+    inside = ["sample_logs/gate/results.json", "sample_logs/gate/results.parquet"]
+    assert completed("report", "RESULTS", "sam") == inside
+    assert completed("compare", "OLD", "sample_logs/gate/results.p") == inside[1:]
+
+
+HEAVY = ("numpy", "scipy", "pandas", "rich", "matplotlib", "numba")
+
+
+def test_completing_a_value_imports_no_library_for_computing_or_drawing():
+    code = f"""
+import sys
+from cdtool.cli.app import app
+from typer.main import get_command
+from typer import Context
+group = get_command(app)
+for name, option in (("benchmark", "--detectors"), ("learn-signature", "--threshold"), ("list", "kind")):
+    command = group.get_command(Context(group), name)
+    parameter = next(item for item in command.params if option in (*item.opts, item.name))
+    assert parameter.shell_complete(Context(command), ""), option
+print([name for name in {HEAVY!r} if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

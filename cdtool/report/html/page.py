@@ -6,27 +6,43 @@ content security policy allows only this script and this style, by their hashes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from cdtool.plain_text import counted
 from cdtool.report.html.page_tables import PageTable, classes
 from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json
 from cdtool.report.html.traces import plot_height, trace_data
 from cdtool.report.model import NO_CERTIFICATE, TITLES, TITLES_OF_MANY
+from cdtool.report.table import Log
+from cdtool.report.tables.attention import failed_traces
 from cdtool.report.writers.base import Report
 
 # Lines under the headline.
 _REASONS = 10
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
-    *("not_met", "met", "results", "kinds", "conditions", "injected", "comparisons", "force", "points", "forces"),
+    *(
+        "attention",
+        "not_met",
+        "met",
+        "results",
+        "kinds",
+        "conditions",
+        "injected",
+        "comparisons",
+        "force",
+        "points",
+        "forces",
+    ),
     *("recordings", "cases"),
     *("not_assessable", "skipped", "damaged", "findings", "calibration"),
 )
 _TEMPLATE, _STYLE = "report.html.j2", "report.css"
 # In the order in which they use one another.
 _SCRIPTS = (
-    *("scales.js", "chart.js", "legend.js", "plots.js", "histogram.js", "forces.js", "trace.js", "tables.js"),
-    "report.js",
+    *("scales.js", "chart.js", "legend.js", "plots.js", "histogram.js", "forces.js", "trace.js", "print.js"),
+    *("tables.js", "report.js"),
 )
 
 
@@ -39,15 +55,17 @@ def to_html(report: Report) -> str:
     of_logs, numbers = traces_of(results, traces), {name: i for i, name in enumerate(results.detectors)}
     tables = {name: PageTable(model.tables[name], of_logs) if name in model.tables else None for name in _TABLES}
     plots = plot_data(report)
+    failed = failed_traces(model.failed, traces, of_logs)
     paged = [table.values() for table in tables.values() if table and table.paged]
     return page_template(_TEMPLATE).render(
         policy=content_policy(style, script),
         style=Markup(style),
         script=Markup(script),
-        data=script_json({**plots, "tables": paged}),
+        data=script_json({**plots, "tables": paged, "failed": failed}),
         traces=[script_json(trace_data(trace, numbers)) for trace in traces],
         trace_height=plot_height(traces[0]) if traces else 0,
         kept=f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
+        printed=_printed(model.failed, of_logs),
         model=model,
         titles=TITLES | (TITLES_OF_MANY if "cases" in model.tables else {}),
         certificate=NO_CERTIFICATE,
@@ -57,3 +75,13 @@ def to_html(report: Report) -> str:
         reasons=model.first_reasons(_REASONS),
         classes=classes,
     )
+
+
+def _printed(failed: Sequence[Log], of_logs: Mapping[Log, Sequence[int]]) -> str:
+    """Return of how many failed recordings the trigger plots are printed; empty if nothing failed."""
+    if not failed:
+        return ""
+    plotted = sum(bool(of_logs.get(log)) for log in failed)
+    words = f"{plotted} of {counted(len(failed), 'failed recording')} have trigger plots, which are printed here."
+    left_out = " The others are listed above; no curves were kept of them." if plotted < len(failed) else ""
+    return f"{words}{left_out} Detectors that detected the contact are left out where a plot has five others."

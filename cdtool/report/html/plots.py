@@ -18,7 +18,7 @@ from cdtool.evaluation.summary import Summary, latencies
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.plain_text import plain
 from cdtool.recording import FloatArray
-from cdtool.report.few_contacts import draws_no_interval
+from cdtool.report.few_contacts import draws_no_interval, open_end
 from cdtool.report.html.page_tables import short, visible
 from cdtool.report.html.traces import HEIGHTS
 from cdtool.report.many import is_many, plotted_groups
@@ -107,6 +107,7 @@ def _latency(results: Results, summaries: Sequence[Summary], contacts: Contacts)
             {
                 "detector": detectors[item.detector],
                 "median": [short(value) for value in _median(item)],
+                "open": _open_end(item),
                 "words": f"median {with_interval(item.median)} ms",
                 "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
                 "latency": [short(row.latency_ms) for row in detected],
@@ -135,6 +136,7 @@ def _histograms(results: Results, summaries: Sequence[Summary], contacts: Contac
             {
                 "detector": detectors[item.detector],
                 "median": [short(value) for value in _median(item)],
+                "open": _open_end(item),
                 "words": f"median {with_interval(item.median)} ms",
                 "counts": f"{item.detected} detected, {item.missed} missed, {item.not_assessable} not assessable",
                 "numbers": np.histogram(np.clip(of_detector, edges[0], edges[-1]), edges)[0].tolist(),
@@ -159,6 +161,12 @@ def _median(item: Summary) -> tuple[float, ...]:
     """Return the median with its interval; only the median if a plot draws none."""
     median = item.median
     return (median.value,) if draws_no_interval(item) else (median.value, median.low, median.high)
+
+
+def _open_end(item: Summary) -> tuple[float | int | None, str] | None:
+    """Return where an open interval begins [ms], and it in words; null if both ends are drawn."""
+    least = open_end(item)
+    return (short(least[0]), least[1]) if least else None
 
 
 def _survival(results: Results, groups: Sequence[str], contacts: Contacts, most: int | None) -> list[dict[str, Any]]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from urllib.parse import quote
 
 from cdtool.errors import UsageError
+from cdtool.plain_text import counted
 from cdtool.report.markdown.text import Section, escape, fitted
 from cdtool.report.model import NO_CERTIFICATE, TITLES, Model
 from cdtool.report.table import Table
@@ -17,8 +17,9 @@ _LEAST = 4_000
 _LIMITS_NAMED = 5
 _REASONS_NAMED = 4
 _LONGEST_NAME = 40
-# With more limits than this, those that are met are collapsed, so that the results are not far below.
-_LIMITS_OPEN = 12
+_LONGEST_OUTCOME = 160
+# The model's tables with all other results, collapsed because they are wider than a comment.
+_DETAILS = ("kinds", "conditions", "injected", "points")
 # The model's tables below the results, collapsed; its tables of the provenance follow.
 _FOLDED = (
     *("missed", "false_alarms", "not_assessable_contacts", "in_progress", "not_assessable", "force_exceptions"),
@@ -35,27 +36,33 @@ def to_markdown(report: Report, most: int = 60_000) -> str:
     if most < _LEAST:
         raise UsageError(f"a report of at most {most} characters", f"set at least {_LEAST}")
     model = report.model
-    limits, met = _limits(model)
+    not_met, met = (_limits(model.tables[name]) if name in model.tables else None for name in ("not_met", "met"))
+    limits = [_section(not_met)] if not_met else []
     results = []
-    if "injected" in model.tables:
-        results.append(_section(model.tables["injected"], escape(model.notes["injected"], None)))
-    results.append(Section("", escape(model.notes["results"], None)))
+    if "short_results" in model.tables:
+        results.append(_section(model.tables["short_results"], escape(model.notes["short_results"], None)))
+    else:
+        results.append(Section("", escape(model.notes["results"], None)))
     results += [Section("", _image(image)) for image in report.images if image.group is None]
-    for group, table in model.groups:
+    for group in dict.fromkeys(image.group for image in report.images if image.group is not None):
         own = [_image(image) for image in report.images if image.group == group]
-        results.append(_section(table, tail="\n\n".join(own)))
-    if "kinds" in model.tables:
-        results.append(_section(model.tables["kinds"]))
-    if "conditions" in model.tables:
-        results.append(_section(model.tables["conditions"], escape(model.notes["conditions"], None)))
+        results.append(Section(escape(group), tail="\n\n".join(own)))
     if model.notes["differences"]:
         lead = escape(model.notes["differences"], None)
         differences = model.tables.get("differences")
         results.append(_section(differences, lead) if differences else Section(TITLES["comparisons"], lead))
-    results += [_section(model.tables[name], lead) for name, lead in _forces(model) if name in model.tables]
+    if "force" in model.tables:
+        results.append(_section(model.tables["force"], _force_sources(model)))
+    details = [_section(met, folded=True)] if met else []
+    if "results" in model.tables:
+        every = replace(model.tables["results"], title="All results")
+        details.append(_section(every, escape(model.notes["results"], None), folded=True))
+    for name in _DETAILS:
+        if name in model.tables:
+            details.append(_section(model.tables[name], escape(model.notes.get(name, ""), None), folded=True))
     tables = [model.tables[name] for name in _FOLDED if name in model.tables]
     folded = [_section(table, folded=True) for table in (*tables, *model.provenance)]
-    return fitted(_head(model), (limits, met, results, folded), most)
+    return fitted(_head(model), (limits, results, details, folded), most)
 
 
 def _head(model: Model) -> str:
@@ -65,9 +72,24 @@ def _head(model: Model) -> str:
     if model.reasons:
         reasons = "; ".join(map(escape, model.first_reasons(_REASONS_NAMED)))
         parts.append(f"**Force, missed contacts, not assessable:** {reasons}.")
+    if "attention" in model.tables:
+        parts.append(_worst(model))
     if model.left_out:
         parts.append(f"**{model.left_out}**, listed below.")
     return "\n\n".join([*parts, NO_CERTIFICATE])
+
+
+def _worst(model: Model) -> str:
+    """Return the worst recording and what needs attention in it, with texts short enough for the head."""
+    table = model.tables["attention"]
+    name, group, *cells = table.rows[0]
+    told = [
+        f"{column.heading}: {escape(cell.line, _LONGEST_OUTCOME)}"
+        for column, cell in zip(table.columns[2:], cells, strict=True)
+        if cell.tone
+    ]
+    where = f"{escape(name.text, _LONGEST_NAME)} ({escape(group.text, _LONGEST_NAME)})"
+    return f"**Worst of {counted(len(table.rows), 'failed recording')}:** {where}; {'; '.join(told)}."
 
 
 def _failing(model: Model) -> list[str]:
@@ -83,23 +105,21 @@ def _failing(model: Model) -> list[str]:
     return [*named[:_LIMITS_NAMED], *([f"and {more} more"] if more > 0 else [])]
 
 
-def _limits(model: Model) -> tuple[list[Section], list[Section]]:
-    """Return the limits, violated ones first; if they are many, those that are met separately and collapsed."""
-    tables = [model.tables[name] for name in ("not_met", "met") if name in model.tables]
-    rows = [row for table in tables for row in table.rows]
-    if rows and len(rows) <= _LIMITS_OPEN:
-        return [_section(replace(tables[0], title=TITLES["limits"], rows=rows))], []
-    met = [_section(table, folded=True) for table in tables if table.name == "met"]
-    return [_section(table) for table in tables if table.name != "met"], met
+def _limits(table: Table) -> Table:
+    """Return a table of limits without their keys: detector, group and result say the same in less width."""
+    kept = [i for i, column in enumerate(table.columns) if column.heading != "limit"]
+    columns = [table.columns[i] for i in kept]
+    return replace(table, columns=columns, rows=[[row[i] for i in kept] for row in table.rows])
 
 
-def _forces(model: Model) -> Sequence[tuple[str, str]]:
-    """Return the tables of forces, the first with the sources of the limits and whether they have been checked."""
-    profiles = dict.fromkeys(
-        f"{escape(item.source, None)}{f' **{item.unchecked}**' if item.unchecked else ''}"
-        for item in model.profiles.values()
+def _force_sources(model: Model) -> str:
+    """Return the sources of the force limits and whether they have been checked."""
+    return " ".join(
+        dict.fromkeys(
+            f"{escape(item.source, None)}{f' **{item.unchecked}**' if item.unchecked else ''}"
+            for item in model.profiles.values()
+        )
     )
-    return ("force", " ".join(profiles)), ("points", "")
 
 
 def _section(table: Table, lead: str = "", tail: str = "", *, folded: bool = False) -> Section:

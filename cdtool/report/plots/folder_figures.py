@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
@@ -17,10 +18,11 @@ FOLDER_FIGURES = (
 """Functions that write a figure into a folder if there is something to show, in the order of a report."""
 
 
-def write_figures(report: Report, folder: Path) -> list[Image]:
-    """Draw all figures that have something to show; raises CdtoolError (see `save`)."""
+def write_figures(report: Report, folder: Path, drawn: Callable[[], None] = lambda: None) -> list[Image]:
+    """Draw all figures that have something to show; raises CdtoolError (see `save`). `drawn` is called after each."""
     images: list[Image] = []
     for place in FOLDER_FIGURES:
         module, _, name = place.partition(":")
         images += getattr(import_module(module), name)(report, folder)
+        drawn()
     return images

@@ -14,7 +14,7 @@ from cdtool.evaluation.results import Results
 from cdtool.evaluation.statistics.small_sample import FEWEST
 from cdtool.evaluation.summary import Summary
 from cdtool.recording import FloatArray
-from cdtool.report.few_contacts import draws_no_interval, grouped
+from cdtool.report.few_contacts import draws_no_interval, grouped, open_end
 from cdtool.report.model import AXES
 from cdtool.report.number_text import NOTHING, with_interval
 from cdtool.report.plots.figures import (
@@ -47,6 +47,8 @@ _COLUMNS = (
 _IMPACT_FREE = 70.0
 _ROW, _PANEL = 0.36, 0.2
 _MOST_MARKS = 400
+# A longer line below the axis would begin left of the figure [characters].
+_LONGEST_LINE = 90
 # Low-discrepancy sequences spread the marks evenly, without random numbers.
 _GOLDEN, _ACROSS = 0.6180339887, 0.7548776662
 # Share of the width of the strip right of the axis, for missed contacts that were monitored for longer.
@@ -116,10 +118,12 @@ def _figure(evaluated: Evaluated) -> Figure:
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]
-    margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, 0.85)
+    axis = _axis_of(list(marks.values()))
+    explained = _explained(summaries, list(marks.values()), axis)
+    bottom = 0.325 + 0.175 * len(explained.splitlines())
+    margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, bottom)
     heights = [_PANEL + _ROW * len(rows[group]) for group in groups]
     figure, panels = stacked_panels(margins.left + 4.4 + margins.right, heights, margins, gap=0.36)
-    axis = _axis_of(list(marks.values()))
     set_latency_scale(panels[-1], axis.low, axis.end, axis.logarithmic)
     panels[-1].set_xlim(axis.low, axis.high)
     counts = {(item.detector, item.group): _count(item) for item in evaluated.summaries}
@@ -130,7 +134,7 @@ def _figure(evaluated: Evaluated) -> Figure:
             free = [counts.get((row.detector, name), NOTHING) for name in impact_free]
             _write_row(table, axes, i, row, free)
     table.write_headings(panels[0])
-    panels[-1].set_xlabel(_explained(summaries, list(marks.values()), axis), linespacing=1.4)
+    panels[-1].set_xlabel(explained, linespacing=1.4)
     return figure
 
 
@@ -202,23 +206,31 @@ def _thinned(ordered: FloatArray) -> FloatArray:
 
 
 def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
-    """Draw the median below the marks with its interval as a bar, open to the right if it has no upper end.
+    """Draw the median below the marks with its interval as a bar; without an upper end it is written at its lower end.
 
     With fewer than ten contacts only the median: the marks show the range.
     """
-    height, median = row + 0.28, summary.median
-    if not draws_no_interval(summary) and median.low <= axis.end:
-        low, high = axis.placed(median.low), axis.placed(median.high)
-        if median.high > axis.end:
-            high = min(axis.placed(median.value), axis.end) if np.isfinite(median.value) else low
-            axes.plot([high, axis.end], [height, height], color="black", linewidth=0.8, linestyle=":", zorder=3)
-            axes.plot(axis.end, height, ">", color="black", markersize=4, clip_on=False, zorder=3)
-        axes.plot([low, high], [height, height], color="black", linewidth=1.4, solid_capstyle="butt", zorder=3)
+    height, median, least = row + 0.28, summary.median, open_end(summary)
+    if least is None and not draws_no_interval(summary) and np.isfinite(median.high):
+        ends = [axis.placed(median.low), axis.placed(median.high)]
+        axes.plot(ends, [height, height], color="black", linewidth=1.4, solid_capstyle="butt", zorder=3)
+    if least is not None:
+        _write_open_end(axes, height, (least[0], median.value), least[1], axis)
     if np.isfinite(median.value):
         at = axis.placed(median.value)
         axes.plot(
             [at, at], [height - 0.13, height + 0.13], color="black", linewidth=2.0, solid_capstyle="butt", zorder=4
         )
+
+
+def _write_open_end(axes: Axes, height: float, ends: tuple[float, float], words: str, axis: _Axis) -> None:
+    """Draw an open interval from its lower end to the median and write it there; in the right half, left of both."""
+    low, high = axis.placed(ends[0]), axis.placed(ends[1] if np.isfinite(ends[1]) else ends[0])
+    axes.plot([low, low], [height - 0.1, height + 0.1], color="black", linewidth=1.0, zorder=3)
+    axes.plot([low, high], [height, height], color="black", linewidth=1.4, solid_capstyle="butt", zorder=3)
+    share = axes.transAxes.inverted().transform(axes.transData.transform((high, 0.0)))[0]
+    at, side, offset = (low, "right", -4) if share > 0.5 else (high, "left", 5)
+    write(axes, words, (at, height), (offset, 0), "data", ha=side, va="center", fontsize=7)
 
 
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_free: Sequence[str]) -> None:
@@ -237,13 +249,19 @@ def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axi
     missed = any(len(item.missed) for item in marks)
     lines = [f"{AXES['latency']}{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
     lines.append(f"each mark: a contact{', open if missed, at the end of its monitoring' if missed else ''}")
+    lines[-1] += "; ≥: without an upper end" if any(map(open_end, summaries)) else ""
     if any(max(len(item.detected), len(item.missed)) > _MOST_MARKS for item in marks):
         lines[-1] += f" (at most {_MOST_MARKS} are drawn)"
     few, later = [draws_no_interval(item) for item in summaries], ", missed contacts counted as later" if missed else ""
     interval = "" if all(few) else " and its 95 % interval"
     lines.append(f"black: median{interval}{later}")
     if any(few):
-        lines[-1] += f"; no bar with fewer than {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
+        no_bar = f"no bar with fewer than {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
+        lines = (
+            [*lines, no_bar]
+            if len(lines[-1]) + len(no_bar) > _LONGEST_LINE
+            else [*lines[:-1], f"{lines[-1]}; {no_bar}"]
+        )
     return "\n".join(lines)
 
 

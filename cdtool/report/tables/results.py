@@ -108,6 +108,22 @@ def results_table(results: Results, items: Sequence[Summary], group: str | None 
     return tabulate("results", title, fields, items, "contacts")
 
 
+def short_results_table(items: Sequence[Summary]) -> Table:
+    """Return the results in at most seven columns, which fit a pull request; those of the force only if filled."""
+    fields: list[tuple[Column, Callable[[Summary], Cell]]] = [
+        (Column("group"), lambda item: name_cell(item.group)),
+        (Column("detector"), lambda item: name_cell(item.detector)),
+        (Column("median [ms]", numeric=True), _short_median),
+        (Column("missed", numeric=True, choice=True), _short_missed),
+        (Column("false alarms", numeric=True, choice=True), _short_false_alarms),
+    ]
+    if any(not math.isnan(item.force_at_alarm) for item in items):
+        fields.append((Column("force at alarm [N]", numeric=True), lambda item: number_cell(item.force_at_alarm)))
+    if any(not math.isnan(item.force_failed) for item in items):
+        fields.append((Column("force limit exceeded", numeric=True, choice=True), _force_failed))
+    return tabulate("short_results", "Results", fields, items, "contacts")
+
+
 def kinds_table(results: Results, items: Sequence[Summary]) -> Table:
     """Return the latencies of each kind of contact, a row per summary; without rows if no contact has a kind."""
     fields: list[tuple[Column, Callable[[Summary], Cell]]] = [
@@ -145,7 +161,7 @@ def _of_force(items: Sequence[Summary]) -> list[tuple[Column, Callable[[Summary]
 
 
 def comparisons_table(evaluated: Evaluated) -> Table:
-    """Return every pair of detectors on the contacts that both could assess."""
+    """Return the pairs of detectors on the contacts that both could assess, as far as a difference could be shown."""
     results, without = evaluated.results, _without_difference(evaluated.comparisons)
     fields: Fields[tuple[Comparison, str]] = (
         (Column("group", choice=True), lambda pair: name_cell(pair[0].group)),
@@ -159,7 +175,7 @@ def comparisons_table(evaluated: Evaluated) -> Table:
         (Column("missed only by second", numeric=True), lambda pair: count_cell(pair[0].only_second_missed)),
         (Column("p of misses", numeric=True), lambda pair: _p(pair[0].missed_p)),
     )
-    pairs = list(zip(evaluated.comparisons, without, strict=True))
+    pairs = [pair for pair in zip(evaluated.comparisons, without, strict=True) if pair[1] != _TOO_FEW]
     return tabulate("comparisons", "Pairs of detectors on the same contacts", fields, pairs, "contacts")
 
 
@@ -182,9 +198,23 @@ def differences_note(evaluated: Evaluated) -> str:
         else " No difference is shown; this is not a proof of none."
     )
     few = _without_difference(comparisons).count(_TOO_FEW)
-    of = "" if few == len(comparisons) else f" in {few} of them"
-    too_few = f" There are {_TOO_FEW}{of}; recordings of one campaign count as one." if few else ""
+    if few == len(comparisons):
+        return too_few_note(evaluated)
+    too_few = f" There are {_TOO_FEW} in {few} of them; recordings of one campaign count as one." if few else ""
     return f"{pairs}; {how}.{none}{too_few}"
+
+
+def too_few_note(evaluated: Evaluated) -> str:
+    """Return how many pairs of detectors could not have shown a difference, which are in no table; empty if none."""
+    few = _without_difference(evaluated.comparisons).count(_TOO_FEW)
+    if not few:
+        return ""
+    of = "" if few == len(evaluated.comparisons) else f" {few} of"
+    pairs = counted(len(evaluated.comparisons), "pair")
+    return (
+        f"No difference can be shown between{of} {pairs} of detectors: there are too few recordings of the same "
+        "contacts. Recordings of one campaign count as one."
+    )
 
 
 def calibration_table(results: Results) -> Table:
@@ -207,6 +237,26 @@ def _latency(column: LatencyColumn, item: Summary) -> Cell:
         return empty_cell() if interval is None else interval_cell(interval)
     ends = dict.fromkeys((number(item.min_ms), number(item.max_ms)))
     return Cell(" to ".join(ends), key=key_of(item.max_ms))
+
+
+def _short_median(item: Summary) -> Cell:
+    """Return the median; its interval only if there is one."""
+    if math.isnan(item.median.low) or math.isnan(item.median.high):
+        return number_cell(item.median.value)
+    return interval_cell(item.median)
+
+
+def _short_missed(item: Summary) -> Cell:
+    if not item.contacts:
+        return empty_cell()
+    count, *bound = missed(item.missed, item.detected + item.missed, item.missed_at_most)
+    unseen = [f"; {item.not_assessable} {NOT_ASSESSABLE}"] if item.not_assessable else []
+    tone = "bad" if item.missed else "unknown" if item.not_assessable else ""
+    return Cell(count, (*bound, *unseen), item.missed, tone)
+
+
+def _short_false_alarms(item: Summary) -> Cell:
+    return count_cell(item.false_alarms, "bad") if _has_exposure(item) else _false_alarms(item)
 
 
 def _detected(item: Summary) -> Cell:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -9,7 +10,7 @@ from cdtool.evaluation.builds.comparison import BuildComparison
 from cdtool.files import write_text
 from cdtool.foreign_files import Kind
 from cdtool.report.comparison_model import comparison_model
-from cdtool.report.markdown.text import escape, table_lines
+from cdtool.report.markdown.text import Section, escape, table_lines
 from cdtool.report.writers.base import Subject, Writer
 
 
@@ -27,10 +28,13 @@ class ComparisonMarkdown(Writer[BuildComparison]):
 
 
 def to_markdown(comparison: BuildComparison) -> str:
-    """Return the verdict, a table of the results, how to read it, and what differs between the builds."""
+    """Return the verdict, a table of the results, all of them in words (folded), and what differs."""
     model = comparison_model(comparison)
-    parts = [f"**cdtool compare: {escape(model.verdict)}**", "\n".join(table_lines(model.results))]
-    parts += [escape(text, None) for text in model.how_to_read]
+    parts = [f"**cdtool compare: {escape(model.verdict)}**", "\n".join(table_lines(model.short_results))]
+    parts += [escape(change, None) for change in model.changes]
+    every = replace(model.results, title="Every result in words")
+    read = "\n\n".join(escape(text, None) for text in model.how_to_read)
+    parts.append(Section(every.counted_title, table=every, tail=read, folded=True).whole)
     if model.changed.rows:
         parts += [f"{model.changed.title}:", "\n".join(table_lines(model.changed))]
     parts += [escape(note) for note in model.notes]

@@ -9,6 +9,7 @@ import math
 import re
 from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from cdtool.evaluation.traces.file import NO_LIMIT
 from cdtool.plain_text import plain
 from cdtool.report.html.page import to_html
 from cdtool.report.html.plots import css_colour
+from cdtool.report.html.self_contained import page_part
 from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
 from cdtool.report.number_text import number, percent, with_interval
 from cdtool.report.plots.style import BAND, LIMIT, NOT_ASSESSED, look_of
@@ -36,7 +38,7 @@ VOID = {"meta", "br", "input", "link", "img", "hr"}
 TAGS = {
     *("html", "head", "meta", "title", "style", "body", "header", "main", "nav", "section", "h1", "h2", "h3", "p", "a"),
     *("strong", "small", "div", "table", "caption", "thead", "tbody", "tr", "th", "td", "figure", "figcaption", "svg"),
-    *("span", "ul", "details", "summary", "noscript", "script", "button", "link"),
+    *("span", "ul", "li", "details", "summary", "noscript", "script", "button", "link"),
 }
 ATTRIBUTES = {
     *("lang", "charset", "http-equiv", "content", "name", "id", "class", "href", "type", "hidden", "open", "title"),
@@ -260,7 +262,7 @@ def test_a_detector_that_assessed_nothing_has_no_count_of_false_alarms():
 
 
 def test_pairs_without_a_difference_say_whether_there_were_enough_recordings_for_one():
-    for contacts, words in ((4, "too few recordings to show one"), (12, "no difference shown")):
+    for contacts in (4, 12):
         evaluated, _ = case(contacts=contacts, limits=False)
         same = tuple(
             replace(item, latency_ms=40.0 + (-1) ** (i // 2 + i), outcome="detected", reason=None)
@@ -268,7 +270,10 @@ def test_pairs_without_a_difference_say_whether_there_were_enough_recordings_for
         )
         recordings = tuple(replace(item, campaign="") for item in evaluated.results.recordings)
         found = parsed(to_html(Report(evaluate(replace(evaluated.results, contacts=same, recordings=recordings)))))
-        assert {row[3] for row in found.tables["comparisons-table"][1:]} == {words}
+        few = "No difference can be shown between 2 pairs of detectors: there are too few recordings" in found.text
+        assert few == (contacts == 4) == ("comparisons-table" not in found.tables)
+        if not few:
+            assert {row[3] for row in found.tables["comparisons-table"][1:]} == {"no difference shown"}
 
 
 def test_a_row_of_latencies_includes_missed_and_not_assessable_contacts(page):
@@ -422,3 +427,72 @@ def test_five_thousand_recordings_stay_below_fifteen_megabytes():
     text = to_html(Report(Evaluated(results, summaries, ()), tuple(traces)))
     assert 2e6 < len(text.encode()) < 15e6
     assert all(log in text for log in (logs[0], logs[-1]))
+
+
+def test_the_first_section_names_the_failed_recordings_and_contains_the_viewer(made, page):
+    text = made[1]
+    sections = re.findall(r'<section id="([a-z-]+)"', text)
+    assert sections[:2] == ["attention", "limits"]
+    first = text[text.index('<section id="attention"') : text.index('<section id="limits"')]
+    assert 'data-table="attention-table"' in first and 'id="viewer"' in first and 'id="not-met-table"' in first
+    head, worst, *others = page.tables["attention-table"]
+    assert head == ["recording", "group", "missed by", "force limit exceeded", "false alarms", "violates limits"]
+    assert worst[0] == "soft/01.csv" and worst[2].startswith("slow")
+    assert others[-1][0] == "free.csv", "a false alarm only"
+
+
+def test_the_page_opens_on_the_worst_recording_that_has_a_trace():
+    evaluated, traces = case()
+    worst = next(i for i, trace in enumerate(traces) if trace.recording == "soft/12.csv")
+    contacts = tuple(
+        replace(item, outcome="missed", latency_ms=None) if item.recording == "soft/12.csv" else item
+        for item in evaluated.results.contacts
+    )
+    found = parsed(to_html(Report(evaluate(replace(evaluated.results, contacts=contacts)), traces)))
+    assert found.data["failed"][0] == worst
+
+
+def test_a_report_without_anything_failed_has_no_such_section():
+    evaluated, traces = case(limits=False)
+    contacts = tuple(
+        replace(item, outcome="detected", latency_ms=40.0, reason=None) for item in evaluated.results.contacts
+    )
+    good = replace(evaluated.results, contacts=contacts, forces=(), points=(), false_alarms=(), skipped=(), findings=())
+    provenance = {key: value for key, value in good.provenance.items() if key != "force_profiles"}
+    text = to_html(Report(evaluate(replace(good, provenance=provenance)), traces[:2]))
+    assert 'id="attention"' not in text and 'id="printed"' not in text
+    assert text.index('id="recordings"') < text.index('id="viewer"')
+
+
+def test_failed_recordings_without_a_trigger_plot_are_counted(made):
+    evaluated, traces = case()
+    text = to_html(Report(evaluated, traces[:1]))
+    assert "1 of 25 failed recordings have trigger plots, which are printed here. The others are listed above" in text
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(first: str, second: str) -> float:
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_texts_and_marks_have_enough_contrast(dark):
+    blocks = re.findall(r":root\s*{(.*?)}", page_part("report.css"), re.DOTALL)
+    colours = dict(re.findall(r"--([\w-]+):\s*(#\w{6})", blocks[0]))
+    colours |= dict(re.findall(r"--([\w-]+):\s*(#\w{6})", blocks[1])) if dark else {}
+    for name in ("ink", "soft", "good", "bad", "unknown", "link", "worst"):
+        for ground in ("page", "raised", "band"):
+            assert contrast(colours[name], colours[ground]) >= 4.5, (name, ground)
+    assert contrast(colours["limit"], colours["page"]) >= 3.0
+
+
+def test_headings_descend_one_level_at_a_time(made):
+    levels = [int(level) for level in re.findall(r"<h([1-6])", made[1])]
+    assert levels[0] == 1 and levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))

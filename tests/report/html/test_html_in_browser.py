@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cdtool.evaluation.evaluated import evaluate
 from cdtool.plain_text import plain
 from cdtool.report import many
 from cdtool.report.html.page import to_html
@@ -326,6 +328,50 @@ def test_hostile_names_stay_text(shown, kind):
     name = plain(f"{hostile}stiff/{hostile}01.csv")
     assert texts(browser, "#viewer-title") == [name]
     assert texts(browser, '[data-table="recordings-table"] tbody td button')[0] == f"▸ {name}"
+
+
+def test_paper_shows_every_failed_recording_all_rows_and_headings(shown):
+    browser = shown(to_html(Report(*case())))
+    shown_rows = len(all_of(browser, '[data-table="recordings-table"] tbody tr'))
+    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+    assert texts(browser, "#printed-plots h3") == ["stiff/01.csv", "stiff/02.csv", "soft/12.csv", "free.csv#2"]
+    plots = all_of(browser, "#printed-plots svg")
+    assert [len(item.find_elements("css selector", "path.line")) for item in plots] == [2, 2, 2, 2]
+    assert {item.get_dom_attribute("viewBox").split()[2] for item in plots} == {"1030"}
+    assert len(all_of(browser, '[data-table="recordings-table"] tbody tr')) == 25 > shown_rows
+    assert not all_of(browser, "th button") and not all_of(browser, "details:not([open])")
+    browser.execute_script("dispatchEvent(new Event('afterprint'))")
+    assert not all_of(browser, "#printed-plots figure") and all_of(browser, "th button")
+    assert len(all_of(browser, '[data-table="recordings-table"] tbody tr')) == shown_rows
+    assert browser.get_log("browser") == []
+
+
+def test_a_plot_on_paper_has_all_detectors_that_failed_and_at_most_five_others(shown):
+    evaluated, traces = case()
+    trace = traces[0]
+    quick, slow = trace.panels
+    names = [f"missed {i}" for i in range(6)] + [f"detected {i}" for i in range(3)]
+    panels = tuple(replace(slow if name[0] == "m" else quick, detector=name) for name in names)
+    rows = [replace(item, detector=name) for name in names for item in evaluated.results.contacts[:2]]
+    results = replace(evaluated.results, detectors=tuple(names), contacts=tuple(rows), limits=())
+    browser = shown(to_html(Report(evaluate(results), (replace(trace, panels=panels),))))
+    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+    assert texts(browser, "#printed-plots h3") == ["stiff/01.csv, part 1 of 2", "stiff/01.csv, part 2 of 2"]
+    words = " ".join(texts(browser, "#printed-plots text"))
+    assert all(f"missed {i} " in words for i in range(6)) and "detected 0" not in words
+    assert all("3 other detectors left out" in note for note in texts(browser, "#printed-plots .note"))
+
+
+def test_an_interval_without_an_upper_end_is_written_and_not_drawn_across_the_plot(shown):
+    evaluated, traces = case()
+    contacts = tuple(
+        replace(item, outcome="missed", latency_ms=None) if item.recording > f"{item.group}/05.csv" else item
+        for item in evaluated.results.contacts
+    )
+    browser = shown(to_html(Report(evaluate(replace(evaluated.results, contacts=contacts)), traces)))
+    words = texts(browser, 'svg[data-plot="latency"] text')
+    assert any(re.fullmatch(r"≥ \d+\.?\d* \(n = 12\)", word) for word in words)
+    assert not all_of(browser, 'svg[data-plot="latency"] path.cross')
 
 
 def test_without_script_every_table_is_there_and_the_plots_say_what_they_need(shown, browser):

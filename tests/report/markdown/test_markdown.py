@@ -84,9 +84,10 @@ def test_limits_that_are_not_met_are_named_first_and_are_on_top_of_their_table(r
     assert text.startswith("# Collision detection: 2 of 3 limits not met (1 violated, 1 not assessable)\n")
     head = text.split("## ")[0]
     assert "momentum, stiff, mean_ms: 65 is more than 50; momentum, stiff, force_at_alarm_n: no load cell." in head
-    assert [row[0] for row in rows(text)[2:5]] == ["**violated**", "**not assessable**", "met"]
+    assert [row[0] for row in rows(text)[2:4]] == ["**violated**", "**not assessable**"]
+    assert len(rows(text)[0]) == 7
     assert rows(text)[2][3:6] == ["mean_ms", "65", "at most 50"]
-    assert text.index("## Limits") < text.index("## stiff")
+    assert text.index("## Limits not met") < text.index("## Results") < text.index("Limits met (1)")
 
 
 def test_a_quantile_that_is_not_reached_violates_its_limit_in_words(results):
@@ -96,11 +97,14 @@ def test_a_quantile_that_is_not_reached_violates_its_limit_in_words(results):
 
 def test_a_table_contains_the_results_of_each_group(evaluated):
     text = to_markdown(Report(evaluated))
-    stiff = rows(text.split("## stiff\n")[1])
-    ekf = next(row for row in stiff if row[0] == "friction_ekf (feekf)")
-    assert ekf[1:] == [
+    stiff = rows(text.split("<summary>All results (")[1])
+    ekf = next(row for row in stiff if row[:2] == ["friction_ekf (feekf)", "stiff"])
+    assert ekf[2:] == [
+        "–",
+        "–",
         "34.0 (–)",
         "30.0 to 38.0",
+        "–",
         "3 of 4",
         "0 of 3: at most 63 %",
         "1",
@@ -109,34 +113,58 @@ def test_a_table_contains_the_results_of_each_group(evaluated):
         "0: at most 300",
         "3600",
     ]
-    momentum = next(row for row in stiff if row[0] == "momentum")
-    assert momentum[1:5] == ["70.0 (–)", "60.0 to not reached", "2 of 3", "1 of 3: at most 86 %"]
+    momentum = next(row for row in stiff if row[:2] == ["momentum", "stiff"])
+    assert momentum[4:6] == ["70.0 (–)", "60.0 to not reached"]
+    assert momentum[7:9] == ["2 of 3", "1 of 3: at most 86 %"]
     assert "Fewer than 10 contacts detected: median and range, no mean, std or P95." in text
-    assert header(text, "soft")[1:5] == ["mean [ms]", "std [ms]", "median [ms]", "P95 [ms]"]
-    assert header(text, "stiff")[1:4] == ["median [ms]", "range [ms]", "contacts detected"]
-    without = [row for row in rows(text) if row[0] == "friction_ekf (feekf)" and row[1] == "–"]
-    assert without[0][1:8] == ["–"] * 7
-    assert [line for line in text.splitlines() if line.startswith("## ")][:3] == [
-        "## stiff",
-        "## soft",
-        "## holdout: no contacts, only false alarms",
-    ]
+    assert [line for line in text.splitlines() if line.startswith("## ")][:2] == ["## Results", "## Comparisons"]
+
+
+def test_the_first_table_fits_a_pull_request_and_ends_with_the_force(results):
+    made, points = forces()
+    felt = tuple(replace(item, force_at_alarm_n=100.0 + i) for i, item in enumerate(results.contacts))
+    text = to_markdown(Report(evaluate(replace(results, contacts=felt, forces=made, points=points))))
+    head, *table = rows(text.split("## Results\n")[1])
+    assert head[:5] == ["group", "detector", "median [ms]", "missed", "false alarms"]
+    assert head[5:] == ["force at alarm [N]", "force limit exceeded"]
+    momentum = next(row for row in table if row[:2] == ["stiff", "momentum"])
+    assert momentum[2:6] == ["70.0", "**1 of 3: at most 86 %**", "0", "104"]
+    ekf = next(row for row in table if row[:2] == ["stiff", "friction_ekf"])
+    assert ekf[3] == "**0 of 3: at most 63 %; 1 not assessable**"
+    soft = next(row for row in table if row[:2] == ["soft", "momentum"])
+    assert soft[2].startswith("350") or "(" in soft[2], "thirty contacts have an interval"
+
+
+def test_only_narrow_tables_are_not_folded(results):
+    made, points = forces()
+    text = to_markdown(Report(evaluate(replace(results, forces=made, points=points))))
+    shown = re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
+    assert max(len(row) for row in rows(shown)) <= 7 < max(len(row) for row in rows(text))
+
+
+def test_the_worst_recording_is_named_before_all_tables(evaluated):
+    head = to_markdown(Report(evaluated)).split("\n## ")[0]
+    assert "**Worst of 2 failed recordings:** stiff/03.csv (stiff); missed by: momentum: 1 of 2 detectors." in head
 
 
 def test_false_alarms_are_shown_with_their_exposure_and_bounds(evaluated):
     text = to_markdown(Report(evaluated))
-    assert [
-        "momentum",
+    shown, every = [row for row in rows(text) if "holdout" in row[:2] and "momentum" in row[:2]][:2]
+    assert shown == ["holdout", "momentum", "–", "–", "**1**"]
+    assert every[-4:] == [
         "1 in 40 operations, 0.100 h",
         "0.0250 (0.0006 to 0.1393): at most 0.119",
         "10.0 (0.3 to 55.7): at most 47.4",
-    ] in rows(text)
+        "–",
+    ]
 
 
 def test_a_detector_that_assessed_nothing_has_no_rate_and_no_bound(results):
     blind = replace(results, exposure=(ExposureResult("holdout", "momentum", 40, 40, 0.0, 40),), false_alarms=())
     text = to_markdown(Report(evaluate(blind)))
-    assert ["momentum", "not assessable in any of 40 operations", "–", "–"] in rows(text)
+    shown, every = [row for row in rows(text) if "holdout" in row[:2] and "momentum" in row[:2]][:2]
+    assert shown[4] == "**not assessable in any of 40 operations**"
+    assert every[-4:-1] == ["not assessable in any of 40 operations", "–", "–"]
     assert "0 in 40" not in text
     assert "false alarms not assessable" in text
 
@@ -165,6 +193,7 @@ def test_single_contacts_and_alarms_are_folded_with_their_reason(results):
     text = to_markdown(Report(evaluate(replace(results, calibration=(budget,), findings=findings))))
     assert ["b.csv", "its end is cut off"] in rows(text) and "**2 entries of data left out or lost**" in text
     assert folded(text) == [
+        "All results",
         "Contacts missed",
         "False alarms",
         "Contacts not assessable",
@@ -188,9 +217,11 @@ def test_single_contacts_and_alarms_are_folded_with_their_reason(results):
 
 def test_differences_that_are_shown_are_listed_and_their_absence_is_not_a_proof(results):
     text = to_markdown(Report(evaluate(results)))
-    assert "1 pair of detectors on the same contacts; p corrected" in text
-    assert "No difference is shown; this is not a proof of none." in text
-    assert "There are too few recordings to show one; recordings of one campaign" in text
+    assert "No difference can be shown between 1 pair of detectors: there are too few recordings of the same" in text
+    alike = contacts_of("friction_ekf", "stiff", [30.0] * 12) + contacts_of("momentum", "stiff", [30.0] * 12)
+    enough = to_markdown(Report(evaluate(replace(results, contacts=tuple(alike)))))
+    assert "1 pair of detectors on the same contacts; p corrected" in enough
+    assert "No difference is shown; this is not a proof of none." in enough
     fast, slow = [30.0 + i % 3 for i in range(12)], [60.0 + i % 5 for i in range(12)]
     contacts = [*contacts_of("friction_ekf", "stiff", fast), *contacts_of("momentum", "stiff", slow)]
     contacts += contacts_of("friction_ekf", "soft", fast) + contacts_of("momentum", "soft", [None] * 12)
@@ -233,8 +264,8 @@ def test_images_are_linked_by_relative_name_below_their_group(evaluated):
     text = to_markdown(
         Report(evaluated, images=(Image("latency.png", "all"), Image("triggers_soft.png", "soft [x]", "soft")))
     )
-    assert text.index("![all](latency.png)") < text.index("## stiff") < text.index("## soft")
-    assert text.index("## soft") < text.index("](triggers_soft.png)") < text.index("## holdout")
+    assert text.index("## Results") < text.index("![all](latency.png)") < text.index("## soft")
+    assert text.index("## soft") < text.index("](triggers_soft.png)") < text.index("## Comparisons")
 
 
 def nothing_is_active(text: str, tables: int) -> None:
@@ -257,7 +288,7 @@ def nothing_is_active(text: str, tables: int) -> None:
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_are_shown_as_text(results, kind):
     name = HOSTILE[kind]
-    nothing_is_active(to_markdown(Report(named(results, name), images=(Image("a.png", name, name),))), 18)
+    nothing_is_active(to_markdown(Report(named(results, name), images=(Image("a.png", name, name),))), 19)
 
 
 @settings(max_examples=60, deadline=None)
@@ -317,7 +348,7 @@ def test_a_report_of_5000_recordings_fits_a_comment_and_says_what_it_left_out(fi
     assert 50_000 < len(text) <= 60_000
     assert text.startswith("# Collision detection: 5 of 15 limits not met (5 violated)\n")
     assert len([row for row in rows(text) if row[0] in ("met", "**violated**")]) == 15
-    assert "## stiff" in text and "## holdout" in text and "## Comparisons" in text
+    assert "## Results" in text and "All results (10)" in text and "## Comparisons" in text
     missed = re.search(r"Cut here: (\d+) of 6250 rows; all of them are in results.json \(`contacts`\)", text)
     assert missed and int(missed[1]) == sum("no alarm in its window" in row for row in rows(text)) > 10
     whole_blocks(text)

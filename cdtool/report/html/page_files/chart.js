@@ -147,6 +147,7 @@ class Chart {
     svg.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     svg.addEventListener("keydown", (event) => this.key(event));
     this.redraw();
+    if (svg.dataset.width) return; // of a fixed width, such as on paper
     new ResizeObserver(() => {
       if (Math.abs(svg.clientWidth - this.width) > 1) this.redraw();
     }).observe(svg);
@@ -198,7 +199,7 @@ class Chart {
 
   redraw() {
     const { svg, plan } = this;
-    this.width = svg.clientWidth || 600;
+    this.width = Number(svg.dataset.width) || svg.clientWidth || 600;
     this.height = Number(svg.getAttribute("height"));
     svg.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
     [svg.dataset.from, svg.dataset.to] = this.view;

@@ -30,7 +30,7 @@ function histogramPlan(data, panel) {
       return `M${from} ${top + BARS_BOTTOM}V${(top + BARS_BOTTOM - height).toFixed(1)}H${to}V${top + BARS_BOTTOM}Z`;
     });
     draw(tint(draw(chart.layer, "g"), detector), "path", { class: "bar", d: bars.join("") });
-    drawMedian(chart, row.median, top + BARS_BOTTOM, clamp);
+    drawMedian(chart, row, top + BARS_BOTTOM, clamp);
   }
 
   return {

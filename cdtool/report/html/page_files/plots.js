@@ -14,24 +14,21 @@ function recordingName(data, number) {
   return number < 0 ? "a recording that is not listed" : data.recordings[number];
 }
 
-/** The median of a lane, and its interval if it has one; dotted if its end is not reached. */
-function drawMedian(chart, [middle, low, high], y, clamp) {
-  if (middle === null) return;
-  const x = chart.x(clamp(middle));
-  if (low === undefined) {
-    // Too few contacts for an interval.
+/** The median of a lane, and its interval if it has one; without an upper end it is written where it begins. */
+function drawMedian(chart, { median: [middle, low, high], open }, y, clamp) {
+  if (middle !== null) {
+    const x = chart.x(clamp(middle));
     draw(chart.layer, "path", { class: "median", d: `M${x} ${y - 12}V${y + 12}` });
-    return;
   }
-  const from = low === null ? x : chart.x(clamp(low));
-  const to = high === null ? x : chart.x(clamp(high));
-  draw(chart.layer, "path", { class: "median", d: `M${x} ${y - 12}V${y + 12}M${from} ${y}H${to}` });
-  if (high !== null) return;
-  const end = chart.right - 6;
-  draw(chart.layer, "path", {
-    class: "cross",
-    d: `M${x} ${y}H${end}M${end - 5} ${y - 4}L${end} ${y}L${end - 5} ${y + 4}`,
-  });
+  if (open) {
+    const x = chart.x(clamp(open[0]));
+    draw(chart.layer, "path", { class: "open-end", d: `M${x} ${y + 6}V${y + 17}` });
+    const isRight = x > 0.5 * chart.width;
+    const at = { class: "small halo", x: isRight ? x - 6 : x + 6, y: y + 16, "text-anchor": isRight ? "end" : "start" };
+    draw(chart.layer, "text", at, open[1]);
+  } else if (middle !== null && low !== undefined && low !== null && high !== null) {
+    draw(chart.layer, "path", { class: "median", d: `M${chart.x(clamp(low))} ${y}H${chart.x(clamp(high))}` });
+  }
 }
 
 /** A mark per contact in its detector's lane, with the median and its interval. */
@@ -71,7 +68,7 @@ function latencyPlan(data, panel, openRecording) {
     draw(group, "path", { class: "mark", d: marks.join("") });
     const open = row.watched.map((value, i) => outline(detector.marker, chart.x(value), heightOf(place, i), 3.6));
     draw(group, "path", { class: "open", d: open.join("") });
-    drawMedian(chart, row.median, top + 46, clamp);
+    drawMedian(chart, row, top + 46, clamp);
   }
 
   function nearest(chart, values, place, x, y) {

@@ -48,15 +48,30 @@ function makeForces(data, viewer) {
   makeForceLegend(host, data, detectors);
 }
 
-/** Print collapsed parts too. */
-function unfoldForPrint() {
-  let folded = [];
+/** Show the headings of tables as text or as buttons: on later pages a browser repeats headings without buttons. */
+function headingsForPrint() {
+  const buttons = [...document.querySelectorAll("th button")];
+  const words = buttons.map((button) => document.createTextNode(button.textContent));
+  buttons.forEach((button, i) => button.replaceWith(words[i]));
+  return () => buttons.forEach((button, i) => words[i].replaceWith(button));
+}
+
+/** Print collapsed parts, all rows of long tables, and the trigger plots of failed recordings too. */
+function completeForPrint(data, viewer, paged) {
+  let folded = [],
+    restoreHeadings = () => {};
   addEventListener("beforeprint", () => {
     folded = [...document.querySelectorAll("details:not([open])")];
     for (const part of folded) part.open = true;
+    for (const table of paged) table.printing(true);
+    restoreHeadings = headingsForPrint();
+    if (viewer) printFailed(data, data.failed.map(viewer.traceAt));
   });
   addEventListener("afterprint", () => {
     for (const part of folded) part.open = false;
+    restoreHeadings();
+    for (const table of paged) table.printing(false);
+    if (viewer) printFailed(data, []);
   });
 }
 
@@ -84,8 +99,8 @@ function start() {
   makeCharts("survival", data, data.survival, (panel, hidden) => survivalPlan(data, panel, hidden));
   makeAmoc(data);
   makeForces(data, viewer);
-  if (viewer) viewer.open(0, false);
-  unfoldForPrint();
+  if (viewer) viewer.open(data.failed.length ? data.failed[0] : 0, false);
+  completeForPrint(data, viewer, paged);
 }
 
 start();

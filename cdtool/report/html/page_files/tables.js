@@ -4,6 +4,8 @@
 const NO_KEY = 1e299;
 const PAGE_SIZES = [15, 50, 200, 1000];
 const LONGEST_WORD = 28;
+// A browser prints more rows only after minutes.
+const MOST_PRINTED = 1000;
 
 /** Which of two rows comes first: by number if they have one, else by text. */
 function compareRows(first, second, direction) {
@@ -67,6 +69,7 @@ class PagedTable {
     makeSortable(headings, (column, direction) => this.sort(column, direction));
     this.body = make(element, "tbody");
     this.pages = make(host, "div", { class: "pages" });
+    this.cut = make(host, "p", { class: "note print-only" });
     this.draw();
   }
 
@@ -146,6 +149,7 @@ class PagedTable {
     const from = this.page * this.size;
     this.body.replaceChildren();
     for (const row of rows.slice(from, from + this.size)) this.drawRow(row);
+    this.cut.textContent = last ? `${rows.length - this.size} more rows are on the screen and in results.json.` : "";
     this.drawPages(rows.length, from, last);
   }
 
@@ -206,6 +210,13 @@ class PagedTable {
       this.size = Number(select.value);
       this.draw();
     });
+  }
+
+  /** On paper all rows are shown, up to MOST_PRINTED; then as before. */
+  printing(begins) {
+    if (begins) this.before = [this.page, this.size];
+    [this.page, this.size] = begins ? [0, MOST_PRINTED] : this.before;
+    this.draw();
   }
 
   /** The row whose trace is shown. */

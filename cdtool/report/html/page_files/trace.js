@@ -221,7 +221,7 @@ function tracePlan(data, trace) {
         y: box.from,
         width,
         height: box.to - box.from,
-        fill: `url(#hatch-${code})`,
+        fill: `url(#${chart.hatch}-${code})`,
       });
       const reason = data.reasons[code];
       const words = [`not assessable: ${reason}`, reason].find((text) => text.length * 6.2 + 8 < width);
@@ -264,9 +264,11 @@ function tracePlan(data, trace) {
     label: contact ? data.axes.time : "time [s]",
     draw(chart) {
       const defs = draw(chart.svg, "defs");
+      // Another plot's pattern would not be drawn while that plot is hidden.
+      chart.hatch = `hatch-${(clipCount += 1)}`;
       for (const [code, d] of Object.entries(HATCHES)) {
         const pattern = draw(defs, "pattern", {
-          id: `hatch-${code}`,
+          id: `${chart.hatch}-${code}`,
           class: "hatch",
           width: 8,
           height: 8,
@@ -308,7 +310,21 @@ function lateness(trace, panel) {
   return { detected: seen.late, missed: 1e6 }[seen.outcome] ?? 1e7;
 }
 
-/** The panel above the table of recordings; returns open(number) to show a trace. */
+/** Group, contact, peak and onset of a trace. */
+function wordsOf(trace) {
+  const contact = shownContact(trace);
+  const words = [trace.group];
+  if (!contact) words.push("no contact");
+  else if (trace.contacts.length > 1) words.push(`contact ${trace.contact + 1} of ${trace.contacts.length}`);
+  if (contact && contact.peak_force !== null) words.push(`peak ${numberText(contact.peak_force)} N`);
+  if (contact)
+    words.push(
+      `onset ${contact.start.toFixed(3)} s (${contact.found_by}, ± ${numberText(1e3 * contact.uncertainty, 2)} ms)`,
+    );
+  return words;
+}
+
+/** The panel with the trigger plot of one recording; returns open(number) to show a trace. */
 function makeViewer(data, sources, opened) {
   const viewer = document.getElementById("viewer");
   const svg = document.getElementById("viewer-plot");
@@ -335,15 +351,7 @@ function makeViewer(data, sources, opened) {
   }
 
   function tell(trace, number) {
-    const contact = shownContact(trace);
-    const words = [trace.group];
-    if (!contact) words.push("no contact");
-    else if (trace.contacts.length > 1) words.push(`contact ${trace.contact + 1} of ${trace.contacts.length}`);
-    if (contact && contact.peak_force !== null) words.push(`peak ${numberText(contact.peak_force)} N`);
-    if (contact)
-      words.push(
-        `onset ${contact.start.toFixed(3)} s (${contact.found_by}, ± ${numberText(1e3 * contact.uncertainty, 2)} ms)`,
-      );
+    const words = wordsOf(trace);
     words.push(`plot ${number + 1} of ${sources.length}${trace.chosen ? `: ${trace.chosen}` : ""}`);
     document.getElementById("viewer-title").textContent = trace.recording || "(no name)";
     document.getElementById("viewer-words").textContent = words.join(" · ");
