@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -143,7 +143,7 @@ class BenchmarkFile:
             "synchronisation_s": "measured" if self.measures_synchronisation else self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {
-                name: asdict(profile) for name in self.groups_of_impacts if (profile := self.impacts[name].force)
+                name: profile.described for name in self.groups_of_impacts if (profile := self.impacts[name].force)
             },
             "sections": self._in_words(self.sections),
         }
