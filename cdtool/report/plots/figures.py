@@ -133,18 +133,27 @@ def text_width(texts: Iterable[str], size: float) -> float:
 
 def save(figure: Figure, path: Path) -> None:
     """Write a figure in the format of its suffix; raises UsageError for an unknown one, CdtoolError if it cannot."""
-    from importlib import import_module
-
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise UsageError(f"{plain(path)} does not name a figure", f"a name that ends in {', '.join(SUFFIXES)}")
+    write_bytes(path, _drawn(figure, suffix))
+
+
+def svg_text(figure: Figure) -> str:
+    """Return a figure as SVG, to be put into a document."""
+    return _drawn(figure, ".svg").decode("utf-8")
+
+
+def _drawn(figure: Figure, suffix: str) -> bytes:
+    """Return the bytes of a figure in the format of a suffix."""
+    from importlib import import_module
+
     canvas = import_module(_BACKENDS[suffix]).FigureCanvas(figure)
-    kind = suffix[1:]
     with drawing():
         _settle(figure)
         drawn = BytesIO()
-        getattr(canvas, f"print_{kind}")(drawn, metadata=_METADATA[suffix])
-        write_bytes(path, drawn.getvalue())
+        getattr(canvas, f"print_{suffix[1:]}")(drawn, metadata=_METADATA[suffix])
+        return drawn.getvalue()
 
 
 def write(

@@ -263,6 +263,7 @@ def read_benchmark_file(
     """
     file = location(path)
     root = Table(read_toml(file, "a benchmark file"), str(file))
+    root.raw("protocol")  # read by workflows/protocol
     if isinstance(root.raw("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
