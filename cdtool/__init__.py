@@ -16,6 +16,7 @@ Every command is available as a function:
     cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
         cdtool.explain_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
     cdtool.benchmark("benchmark.toml")                                  -> Benchmark
+    cdtool.protocol("protocol.toml")                                    -> Protocol: of a force test, to be signed
     cdtool.score("triggers.csv", "benchmark.toml")                      -> Score
     cdtool.compare("old.json", "new.json")                              -> BuildComparison
     cdtool.plan(missed_at_most="5%")                                    -> Plan
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.init.drafting import init, init_study
     from cdtool.workflows.injecting import inject
     from cdtool.workflows.planning import plan
+    from cdtool.workflows.protocol.measuring import protocol
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
@@ -78,6 +80,7 @@ _API = {
     "inject": "cdtool.workflows.injecting:inject",
     "init": "cdtool.workflows.init.drafting:init",
     "init_study": "cdtool.workflows.init.drafting:init_study",
+    "protocol": "cdtool.workflows.protocol.measuring:protocol",
     "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",
@@ -107,6 +110,7 @@ __all__ = [
     "inject",
     "learn_signature",
     "plan",
+    "protocol",
     "read",
     "recover",
     "score",

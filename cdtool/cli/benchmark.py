@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -21,6 +22,7 @@ from cdtool.cli.options import (
     listed,
 )
 from cdtool.cli.place import Place, location
+from cdtool.cli.protocol import facts_of, file_of_protocol, show_protocol
 from cdtool.cli.summary_table import finish, show_conclusion, show_table
 from cdtool.errors import UsageError
 from cdtool.plain_text import counted
@@ -38,6 +40,15 @@ def benchmark(
     ],
     output: OutputOption = None,
     force: ForceOption = False,
+    protocol: Annotated[
+        Place | None,
+        typer.Option(
+            "--protocol",
+            "-p",
+            parser=location,
+            help="Protocol file (TOML) for -o protocol.pdf or protocol.html. Default: [protocol] of FILE.",
+        ),
+    ] = None,
     detectors: Annotated[
         str | None,
         typer.Option(
@@ -74,12 +85,13 @@ def benchmark(
 ) -> None:
     """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
 
-    Exits with status 1 if a limit or force profile in the file is violated.
+    Exits with status 1 if a limit or force profile in the file is violated, and with 4 if a protocol is incomplete.
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
     from cdtool.evaluation.results_file import to_json
     from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.protocol.names import protocol_names
     from cdtool.report.writers.base import Report
     from cdtool.workflows.benchmark.benchmark import benchmark as run
     from cdtool.workflows.execution.workers import Workers
@@ -92,8 +104,10 @@ def benchmark(
     if dry_run:
         _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
         return
-    targets = output or []
+    documents, targets = protocol_names(output or [])
+    protocol_file = file_of_protocol(file, protocol, documents)
     check_outputs(targets, force=force)
+    check_outputs(documents, force=force, subject="protocol")
     with progress("benchmark") as advance:
         done = run(
             file,
@@ -104,6 +118,13 @@ def benchmark(
             progress=advance,
         )
     written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
+    made = None
+    if protocol_file is not None:
+        from cdtool.workflows.protocol.measuring import make_protocol
+
+        made = make_protocol(protocol_file, done, _command(file, protocol, output or [], detectors, false_alarm_budget))
+        inputs = (*done.inputs, protocol_file.path)
+        write_outputs(made, documents, force=force, inputs=inputs, subject="protocol")
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
         typer.echo(to_json(done.results), nl=False)
@@ -115,7 +136,21 @@ def benchmark(
             typer.echo(f"store: {counted(done.stored.computed, 'recording')} computed, {done.stored.reused} as stored")
         for path in written:
             typer.echo(f"written: {plain(path)}")
-    finish(done.evaluated)
+        if made is not None:
+            show_protocol(made, documents)
+        elif done.results.forces:
+            typer.echo("next, for a test protocol of these forces:")
+            typer.echo(f"  cdtool protocol init {shlex.quote(plain(file))} -o protocol.toml")
+    finish(done.evaluated, facts_of(made.verdict.outcome) if made is not None else ())
+
+
+def _command(
+    file: Path, protocol: Path | None, output: list[Path], detectors: str | None, false_alarm_budget: str | None
+) -> str:
+    """Return the command with the options that determine a protocol."""
+    options = [("-p", protocol), ("--detectors", detectors), ("--false-alarm-budget", false_alarm_budget)]
+    given = [(name, value) for name, value in options if value is not None] + [("-o", path) for path in output]
+    return shlex.join(["cdtool", "benchmark", str(file), *(str(word) for pair in given for word in pair)])
 
 
 def _show_agreement(evaluated: Evaluated) -> None:

@@ -146,7 +146,7 @@ def assess_point(
     needed = max(point.repetitions, profile.average_of if profile else 1)
     reasons = [
         *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
-        *_of_count(point, needed, len(repetitions), bool(unmeasured)),
+        *_of_count(point, needed, len(repetitions), has_others=bool(unmeasured)),
         *(_reason(ReasonKind(item.kind), point, recording=item.recording, message=item.message) for item in unmeasured),
         *_repeated(point, repetitions),
     ]
@@ -155,6 +155,37 @@ def assess_point(
         for number, item in enumerate(repetitions, 1):
             reasons += _of_repetition(point, number, item, profile, instrument)
     return PointAssessment(point, profile, tuple(repetitions), verdict, tuple(reasons))
+
+
+def check_point(point: MeasuringPoint, profile: ForceProfile | None, recordings: int) -> PointAssessment:
+    """Check the plan of a point against its profile, before its recordings are read.
+
+    Parameters
+    ----------
+    point : MeasuringPoint
+        The point of the plan.
+    profile : ForceProfile or None
+        Its force limits, if it has any.
+    recordings : int
+        The number of its recordings.
+
+    Returns
+    -------
+    PointAssessment
+        Without repetitions; with every reason that is known already.
+
+    Examples
+    --------
+    >>> found = check_point(MeasuringPoint(name="edge", repetitions=3), None, recordings=3)
+    >>> [reason.kind.value for reason in found.reasons]
+    ['no_profile']
+    """
+    needed = max(point.repetitions, profile.average_of if profile else 1)
+    reasons = [
+        *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
+        *_of_count(point, needed, recordings, has_others=False),
+    ]
+    return PointAssessment(point, profile, (), None, tuple(reasons))
 
 
 def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Sequence[Reason] = ()) -> Verdict:
@@ -208,7 +239,7 @@ def _of_plan(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason]:
         yield _reason(ReasonKind.WRONG_STIFFNESS, point, stiffness=stiffness, needed=required, profile=profile.name)
 
 
-def _of_count(point: MeasuringPoint, needed: int, present: int, has_others: bool) -> Iterator[Reason]:
+def _of_count(point: MeasuringPoint, needed: int, present: int, *, has_others: bool) -> Iterator[Reason]:
     if present < needed:
         # With recordings that are no repetition, these are the reason; the count is stated in any case.
         kind = ReasonKind.TOO_FEW_REPETITIONS if present or has_others else ReasonKind.NOT_MEASURED

@@ -40,21 +40,19 @@ def protocol_document(protocol: Protocol) -> Document:
         data_hash=words("document.data_hash", hash=protocol.data_sha256),
         page=words("document.page", page="{page}", pages="{pages}"),
         day=(day.year, day.month, day.day) if day else None,
-        blocks=tuple(
-            [
-                *_cover(protocol, words),
-                *_machine(protocol, words),
-                *_instruments(protocol, words),
-                *_plan(protocol, words),
-                *_results(protocol, words),
-                *_curves(protocol, words),
-                *_latencies(protocol, words),
-                *_checks(protocol, words),
-                *_deviations(protocol, words),
-                *_limits(protocol, words),
-                *_provenance(protocol, words),
-                *_signatures(protocol, words),
-            ]
+        blocks=(
+            *_cover(protocol, words),
+            *_machine(protocol, words),
+            *_instruments(protocol, words),
+            *_plan(protocol, words),
+            *_results(protocol, words),
+            *_curves(protocol, words),
+            *_latencies(protocol, words),
+            *_checks(protocol, words),
+            *_deviations(protocol, words),
+            *_limits(protocol, words),
+            *_provenance(protocol, words),
+            *_signatures(protocol, words),
         ),
     )
 
@@ -173,7 +171,9 @@ def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
     times = [item.dynamic_time for item in point.repetitions]
     time = _time(sum(times) / len(times) if kind == "mean" else max(times), words)
     blank = [""] if pressures else []
-    rows.append((*_row(words, words(f"row.{kind}"), "", first, time, *others, *blank), words(f"outcome.{point.outcome}")))
+    rows.append(
+        (*_row(words, words(f"row.{kind}"), "", first, time, *others, *blank), words(f"outcome.{point.outcome}"))
+    )
     at_most = _padded([step.at_most_n for step in profile.steps])
     limit_time = words.number(1e3 * profile.steps[1].from_s) if len(profile.steps) > 1 else ""
     rows.append((*_row(words, words("row.limit"), profile.name, at_most[0], limit_time, *at_most[1:], *blank), ""))

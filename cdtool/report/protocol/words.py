@@ -1,4 +1,4 @@
-"""The texts of a protocol in one language: sentences with placeholders from a table, numbers and dates as usual there."""
+"""The texts of a protocol in one language: sentences from a table, numbers and dates as usual there."""
 
 from __future__ import annotations
 

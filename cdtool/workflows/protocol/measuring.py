@@ -18,11 +18,11 @@ from cdtool.evaluation.protocol.protocol import ExcludedRecording, FileDigest, P
 from cdtool.evaluation.results import Results, Skipped
 from cdtool.recording import Recording
 from cdtool.version import __version__
-from cdtool.workflows.benchmark.benchmark import Benchmark
+from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
 from cdtool.workflows.contacts.matched_log import force_curves
-from cdtool.workflows.protocol.protocol_file import ProtocolFile, digest_of_file
+from cdtool.workflows.protocol.protocol_file import ProtocolFile, digest_of_file, read_protocol_file
 from cdtool.workflows.runs import find_logs, resolve_all, shown_path
 
 
@@ -94,6 +94,43 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
     return Assignment(tuple(points), excluded)
 
 
+def protocol(file: str | Path, *, detectors: Sequence[str] = (), jobs: int = 1) -> Protocol:
+    """Run the benchmark of a protocol file and return its protocol.
+
+    Parameters
+    ----------
+    file : str or Path
+        The protocol file, or a benchmark file with a table [protocol].
+    detectors : sequence of str, optional
+        Detectors in place of the benchmark's.
+    jobs : int, optional
+        Number of logs processed at a time.
+
+    Returns
+    -------
+    Protocol
+        Points, repetitions, verdict and provenance.
+
+    Raises
+    ------
+    ConfigurationError
+        A file is wrong; the message names file and key.
+    CdtoolError
+        The benchmark cannot be run, see `cdtool.benchmark`.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> made = cdtool.protocol("sample_logs/gate/protocol.toml", detectors=["momentum"])
+    >>> made.verdict.outcome, [point.outcome for point in made.points]
+    ('fail', ['fail', 'fail'])
+    """
+    read = read_protocol_file(file)
+    if read.benchmark is None:
+        raise ConfigurationError(f"{read.path}: protocol.benchmark: is missing", "name the benchmark file")
+    return make_protocol(read, benchmark(read.benchmark, detectors=detectors, jobs=jobs), f"cdtool.protocol({file})")
+
+
 def make_protocol(file: ProtocolFile, done: Benchmark, command: str = "") -> Protocol:
     """Return the protocol of a finished benchmark: its recordings are read again for the whole force-time curves.
 
@@ -118,7 +155,7 @@ def make_protocol(file: ProtocolFile, done: Benchmark, command: str = "") -> Pro
 
     Examples
     --------
-    `cdtool.protocol` runs the benchmark and returns its protocol.
+    `protocol` runs the benchmark of a protocol file and returns its protocol.
     """
     setup = read_benchmark_file(done.inputs[0], detectors=done.results.detectors)
     if file.benchmark and file.benchmark.resolve() != setup.path.resolve():
