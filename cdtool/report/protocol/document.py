@@ -125,7 +125,7 @@ def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
         reach = f"{words.number(item.range_n)} N" if item.range_n else item.range
         values = (item.quantity, item.model, item.serial_number, reach, item.accuracy_class, item.sample_rate_hz)
         rows.append(_row(words, *values, item.filter, item.calibrated_on, item.calibration_valid_until))
-    yield _grid(columns, rows, widths=(2, 4, 3, 3, 3, 2, 3, 3, 3), numeric=(5,))
+    yield _grid(columns, rows, widths=(5, 8, 6, 5, 5, 5, 6, 6, 6), numeric=(5,))
 
 
 def _plan(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -179,7 +179,7 @@ def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
     rows.append((*_row(words, words("row.limit"), profile.name, at_most[0], limit_time, *at_most[1:], *blank), ""))
     count = len(point.repetitions)
     numeric = tuple(range(2, len(columns) - 1))
-    widths = (2, 7, *(3 for _ in numeric), 4)
+    widths = (4, 13, *(6 for _ in numeric), 8)
     yield _grid(columns, rows, widths=widths, numeric=numeric, strong=(count, count + 1))
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from statistics import median
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -186,7 +187,7 @@ def _speeds(read: LogToScore) -> Iterator[float]:
 
 def _profiles_known() -> list[str]:
     names = list(read_force_limits())
-    return ['# Force profiles that come with cdtool, or limits = "FILE" with your own:', f"# {', '.join(names)}"]
+    return ['# Force profiles that come with cdtool, or limits = "FILE" with your own:', *wrap(", ".join(names), 100, initial_indent="# ", subsequent_indent="# ")]
 
 
 def _table(heading: str, kind: type[Any], known: Mapping[str, tuple[str, str]]) -> list[str]:
