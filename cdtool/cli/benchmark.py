@@ -120,11 +120,12 @@ def benchmark(
     written = write_outputs(Report(done.evaluated, done.traces), targets, force=force, inputs=done.inputs)
     made = None
     if protocol_file is not None:
+        from cdtool.report.protocol.document import ProtocolReport
         from cdtool.workflows.protocol.measuring import make_protocol
 
         made = make_protocol(protocol_file, done, _command(file, protocol, output or [], detectors, false_alarm_budget))
         inputs = (*done.inputs, protocol_file.path)
-        write_outputs(made, documents, force=force, inputs=inputs, subject="protocol")
+        write_outputs(ProtocolReport(made), documents, force=force, inputs=inputs, subject="protocol")
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
         typer.echo(to_json(done.results), nl=False)
@@ -147,9 +148,11 @@ def benchmark(
 def _command(
     file: Path, protocol: Path | None, output: list[Path], detectors: str | None, false_alarm_budget: str | None
 ) -> str:
-    """Return the command with the options that determine a protocol."""
+    """Return the command with the options that determine a protocol; of the outputs only their names."""
     options = [("-p", protocol), ("--detectors", detectors), ("--false-alarm-budget", false_alarm_budget)]
-    given = [(name, value) for name, value in options if value is not None] + [("-o", path) for path in output]
+    given = [(name, value) for name, value in options if value is not None] + [
+        ("-o", Path(path.name)) for path in output
+    ]
     return shlex.join(["cdtool", "benchmark", str(file), *(str(word) for pair in given for word in pair)])
 
 

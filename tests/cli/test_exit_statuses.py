@@ -18,6 +18,7 @@ from tests.command import Outcome, cdtool
 from tests.evaluation.judged_results import results as judged_results
 from tests.formats.mcap.small_files import small_file
 from tests.synthetic.builds import MISSED, build_results
+from tests.synthetic.force_rig import write_protocol
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
@@ -86,6 +87,10 @@ class Folder:
         head = 'machine = "model.toml"\ndetectors = ["gm"]\n'
         path.write_text(f"{head}[signature]\nforce = true\n[learn]\nlogs = [{free}]\n{inject}", encoding="utf-8")
         return path
+
+    @property
+    def gate_protocol(self) -> Path:
+        return GATE / "protocol.toml"
 
     @property
     def store(self) -> Path:
@@ -240,6 +245,11 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("signature update", 0): lambda f: _update(f, f.gate / "holdout" / "01.csv"),
     ("signature update", 2): lambda f: _update(f, f.absent),
     ("signature update", 3): lambda f: _update(f, f.gate / "holdout" / "01.csv", f.empty),
+    ("protocol init", 0): lambda f: cdtool("protocol", "init", f.benchmark(), "-o", f.path / "protocol.toml"),
+    ("protocol init", 2): lambda f: cdtool("protocol", "init", f.absent, "-o", f.path / "protocol.toml"),
+    ("protocol check", 0): lambda f: cdtool("protocol", "check", f.gate_protocol),
+    ("protocol check", 2): lambda f: cdtool("protocol", "check", f.machine),
+    ("protocol check", 4): lambda f: cdtool("protocol", "check", write_protocol(f.path, valid_until="2026-01-16")),
     ("store status", 0): lambda f: cdtool("store", "status", f.store),
     ("store status", 2): lambda f: cdtool("store", "status", f.absent),
     ("store gc", 0): lambda f: cdtool("store", "gc", f.store),

@@ -47,4 +47,4 @@ class Protocol:
     def data_sha256(self) -> str:
         """Return the hash of the data, which stands on every page: of all files' names and hashes, in their order."""
         lines = "".join(f"{item.sha256}  {item.name}\n" for item in self.files)
-        return hashlib.sha256(lines.encode()).hexdigest()
+        return hashlib.sha256(lines.encode("utf-8", "surrogatepass")).hexdigest()

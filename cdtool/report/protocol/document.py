@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition
 from cdtool.evaluation.protocol.plan import Instrument
@@ -26,6 +27,18 @@ from cdtool.report.protocol.curve_drawing import curve_drawings
 from cdtool.report.protocol.words import Words, words_of
 
 _CHECKED_STEPS = 3
+
+
+@dataclass(frozen=True)
+class ProtocolReport:
+    """What the writers of a protocol write: the protocol, and its document, which is made once."""
+
+    protocol: Protocol
+
+    @cached_property
+    def document(self) -> Document:
+        """The document in the language of the plan."""
+        return protocol_document(self.protocol)
 
 
 def protocol_document(protocol: Protocol) -> Document:
@@ -137,7 +150,7 @@ def _plan(protocol: Protocol, words: Words) -> Iterator[Block]:
         numbers = (item.obstacle_stiffness_n_per_mm, item.contact_area_mm2, item.speed_m_per_s, item.repetitions)
         rows.append(_row(words, item.name, item.position, item.region, item.obstacle, *numbers))
     if rows:
-        yield _grid(columns, rows, widths=(4, 6, 4, 4, 3, 2, 2, 3), numeric=(4, 5, 6, 7))
+        yield _grid(columns, rows, widths=(8, 12, 9, 9, 6, 5, 5, 6), numeric=(4, 5, 6, 7))
     else:
         yield Paragraph(words("text.no_point"))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +13,11 @@ from cdtool.report.protocol.blocks import Curves, Document
 
 if TYPE_CHECKING:
     from jinja2 import Template
+    from markupsafe import Markup
 
 _FOLDER = Path(__file__).with_name("page_files")
+# After a sign between two characters, and between 24 others: as in protocol.typ.
+_BREAKS = re.compile(r"(?<=[/_])(?=\S)|(?<=\S{24})(?=\S{8})")
 
 
 def to_html(document: Document) -> str:
@@ -40,7 +44,16 @@ def _template() -> Template:
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["breakable"] = _breakable
     return environment.from_string(page_file("protocol.html.j2"))
+
+
+def _breakable(text: str) -> Markup:
+    """Return a text as markup, with places to break after the signs of file names and within what is very long."""
+    from markupsafe import Markup, escape
+
+    parts = _BREAKS.split(text)
+    return Markup("<wbr>").join(escape(part) for part in parts if part)
 
 
 def _data_url(svg: str) -> str:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from cdtool.evaluation.protocol.protocol import Protocol
 from cdtool.files import write_text
 from cdtool.foreign_files import Kind
 from cdtool.report.writers.base import Subject, Writer
 
+if TYPE_CHECKING:
+    from cdtool.report.protocol.document import ProtocolReport
 
-class ProtocolHtml(Writer[Protocol]):
+
+class ProtocolHtml(Writer["ProtocolReport"]):
     """Test protocol: HTML, one page without script that loads no other file and prints as A4."""
 
     name: ClassVar[str] = "protocol_html"
@@ -19,9 +21,8 @@ class ProtocolHtml(Writer[Protocol]):
     suffixes: ClassVar[tuple[str, ...]] = (".html",)
     kinds: ClassVar[dict[str, Kind]] = {".html": Kind(b'content="cdtool test protocol"', "test protocol of cdtool")}
 
-    def write(self, report: Protocol, target: Path) -> None:
+    def write(self, report: ProtocolReport, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        from cdtool.report.protocol.document import protocol_document
         from cdtool.report.protocol.html import to_html
 
-        write_text(target, to_html(protocol_document(report)))
+        write_text(target, to_html(report.document))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from cdtool.evaluation.protocol.protocol import Protocol
 from cdtool.files import write_bytes
 from cdtool.foreign_files import Kind
 from cdtool.report.writers.base import Subject, Writer
 
+if TYPE_CHECKING:
+    from cdtool.report.protocol.document import ProtocolReport
 
-class ProtocolPdf(Writer[Protocol]):
+
+class ProtocolPdf(Writer["ProtocolReport"]):
     """Test protocol: PDF/A-2a, tagged, with embedded fonts; needs the extra `pdf`."""
 
     name: ClassVar[str] = "protocol_pdf"
@@ -26,9 +28,8 @@ class ProtocolPdf(Writer[Protocol]):
 
         check_typst()
 
-    def write(self, report: Protocol, target: Path) -> None:
+    def write(self, report: ProtocolReport, target: Path) -> None:
         """Write it; raises CdtoolError."""
-        from cdtool.report.protocol.document import protocol_document
         from cdtool.report.protocol.pdf import to_pdf
 
-        write_bytes(target, to_pdf(protocol_document(report)))
+        write_bytes(target, to_pdf(report.document))

@@ -187,7 +187,10 @@ def _speeds(read: LogToScore) -> Iterator[float]:
 
 def _profiles_known() -> list[str]:
     names = list(read_force_limits())
-    return ['# Force profiles that come with cdtool, or limits = "FILE" with your own:', *wrap(", ".join(names), 100, initial_indent="# ", subsequent_indent="# ")]
+    return [
+        '# Force profiles that come with cdtool, or limits = "FILE" with your own:',
+        *wrap(", ".join(names), 100, initial_indent="# ", subsequent_indent="# "),
+    ]
 
 
 def _table(heading: str, kind: type[Any], known: Mapping[str, tuple[str, str]]) -> list[str]:

@@ -225,7 +225,9 @@ def test_a_calibration_is_valid_on_its_first_and_last_day():
 def test_a_missing_value_is_named_with_its_key_and_file(name):
     plan = replace(PLAN, machine=replace(PLAN.machine, **{name: ""}))
     verdict = judge(plan, good(), "p.toml")
-    assert [dict(reason.values) for reason in verdict.reasons] == [{"key": f"protocol.machine.{name}", "file": "p.toml"}]
+    assert [dict(reason.values) for reason in verdict.reasons] == [
+        {"key": f"protocol.machine.{name}", "file": "p.toml"}
+    ]
 
 
 def test_zero_degrees_are_a_temperature_and_zero_is_no_speed():
