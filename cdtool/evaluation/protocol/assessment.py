@@ -76,7 +76,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class Unmeasured:
-    """A recording, or a contact, of a point that is no repetition, and why; `message` is that of an error."""
+    """A recording, or a contact, of a point that does not count as a repetition, and why; `message` is that of an error."""
 
     recording: str
     kind: Literal["unreadable", "no_force", "in_progress"]
@@ -122,7 +122,7 @@ def assess_point(
     repetitions : sequence of Repetition
         The contacts, all compared with this profile.
     unmeasured : sequence of Unmeasured
-        Recordings of the point that are no repetition.
+        Recordings of the point that do not count.
     instrument : Instrument or None
         The instrument that measured the force.
 

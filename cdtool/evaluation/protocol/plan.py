@@ -198,7 +198,7 @@ def _empty_of(values: Any) -> Iterator[tuple[str, Due]]:
         if due == "never" or (only_of_force and not values.measures_force):
             continue
         value = getattr(values, item.name)
-        # 0 is a temperature; it is no speed, area, range or number of repetitions.
+        # 0 is a temperature; as a speed, area, range or number of repetitions it means that nothing is stated.
         is_zero = value == 0 and item.name != "temperature_c"
         if value is None or is_zero or (isinstance(value, str) and not value.strip()):
             yield item.name, due

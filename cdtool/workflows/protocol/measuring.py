@@ -55,7 +55,7 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
     Returns
     -------
     Assignment
-        The recordings of each point in order. A pattern that names no file yet gives none.
+        The recordings of each point in order. A pattern without a file, as before the test, is left out.
 
     Raises
     ------

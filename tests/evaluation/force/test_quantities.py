@@ -69,7 +69,7 @@ def test_a_contact_that_never_ends_has_an_infinite_time():
 
 
 @pytest.mark.parametrize("level", [0.0, -1.0, math.nan])
-def test_a_level_that_is_none_is_refused(level):
+def test_a_level_that_is_not_above_zero_is_refused(level):
     with pytest.raises(UsageError, match="level"):
         time_above(curve(np.zeros(len(TIME))), level)
 
