@@ -76,7 +76,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class Unmeasured:
-    """A recording, or a contact, of a point that does not count as a repetition, and why; `message` is that of an error."""
+    """A recording or contact of a point that does not count as a repetition, and why; `message`: that of an error."""
 
     recording: str
     kind: Literal["unreadable", "no_force", "in_progress"]
@@ -241,7 +241,7 @@ def _of_plan(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason]:
 
 def _of_count(point: MeasuringPoint, needed: int, present: int, *, has_others: bool) -> Iterator[Reason]:
     if present < needed:
-        # With recordings that are no repetition, these are the reason; the count is stated in any case.
+        # With recordings that do not count, these are the reason; the count is stated in any case.
         kind = ReasonKind.TOO_FEW_REPETITIONS if present or has_others else ReasonKind.NOT_MEASURED
         yield _reason(kind, point, present=present, needed=needed)
     if point.peak_pressures_n_per_cm2 and len(point.peak_pressures_n_per_cm2) != present:

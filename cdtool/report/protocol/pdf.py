@@ -12,6 +12,8 @@ from cdtool.report.protocol.html import page_file
 
 # Level A: tagged, so that a reader without sight hears headings, tables and descriptions of the curves.
 _STANDARDS = ["a-2a", "ua-1"]
+# The font of every character that the text's own font does not have; it comes with matplotlib.
+_FALLBACK = "DejaVuSans.ttf"
 
 
 def check_typst() -> None:
@@ -33,17 +35,26 @@ def to_pdf(document: Document) -> bytes:
     import typst
     from matplotlib import get_data_path
 
-    # Only fonts that are installed with the libraries: the same pages on every computer.
     fonts = Path(get_data_path()) / "fonts" / "ttf"
+    text = json.dumps(asdict(document), ensure_ascii=False)
     try:
         made = typst.compile(
             page_file("protocol.typ").encode(),
             format="pdf",
-            sys_inputs={"document": json.dumps(asdict(document), ensure_ascii=False)},
+            sys_inputs={"document": text},
             pdf_standards=_STANDARDS,
             font_paths=[str(fonts)],
-            ignore_system_fonts=True,
+            # Fonts that are installed with the libraries give the same pages on every computer.
+            ignore_system_fonts=_has_every_character(fonts / _FALLBACK, text),
         )
     except Exception as fault:
         raise OutputError(f"typst cannot typeset the protocol: {fault}", "write -o protocol.html") from fault
     return bytes(made)
+
+
+def _has_every_character(font: Path, text: str) -> bool:
+    """Return whether a font has all characters of a text, as it has not of Chinese."""
+    from matplotlib.ft2font import FT2Font
+
+    known = FT2Font(str(font)).get_charmap()
+    return all(ord(character) in known for character in set(text) if character.isprintable())

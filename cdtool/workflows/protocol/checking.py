@@ -59,11 +59,9 @@ def check_protocol(path: str | Path) -> CheckedProtocol:
         except CdtoolError as fault:
             more.append(Reason(ReasonKind.BENCHMARK_UNREADABLE, {"message": str(fault)}, due="test_day"))
     assignment = assign(file, setup) if setup else Assignment((), {})
-    logs = {item.point.name: item for item in assignment.points}
-    points = []
-    for point in file.plan.points:
-        found = logs.get(point.name)
-        profile = profiles_of(found, file, setup) if found and setup else file.profile_of(point)
-        points.append(check_point(point, profile, len(found.logs) if found else 0))
+    if setup is None:
+        points = [check_point(point, file.profile_of(point), 0) for point in file.plan.points]
+    else:
+        points = [check_point(item.point, profiles_of(item, file, setup), len(item.logs)) for item in assignment.points]
     verdict = judge(file.plan, points, file.path.name, more)
-    return CheckedProtocol(file, verdict, {name: len(item.logs) for name, item in logs.items()})
+    return CheckedProtocol(file, verdict, {item.point.name: len(item.logs) for item in assignment.points})

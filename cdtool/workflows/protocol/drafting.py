@@ -83,7 +83,7 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
     if output.exists() and not force:
         raise UsageError(f"{output}: already exists", "choose another name, or overwrite it with --force")
     setup = read_benchmark_file(benchmark, learning=False, detectors=["all"]) if benchmark is not None else None
-    points = _points(setup) if setup else []
+    points = _points(setup, output.parent) if setup else []
     read = {point.name: list(_read(setup, point.logs)) for point in points} if setup else {}
     name = relative_name(setup.path, output.parent) if setup else ""
     lines = [
@@ -111,8 +111,8 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
     return DraftedProtocol(output, text, sum(f"# {_FILL_IN}" in line for line in lines[1:]))
 
 
-def _points(setup: BenchmarkFile) -> list[_Point]:
-    """Return the test points of a benchmark file, or else its groups of impacts."""
+def _points(setup: BenchmarkFile, folder: Path) -> list[_Point]:
+    """Return the test points of a benchmark file, or else its groups of impacts; logs are relative to a folder."""
     groups = {name: group for name, group in setup.impacts.items() if not (group.is_impact_free or group.condition)}
     if not setup.points:
         return [
@@ -128,7 +128,7 @@ def _points(setup: BenchmarkFile) -> list[_Point]:
         _Point(
             name,
             "logs",
-            json.dumps([relative_name(log, setup.path.parent) for log in logs], ensure_ascii=False),
+            json.dumps([relative_name(log, folder) for log in logs], ensure_ascii=False),
             tuple((group_of[log], log) for log in logs),
             groups[group_of[logs[0]]].force,
         )

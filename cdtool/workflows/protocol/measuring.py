@@ -76,7 +76,7 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
     for number, item in enumerate(file.plan.exclusions, 1):
         for log in _found(item.logs, file, f"exclusion[{number}]"):
             excluded[_scored_log(log, groups, file, f"exclusion[{number}]")[1]] = item.reason
-    owner: dict[Path, str] = {}
+    owner: dict[Path, int] = {}
     points = []
     for number, point in enumerate(file.plan.points, 1):
         key = f"point[{number}]"
@@ -85,9 +85,9 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
         else:
             logs = [_scored_log(log, groups, file, key) for log in _found(point.logs, file, key)]
         for _, log in logs:
-            if owner.setdefault(log, point.name) != point.name:
+            if owner.setdefault(log, number) != number:
                 raise ConfigurationError(
-                    f"{file.path}: protocol.{key}: {log} is also of the point '{owner[log]}'",
+                    f"{file.path}: protocol.{key}: {log} is also of the point {owner[log]}",
                     "a recording belongs to one point",
                 )
         points.append(PointLogs(point, tuple((group, log) for group, log in logs if log not in excluded)))
@@ -230,7 +230,7 @@ def _assessed(
 
 
 def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[list[Repetition], list[Unmeasured]]:
-    """Return the contacts of a recording, and those that are no repetition."""
+    """Return the contacts of a recording, and those that do not count."""
     recording: Recording = read.recording
     curves, problems = force_curves(recording, read.contacts, mass)
     repetitions = [

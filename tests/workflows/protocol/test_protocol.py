@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 
 import cdtool
 from cdtool.errors import ConfigurationError, UsageError
+from cdtool.evaluation.protocol.plan import (
+    Deviation,
+    Exclusion,
+    Instrument,
+    MachineParticulars,
+    MeasuringPoint,
+    TestParticulars,
+)
 from cdtool.evaluation.protocol.protocol import Protocol
 from cdtool.workflows.protocol.checking import check_protocol
 from cdtool.workflows.protocol.drafting import draft_protocol
@@ -103,7 +112,7 @@ def test_a_point_names_its_logs_by_patterns(tmp_path):
         ({"more": '[[protocol.deviation]]\npoint = "x"\ntext = "a"\nreason = "b"'}, "a deviation names the point 'x'"),
         ({"logs": 'group = "edge"\nlogs = ["a"]'}, "has a group and logs"),
         ({"more": '[[protocol.point]]\nname = "b"\nprofile = "en_1"'}, "unknown force profile 'en_1'"),
-        ({"more": '[[protocol.point]]\nname = "b"\ngroup = "edge"'}, "is also of the point 'edge'"),
+        ({"more": '[[protocol.point]]\nname = "b"\ngroup = "edge"'}, "is also of the point 1"),
     ],
 )
 def test_a_wrong_file_names_file_and_key(changes, words, rig, tmp_path):
@@ -139,6 +148,35 @@ def test_a_draft_knows_what_the_recordings_show_and_lists_the_rest(rig, tmp_path
         draft_protocol(rig / "benchmark.toml", draft.path)
     with pytest.raises(UsageError, match=r"\.toml"):
         draft_protocol(rig / "benchmark.toml", tmp_path / "draft.txt")
+
+
+def test_a_draft_takes_the_test_points_of_the_benchmark_and_names_logs_relative_to_itself(rig, tmp_path):
+    text = (rig / "benchmark.toml").read_text(encoding="utf-8")
+    force = '[force]\nprofile = "en_12453_wide_gap"\n[points.low]\nlogs = ["edge/0[12].csv"]\n'
+    (rig / "points.toml").write_text(text + force, encoding="utf-8")
+    (rig / "plans").mkdir()
+    draft = draft_protocol(rig / "points.toml", rig / "plans" / "draft.toml")
+    (point,) = read_protocol_file(draft.path).plan.points
+    assert (point.name, point.profile, point.obstacle_stiffness_n_per_mm) == ("low", "en_12453_wide_gap", 500.0)
+    assert point.logs == ("../edge/01.csv", "../edge/02.csv") and point.repetitions == 3
+    assert check_protocol(draft.path).recordings == {"low": 2}
+
+
+def test_every_entry_is_on_the_page():
+    page = Path("docs/protocol.md").read_text(encoding="utf-8")
+    tables = {
+        "machine": MachineParticulars,
+        "test": TestParticulars,
+        "instrument": Instrument,
+        "point": MeasuringPoint,
+        "deviation": Deviation,
+        "exclusion": Exclusion,
+    }
+    due = {"before_test": "before", "test_day": "test day", "never": "no"}
+    for table, kind in tables.items():
+        for item in fields(kind):
+            row = re.compile(rf"\| `{table}\.{item.name}` \| [a-z ]+ \| {due[item.metadata['due']]} \| (.*) \|")
+            assert row.search(page)[1] == item.metadata["meaning"]
 
 
 def test_before_anything_is_recorded_a_plan_can_be_drafted_and_checked(tmp_path):
