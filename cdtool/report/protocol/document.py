@@ -107,7 +107,11 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
         if point.verdict and point.profile and point.profile.average_of > 1:
             for step in point.verdict.steps:
                 if step.above and step.outcome != "fail":
-                    values = {"count": step.above, "tests": point.verdict.tests, "step": step.step.name}
+                    values = {
+                        "count": step.above,
+                        "tests": point.verdict.tests,
+                        "step": words.name("step", step.step.name),
+                    }
                     yield words("notice.single_above", point=point.point.name, **values)
     if any(point.point.peak_pressures_n_per_cm2 for point in protocol.points):
         yield words("notice.pressure")
@@ -136,7 +140,14 @@ def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
     rows = []
     for item in protocol.plan.instruments:
         reach = f"{words.number(item.range_n)} N" if item.range_n else item.range
-        values = (item.quantity, item.model, item.serial_number, reach, item.accuracy_class, item.sample_rate_hz)
+        values = (
+            words.name("quantity", item.quantity),
+            item.model,
+            item.serial_number,
+            reach,
+            item.accuracy_class,
+            item.sample_rate_hz,
+        )
         rows.append(_row(words, *values, item.filter, item.calibrated_on, item.calibration_valid_until))
     yield _grid(columns, rows, widths=(5, 8, 6, 5, 5, 5, 6, 6, 6), numeric=(5,))
 
@@ -319,7 +330,7 @@ def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
             )
         )
         columns = [words(f"column.{name}") for name in ("step", "from", "at_most")]
-        rows = [_row(words, step.name, step.from_s, step.at_most_n) for step in profile.steps]
+        rows = [_row(words, words.name("step", step.name), step.from_s, step.at_most_n) for step in profile.steps]
         yield _grid(columns, rows, widths=(4, 2, 2), numeric=(1, 2))
         if profile.measuring_source:
             numbers = {

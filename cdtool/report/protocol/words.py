@@ -32,6 +32,10 @@ class Words:
         text = str(self.texts[table][name])
         return text.format(**{item: self.value(value) for item, value in values.items()})
 
+    def name(self, table: str, name: str) -> str:
+        """Return a name of the files in this language, as that of a step; one that the table does not have as it is."""
+        return str(self.texts[table].get(name, name))
+
     def value(self, value: object) -> str:
         """Return a value as text: a number with the language's decimal sign, a date, a text as it is."""
         if value is None:
@@ -55,6 +59,8 @@ class Words:
         values: dict[str, object] = dict(reason.values)
         if reason.cause is not None:
             values["cause"] = self(f"cause.{reason.cause.kind}", **reason.cause.numbers)
+        if "step" in values:
+            values["step"] = self.name("step", str(values["step"]))
         if "averaged" in values:
             values["averaged"] = self(f"averaged.{values['averaged']}")
         if reason.kind is ReasonKind.NO_VALUE:

@@ -8,6 +8,7 @@ import typing
 
 import pytest
 
+from cdtool.evaluation.force.limits import read_force_limits
 from cdtool.evaluation.force.verdict import CauseKind, StepCause
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Verdict
 from cdtool.report.protocol.words import LANGUAGES, words_of
@@ -60,8 +61,15 @@ def test_numbers_and_dates_are_as_usual_in_the_language():
 def test_a_cause_is_part_of_the_sentence_of_its_reason():
     values = {"point": "edge", "repetition": 2, "recording": "a.csv", "step": "static"}
     reason = Reason(ReasonKind.NOT_ASSESSABLE, values, StepCause("samples_missing", {"missing_ms": 12.5}))
-    wanted = "edge, Wiederholung 2 (a.csv), static: Werte der Kraftmessdose fehlen für 12,5 ms"
+    wanted = "edge, Wiederholung 2 (a.csv), statisch: Werte der Kraftmessdose fehlen für 12,5 ms"
     assert words_of("de").reason(reason) == wanted
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
+    names = {step.name for profile in read_force_limits().values() for step in profile.steps}
+    assert names == set(words_of(language).texts["step"])
+    assert words_of(language).name("step", "my step") == "my step"
 
 
 def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():
