@@ -113,6 +113,7 @@ def cases(inputs: Path) -> list[Case]:
         ),
         Case("benchmark", (*benchmark, "gm", *every), (*benchmark, "pt", *every)),
         Case("benchmark, protocol", _protocol(inputs, "b"), _protocol(inputs, "a")),
+        Case("protocol write", _written(inputs, "b"), _written(inputs, "a")),
         Case(
             "protocol init",
             ("protocol", "init", f"{inputs}/benchmark.toml", "-o", "{out}/p.toml", "--force"),
@@ -190,6 +191,10 @@ def _protocol(inputs: Path, name: str) -> tuple[str, ...]:
         "-o",
         "{out}/protocol.html",
     )
+
+
+def _written(inputs: Path, name: str) -> tuple[str, ...]:
+    return ("protocol", "write", f"{inputs}/protocol_{name}.toml", "-o", "{out}/protocol.html")
 
 
 def _plot(*words: str) -> tuple[str, ...]:

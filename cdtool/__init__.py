@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.init.drafting import init, init_study
     from cdtool.workflows.injecting import inject
     from cdtool.workflows.planning import plan
-    from cdtool.workflows.protocol.measuring import protocol
+    from cdtool.workflows.protocol.making import protocol
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.score_triggers import score
@@ -80,7 +80,7 @@ _API = {
     "inject": "cdtool.workflows.injecting:inject",
     "init": "cdtool.workflows.init.drafting:init",
     "init_study": "cdtool.workflows.init.drafting:init_study",
-    "protocol": "cdtool.workflows.protocol.measuring:protocol",
+    "protocol": "cdtool.workflows.protocol.making:protocol",
     "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",

@@ -103,6 +103,7 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "signature forecast": _CAN_LOSE,
     "signature update": _CAN_LOSE,
     "protocol init": _ALWAYS,
+    "protocol write": _ALWAYS | {ExitStatus.VIOLATED, ExitStatus.INCONCLUSIVE},
     "protocol check": _ALWAYS | {ExitStatus.INCONCLUSIVE},
     "store status": _ALWAYS,
     "store gc": _ALWAYS,

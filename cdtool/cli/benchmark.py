@@ -121,7 +121,7 @@ def benchmark(
     made = None
     if protocol_file is not None:
         from cdtool.report.protocol.document import ProtocolReport
-        from cdtool.workflows.protocol.measuring import make_protocol
+        from cdtool.workflows.protocol.making import make_protocol
 
         made = make_protocol(protocol_file, done, _command(file, protocol, output or [], detectors, false_alarm_budget))
         inputs = (*done.inputs, protocol_file.path)

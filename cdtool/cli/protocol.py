@@ -1,4 +1,4 @@
-"""`cdtool protocol init|check`, and what `cdtool benchmark` shows of a protocol."""
+"""`cdtool protocol init|check|write`, and what `cdtool benchmark` shows of a protocol."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import leave, plain, print_json, say
-from cdtool.cli.options import JsonOption
+from cdtool.cli.options import ForceOption, JsonOption
 from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
 from cdtool.exit_status import Fact, statuses_words
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.protocol.protocol_file import ProtocolFile
 
 protocol = typer.Typer(
-    help="Draft and check the file of a test protocol; `cdtool benchmark -p` writes the protocol.",
+    help="Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
@@ -34,7 +34,7 @@ _SHOWN = 10
 
 @protocol.callback()
 def _protocol() -> None:
-    """Draft and check the file of a test protocol; `cdtool benchmark -p` writes the protocol."""
+    """Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies."""
 
 
 @protocol.command("init", epilog=statuses_words("protocol init"))
@@ -91,6 +91,38 @@ def check(
     leave(facts=[Fact.INCOMPLETE] if reasons else [])
 
 
+@protocol.command("write", epilog=statuses_words("protocol write"))
+def write(
+    file: Annotated[
+        Place,
+        typer.Argument(parser=location, help="Protocol file, or a benchmark file with [protocol].", metavar="FILE"),
+    ],
+    output: Annotated[
+        list[Place] | None,
+        typer.Option("--output", "-o", parser=location, help="Output, repeatable: .pdf or .html."),
+    ] = None,
+    force: ForceOption = False,
+) -> None:
+    """Write the protocol without running detectors, for recordings of a force rig that have only a force.
+
+    `cdtool benchmark -p` writes the same with their latencies. Exits with 1 if it fails and 4 if it is incomplete.
+
+    Example: cdtool protocol write sample_logs/gate/protocol.toml -o protocol.html
+    """
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.protocol.document import ProtocolReport
+    from cdtool.workflows.protocol.making import protocol as make
+
+    if not output:
+        raise UsageError("--output is missing", "add -o protocol.pdf or -o protocol.html")
+    check_outputs(output, force=force, subject="protocol")
+    names = [word for path in output for word in ("-o", path.name)]
+    made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
+    write_outputs(ProtocolReport(made), output, force=force, inputs=(file,), subject="protocol")
+    show_protocol(made, output)
+    leave(facts=facts_of(made.verdict.outcome))
+
+
 def _show_checked(checked: CheckedProtocol) -> None:
     from cdtool.evaluation.protocol.reasons import Verdict
     from cdtool.report.protocol.words import words_of
@@ -113,7 +145,10 @@ def _show_checked(checked: CheckedProtocol) -> None:
     folder = file.path.parent
     benchmark = file.benchmark or folder / "benchmark.toml"
     own = [] if benchmark == file.path else ["-p", _quoted(file.path)]
-    typer.echo("  " + " ".join(["cdtool benchmark", _quoted(benchmark), *own, "-o protocol.pdf"]))
+    command = ["cdtool benchmark", _quoted(benchmark), *own] if checked.has_detectors else ["cdtool protocol write"]
+    if not checked.has_detectors:
+        command.append(_quoted(file.path))
+    typer.echo("  " + " ".join([*command, "-o protocol.pdf"]))
 
 
 def file_of_protocol(benchmark: Path, given: Path | None, targets: Sequence[Path]) -> ProtocolFile | None:

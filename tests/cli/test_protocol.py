@@ -33,6 +33,7 @@ FILLED_IN = {
     "region": '"gap of 300 mm"',
     "obstacle_stiffness_n_per_mm": "500",
     "contact_area_mm2": "5027",
+    "speed_m_per_s": "0.2",
     "profile": '"en_12453_reducing_gap"',
 }
 
@@ -70,6 +71,25 @@ def test_from_a_rig_s_logs_to_a_protocol_in_four_commands_each_named_by_the_one_
     made = cdtool(*benchmark[:-1], "protocol.html")
     assert made.status == 0 and "protocol: pass" in made.out, made.out + made.err
     assert "print and sign" in made.out and "PASS" in Path("protocol.html").read_text(encoding="utf-8")
+
+
+def test_recordings_of_a_rig_that_have_only_a_force_need_no_detector(tmp_path, monkeypatch):
+    write_rig(tmp_path, FORCES)
+    monkeypatch.chdir(tmp_path)
+    for path in Path("edge").iterdir():
+        rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+        text = "".join(f"{row[0]};{row[3]}\n" for row in rows[1:])
+        path.write_text(f"Time [s];Force [N]\n{text}", encoding="utf-8")
+    steps = {words[0]: words for words in commands(cdtool("init", *sorted(Path("edge").iterdir()), "-o", "study"))}
+    (check,) = commands(cdtool(*steps["protocol"]))
+    draft = tmp_path / "study" / "protocol.toml"
+    fill_in(draft)
+    (write,) = commands(cdtool(*check))
+    assert write[:2] == ["protocol", "write"]
+    made = cdtool(*write[:-1], "protocol.html")
+    assert made.status == 0 and "protocol: pass" in made.out, made.out + made.err
+    nothing = cdtool("protocol", "write", "study/protocol.toml")
+    assert nothing.status == 2 and "-o protocol.pdf" in nothing.err
 
 
 @pytest.fixture(scope="module")

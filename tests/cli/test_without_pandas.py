@@ -33,6 +33,7 @@ commands = [
     ("benchmark", folder / "benchmark.toml", "--store", folder / "store", "--trust-mtime"),
     ("protocol", "init", folder / "benchmark.toml", "-o", folder / "protocol.toml"),
     ("protocol", "check", folder / "protocol.toml"),
+    ("protocol", "write", folder / "protocol.toml", "-o", folder / "p.html"),
     ("benchmark", folder / "benchmark.toml", "-p", folder / "protocol.toml", "-o", folder / "protocol.html"),
     ("store", "status", folder / "store"),
     ("store", "gc", folder / "store"),

@@ -48,7 +48,10 @@ def to_pdf(document: Document) -> bytes:
             ignore_system_fonts=_has_every_character(fonts / _FALLBACK, text),
         )
     except Exception as fault:
-        raise OutputError(f"typst cannot typeset the protocol: {fault}", "write -o protocol.html") from fault
+        raise OutputError(
+            f"typst cannot typeset the protocol: {fault}",
+            "update it, pip install -U 'cdtool[pdf]', or write -o protocol.html",
+        ) from fault
     return bytes(made)
 
 

@@ -15,11 +15,15 @@ from cdtool.workflows.protocol.protocol_file import ProtocolFile, read_protocol_
 
 @dataclass(frozen=True)
 class CheckedProtocol:
-    """A protocol file with what is incomplete; `recordings` is the number of each point by name."""
+    """A protocol file with what is incomplete; `recordings` is the number of each point by name.
+
+    `has_detectors`: the benchmark file names detectors, or could not be read.
+    """
 
     file: ProtocolFile
     verdict: Verdict
     recordings: dict[str, int]
+    has_detectors: bool = True
 
 
 def check_protocol(path: str | Path) -> CheckedProtocol:
@@ -64,4 +68,5 @@ def check_protocol(path: str | Path) -> CheckedProtocol:
     else:
         points = [check_point(item.point, profiles_of(item, file, setup), len(item.logs)) for item in assignment.points]
     verdict = judge(file.plan, points, file.path.name, more)
-    return CheckedProtocol(file, verdict, {item.point.name: len(item.logs) for item in assignment.points})
+    recordings = {item.point.name: len(item.logs) for item in assignment.points}
+    return CheckedProtocol(file, verdict, recordings, setup is None or bool(setup.detectors))

@@ -12,18 +12,15 @@ from pathlib import Path
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.force.limits import ForceProfile
-from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition, Unmeasured, assess_point, judge
+from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.evaluation.protocol.plan import MeasuringPoint
-from cdtool.evaluation.protocol.protocol import ExcludedRecording, FileDigest, Protocol
-from cdtool.evaluation.results import Results, Skipped
+from cdtool.evaluation.results import Skipped
 from cdtool.recording import Recording
-from cdtool.version import __version__
-from cdtool.workflows.benchmark.benchmark import Benchmark, benchmark
-from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
 from cdtool.workflows.contacts.matched_log import force_curves
-from cdtool.workflows.protocol.protocol_file import ProtocolFile, digest_of_file, read_protocol_file
-from cdtool.workflows.runs import find_logs, resolve_all, shown_path
+from cdtool.workflows.protocol.protocol_file import ProtocolFile
+from cdtool.workflows.runs import find_logs, resolve_all
 
 
 @dataclass(frozen=True)
@@ -64,6 +61,7 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
 
     Examples
     --------
+    >>> from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
     >>> from cdtool.workflows.protocol.protocol_file import read_protocol_file
     >>> setup = read_benchmark_file("sample_logs/gate/benchmark.toml")
     >>> assignment = assign(read_protocol_file("sample_logs/gate/protocol.toml"), setup)
@@ -92,85 +90,6 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
                 )
         points.append(PointLogs(point, tuple((group, log) for group, log in logs if log not in excluded)))
     return Assignment(tuple(points), excluded)
-
-
-def protocol(file: str | Path, *, detectors: Sequence[str] = (), jobs: int = 1) -> Protocol:
-    """Run the benchmark of a protocol file and return its protocol.
-
-    Parameters
-    ----------
-    file : str or Path
-        The protocol file, or a benchmark file with a table [protocol].
-    detectors : sequence of str, optional
-        Detectors in place of the benchmark's.
-    jobs : int, optional
-        Number of logs processed at a time.
-
-    Returns
-    -------
-    Protocol
-        Points, repetitions, verdict and provenance.
-
-    Raises
-    ------
-    ConfigurationError
-        A file is wrong; the message names file and key.
-    CdtoolError
-        The benchmark cannot be run, see `cdtool.benchmark`.
-
-    Examples
-    --------
-    >>> import cdtool
-    >>> made = cdtool.protocol("sample_logs/gate/protocol.toml", detectors=["momentum"])
-    >>> made.verdict.outcome, [point.outcome for point in made.points]
-    ('fail', ['fail', 'fail'])
-    """
-    read = read_protocol_file(file)
-    if read.benchmark is None:
-        raise ConfigurationError(f"{read.path}: protocol.benchmark: is missing", "name the benchmark file")
-    return make_protocol(read, benchmark(read.benchmark, detectors=detectors, jobs=jobs), f"cdtool.protocol({file})")
-
-
-def make_protocol(file: ProtocolFile, done: Benchmark, command: str = "") -> Protocol:
-    """Return the protocol of a finished benchmark: its recordings are read again for the whole force-time curves.
-
-    Parameters
-    ----------
-    file : ProtocolFile
-        The protocol file.
-    done : Benchmark
-        The finished benchmark, for the latencies and the digests.
-    command : str, optional
-        The command that makes it, for its provenance.
-
-    Returns
-    -------
-    Protocol
-        Points, repetitions, verdict and provenance.
-
-    Raises
-    ------
-    ConfigurationError
-        The recordings cannot be assigned to the points, see `assign`; or the file names another benchmark.
-
-    Examples
-    --------
-    `protocol` runs the benchmark of a protocol file and returns its protocol.
-    """
-    setup = read_benchmark_file(done.inputs[0], detectors=done.results.detectors)
-    if file.benchmark and file.benchmark.resolve() != setup.path.resolve():
-        raise ConfigurationError(
-            f"{file.path}: protocol.benchmark: is {file.benchmark}, the command has {setup.path}", "use the same file"
-        )
-    assignment = assign(file, setup)
-    late = _latencies(done.results)
-    points = tuple(_assessed(item, file, setup, late) for item in assignment.points)
-    excluded = tuple(
-        ExcludedRecording(shown_path(log, setup.path.parent), reason) for log, reason in assignment.excluded.items()
-    )
-    verdict = judge(file.plan, points, file.path.name)
-    files = _digests(file, setup, done.results, points, {item.recording for item in excluded})
-    return Protocol(file.plan, points, verdict, files, excluded, done.results.detectors, __version__, command)
 
 
 def profiles_of(item: PointLogs, file: ProtocolFile, setup: BenchmarkFile) -> ForceProfile | None:
@@ -206,12 +125,13 @@ def _of_group(point: MeasuringPoint, setup: BenchmarkFile, key: str) -> list[tup
     return [(point.group, log) for log in setup.impacts[point.group].logs]
 
 
-def _assessed(
+def measured_point(
     item: PointLogs,
     file: ProtocolFile,
     setup: BenchmarkFile,
     late: Mapping[tuple[str, str, int], Mapping[str, float | None]],
 ) -> PointAssessment:
+    """Return a point with its repetitions; `late` are the latencies [ms] by group, recording and contact."""
     profile = profiles_of(item, file, setup)
     repetitions: list[Repetition] = []
     unmeasured: list[Unmeasured] = []
@@ -248,39 +168,3 @@ def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[lis
     if "force" not in recording:
         unmeasured.append(Unmeasured(recording.name, "no_force", "no load cell"))
     return repetitions, unmeasured
-
-
-def _latencies(results: Results) -> dict[tuple[str, str, int], dict[str, float | None]]:
-    """Return the latency of each detector [ms] by group, recording and contact."""
-    found: dict[tuple[str, str, int], dict[str, float | None]] = {}
-    for row in results.contacts:
-        found.setdefault((row.group, row.recording, row.contact), {})[row.detector] = row.latency_ms
-    return found
-
-
-def _digests(
-    file: ProtocolFile,
-    setup: BenchmarkFile,
-    results: Results,
-    points: Sequence[PointAssessment],
-    excluded: set[str],
-) -> tuple[FileDigest, ...]:
-    """Return every file of which the protocol was made, and every recording, with its SHA-256; names are relative."""
-    base = setup.path.parent
-    files = (
-        []
-        if file.path.resolve() == setup.path.resolve()
-        else [FileDigest(shown_path(file.path, base), digest_of_file(file.path), "protocol")]
-    )
-    files.append(FileDigest(shown_path(setup.path, base), setup.digest, "benchmark"))
-    machine = setup.machine_file.path
-    files.append(FileDigest(shown_path(machine, base), digest_of_file(machine), "machine"))
-    if file.limits is not None:
-        files.append(FileDigest(shown_path(file.limits, base), digest_of_file(file.limits), "limits"))
-    measured = {item.recording for point in points for item in point.repetitions}
-    for row in results.recordings:
-        role = "excluded" if row.recording in excluded else "measured" if row.recording in measured else "scored"
-        files.append(FileDigest(row.recording, row.sha256, role))  # type: ignore[arg-type]  # one of the roles
-    learned = results.provenance.get("learned_sha256", {})
-    files += [FileDigest(name, digest, "learned") for name, digest in learned.items()]
-    return tuple(files)

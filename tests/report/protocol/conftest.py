@@ -10,7 +10,7 @@ from cdtool.evaluation.protocol.protocol import Protocol
 from cdtool.report.protocol.blocks import Document
 from cdtool.report.protocol.document import protocol_document
 from cdtool.workflows.benchmark.benchmark import benchmark
-from cdtool.workflows.protocol.measuring import make_protocol
+from cdtool.workflows.protocol.making import make_protocol
 from cdtool.workflows.protocol.protocol_file import read_protocol_file
 from tests.synthetic.force_rig import half_sine, write_log, write_protocol, write_rig
 

@@ -23,6 +23,7 @@ from cdtool.evaluation.protocol.plan import (
 from cdtool.evaluation.protocol.protocol import Protocol
 from cdtool.workflows.protocol.checking import check_protocol
 from cdtool.workflows.protocol.drafting import draft_protocol
+from cdtool.workflows.protocol.making import make_protocol
 from cdtool.workflows.protocol.protocol_file import read_protocol_file
 from tests.synthetic.force_rig import half_sine, write_log, write_protocol, write_rig
 
@@ -39,7 +40,7 @@ def rig(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def made(rig) -> Protocol:
-    return cdtool.protocol(rig / "protocol.toml")
+    return make_protocol(read_protocol_file(rig / "protocol.toml"), cdtool.benchmark(rig / "benchmark.toml"))
 
 
 def kinds(protocol: Protocol) -> list[str]:
@@ -76,6 +77,20 @@ def test_every_file_is_named_with_its_hash_and_one_hash_stands_for_all(rig, made
     assert hashlib.sha256(lines.encode()).hexdigest() == made.data_sha256
     changed = replace(made, files=made.files[:-1])
     assert changed.data_sha256 != made.data_sha256
+
+
+def test_without_detectors_the_protocol_is_the_same_but_for_latencies(rig, made):
+    own = cdtool.protocol(rig / "protocol.toml")
+    assert (own.verdict, own.files, own.detectors) == (made.verdict, made.files, ())
+    for one, other in zip(own.points[0].repetitions, made.points[0].repetitions, strict=True):
+        assert one.latencies_ms == {} and one.verdict == other.verdict and one.curve.peak == other.curve.peak
+
+
+def test_a_recording_that_cannot_be_read_has_its_hash_too(tmp_path):
+    write_rig(tmp_path, FORCES)
+    (tmp_path / "edge" / "04.csv").write_text("no table\n", encoding="utf-8")
+    files = {item.name: (item.sha256, item.role) for item in cdtool.protocol(write_protocol(tmp_path)).files}
+    assert files["edge/04.csv"] == (hashlib.sha256(b"no table\n").hexdigest(), "measured")
 
 
 def test_an_excluded_recording_is_named_and_not_counted(tmp_path):
@@ -189,6 +204,6 @@ def test_before_anything_is_recorded_a_plan_can_be_drafted_and_checked(tmp_path)
 
 
 def test_the_sample_gate_fails_and_says_what_is_incomplete():
-    protocol = cdtool.protocol("sample_logs/gate/protocol.toml", detectors=["pi"])
+    protocol = cdtool.protocol("sample_logs/gate/protocol.toml")
     assert protocol.verdict.outcome == "fail"
     assert set(kinds(protocol)) == {"point_exceeds", "record_too_short"}
