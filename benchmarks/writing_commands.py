@@ -46,6 +46,12 @@ def prepare(folder: Path, run: Run) -> None:
         )
         text = f"recording,time_s\ngate/stiff/01.csv,{2.0 if name == 'a' else 2.5}\n"
         (folder / f"t{name}.csv").write_text(text, encoding="utf-8")
+    for name, language in (("a", "en"), ("b", "de")):
+        (folder / f"protocol_{name}.toml").write_text(
+            f'[protocol]\nbenchmark = "benchmark.toml"\nlanguage = "{language}"\n'
+            '[[protocol.point]]\nname = "edge"\ngroup = "stiff"\nprofile = "en_12453_wide_gap"\n',
+            encoding="utf-8",
+        )
     model = (
         "[model.controller]\nspeed_gain = 4300\nintegral_gain = 8000\nperiod = 0.001\n[model.drive]\nstiffness = 8e4\n"
     )
@@ -106,6 +112,13 @@ def cases(inputs: Path) -> list[Case]:
             _plot("signature", "forecast", a, *season, *machine, *weather, "--temperatures", "15:20"),
         ),
         Case("benchmark", (*benchmark, "gm", *every), (*benchmark, "pt", *every)),
+        Case("benchmark, protocol", _protocol(inputs, "b"), _protocol(inputs, "a")),
+        Case("protocol write", _written(inputs, "b"), _written(inputs, "a")),
+        Case(
+            "protocol init",
+            ("protocol", "init", f"{inputs}/benchmark.toml", "-o", "{out}/p.toml", "--force"),
+            ("protocol", "init", "-o", "{out}/p.toml", "--force"),
+        ),
         Case("benchmark, folder", (*benchmark, "gm", "-o", "{out}/report"), (*benchmark, "pt", "-o", "{out}/report")),
         Case(
             "report, folder",
@@ -167,6 +180,21 @@ def cases(inputs: Path) -> list[Case]:
         Case("study sensors", _sensors(machine, "0.3"), _sensors(machine, "0.2")),
         Case("study figures", ("study", "figures", "-o", "{out}/figures")),
     ]
+
+
+def _protocol(inputs: Path, name: str) -> tuple[str, ...]:
+    return (
+        "benchmark",
+        f"{inputs}/benchmark.toml",
+        "-p",
+        f"{inputs}/protocol_{name}.toml",
+        "-o",
+        "{out}/protocol.html",
+    )
+
+
+def _written(inputs: Path, name: str) -> tuple[str, ...]:
+    return ("protocol", "write", f"{inputs}/protocol_{name}.toml", "-o", "{out}/protocol.html")
 
 
 def _plot(*words: str) -> tuple[str, ...]:

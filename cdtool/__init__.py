@@ -16,6 +16,7 @@ Every command is available as a function:
     cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
         cdtool.explain_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
     cdtool.benchmark("benchmark.toml")                                  -> BenchmarkResult
+    cdtool.protocol("protocol.toml")                                    -> Protocol: of a force test, to be signed
     cdtool.score("triggers.csv", "benchmark.toml")                      -> BenchmarkResult
         cdtool.read_results("results.json")                                 -> BenchmarkResult
     cdtool.compare("old.json", "new.json")                              -> BuildComparison
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from cdtool.workflows.init.drafting import init, init_study
     from cdtool.workflows.injecting import inject
     from cdtool.workflows.planning import plan
+    from cdtool.workflows.protocol.making import protocol
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.signature.forecasting import forecast_signature
@@ -90,6 +92,7 @@ _API = {
     "inject": "cdtool.workflows.injecting:inject",
     "init": "cdtool.workflows.init.drafting:init",
     "init_study": "cdtool.workflows.init.drafting:init_study",
+    "protocol": "cdtool.workflows.protocol.making:protocol",
     "recover": "cdtool.workflows.recovering:recover",
     "compare": "cdtool.workflows.comparing:compare",
     "plan": "cdtool.workflows.planning:plan",
@@ -157,6 +160,7 @@ __all__ = [
     "learn_signature",
     "plan",
     "previous_value",
+    "protocol",
     "read",
     "read_machine_file",
     "read_results",

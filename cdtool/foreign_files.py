@@ -20,16 +20,20 @@ _LOOKED_AT = 1 << 13
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that cdtool writes: the mark in all of them, and their name in a message."""
+    """A kind of file that cdtool writes: the mark in all of them, and their name in a message.
+
+    `anywhere`: the mark may be in the middle of a long file.
+    """
 
     mark: bytes
     words: str
+    anywhere: bool = False
 
     def is_kind_of(self, path: Path) -> bool:
         """Whether a file is of this kind; an empty one is of every kind. Raises UsageError if it cannot be read."""
         try:
             with path.open("rb") as file:
-                head = file.read(_LOOKED_AT)
+                head = file.read() if self.anywhere else file.read(_LOOKED_AT)
                 file.seek(max(len(head), path.stat().st_size - _LOOKED_AT))
                 tail = file.read(_LOOKED_AT)
         except OSError as fault:

@@ -33,6 +33,7 @@ COMMANDS: Mapping[str, str] = {
     "explain": "cdtool.cli.explain:explain",
     "benchmark": "cdtool.cli.benchmark:benchmark",
     "report": "cdtool.cli.report:report",
+    "protocol": "cdtool.cli.protocol:protocol",
     "score": "cdtool.cli.score:score",
     "compare": "cdtool.cli.compare:compare",
     "plan": "cdtool.cli.plan:plan",

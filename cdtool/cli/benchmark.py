@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,6 +23,7 @@ from cdtool.cli.options import (
     listed,
 )
 from cdtool.cli.place import Place, location
+from cdtool.cli.protocol import facts_of, file_of_protocol, show_protocol
 from cdtool.cli.summary_table import finish
 from cdtool.cli.written_reports import show_results, write_reports
 from cdtool.errors import UsageError
@@ -46,6 +48,15 @@ def benchmark(
     ],
     output: OutputOption = None,
     force: ForceOption = False,
+    protocol: Annotated[
+        Place | None,
+        typer.Option(
+            "--protocol",
+            "-p",
+            parser=location,
+            help="Protocol file (TOML) for -o protocol.pdf or protocol.html. Default: [protocol] of FILE.",
+        ),
+    ] = None,
     detectors: Annotated[
         str | None,
         typer.Option(
@@ -83,12 +94,13 @@ def benchmark(
 ) -> None:
     """Score detectors on recordings: latency, missed contacts and false alarms per detector and group.
 
-    Exits with status 1 if a limit or force profile in the file is violated.
+    Exits with status 1 if a limit or force profile in the file is violated, and with 4 if a protocol is incomplete.
 
     Example: cdtool benchmark sample_logs/gate/benchmark.toml -o results.json -o report.html
     """
     from cdtool.evaluation.results_file import to_json
-    from cdtool.report.outputs import check_outputs
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.protocol.names import protocol_names
     from cdtool.report.writers.base import Report
     from cdtool.workflows.benchmark.benchmark import benchmark as run
     from cdtool.workflows.execution.workers import Workers
@@ -101,8 +113,10 @@ def benchmark(
     if dry_run:
         _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
         return
-    targets = output or []
+    documents, targets = protocol_names(output or [])
+    protocol_file = file_of_protocol(file, protocol, documents)
     check_outputs(targets, force=force)
+    check_outputs(documents, force=force, subject="protocol")
     with progress("benchmark", quiet=quiet) as advance:
         done = run(
             file,
@@ -114,6 +128,14 @@ def benchmark(
         )
     report = Report(done.evaluated, done.traces)
     written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
+    made = None
+    if protocol_file is not None:
+        from cdtool.report.protocol.document import ProtocolReport
+        from cdtool.workflows.protocol.making import make_protocol
+
+        made = make_protocol(protocol_file, done, _command(file, protocol, output or [], detectors, false_alarm_budget))
+        inputs = (*done.inputs, protocol_file.path)
+        write_outputs(ProtocolReport(made), documents, force=force, inputs=inputs, subject="protocol")
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
         typer.echo(to_json(done.results), nl=False)
@@ -121,7 +143,23 @@ def benchmark(
         if not quiet:
             _show_agreement(done.evaluated)
         show_results(done.evaluated, written, quiet=quiet, more=_stored(done.stored))
-    finish(done.evaluated)
+        if made is not None:
+            show_protocol(made, documents)
+        elif done.results.forces and not quiet:
+            typer.echo("next, for a test protocol of these forces:")
+            typer.echo(f"  cdtool protocol init {shlex.quote(plain(file))} -o protocol.toml")
+    finish(done.evaluated, facts_of(made.verdict.outcome) if made is not None else ())
+
+
+def _command(
+    file: Path, protocol: Path | None, output: list[Path], detectors: str | None, false_alarm_budget: str | None
+) -> str:
+    """Return the command with the options that determine a protocol; of the outputs only their names."""
+    options = [("-p", protocol), ("--detectors", detectors), ("--false-alarm-budget", false_alarm_budget)]
+    given = [(name, value) for name, value in options if value is not None] + [
+        ("-o", Path(path.name)) for path in output
+    ]
+    return shlex.join(["cdtool", "benchmark", str(file), *(str(word) for pair in given for word in pair)])
 
 
 def _stored(outcomes: StoreReport | None) -> list[str]:

@@ -116,6 +116,8 @@ def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
         some = " ".join(pattern if "*" in pattern else _quoted(pattern) for pattern in patterns(logs, Path()))
         typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
     typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
+    typer.echo("for a test protocol of the contact forces:")
+    typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
 
 
 def _warn(drafted: Drafted) -> None:

@@ -169,10 +169,10 @@ def _show_limits(evaluated: Evaluated) -> None:
         typer.echo(f"  limits not met: and {len(failed) - _SHOWN} more")
 
 
-def finish(evaluated: Evaluated) -> None:
-    """Exit with the status of the results' conclusion."""
+def finish(evaluated: Evaluated, facts: Sequence[Fact] = ()) -> None:
+    """Exit with the status of the results' conclusion and of further facts."""
     results = evaluated.results
-    leave(results.skipped, results.findings, [Fact[name.upper()] for name in results.conclusion.facts])
+    leave(results.skipped, results.findings, [*(Fact[name.upper()] for name in results.conclusion.facts), *facts])
 
 
 def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:

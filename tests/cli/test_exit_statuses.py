@@ -18,6 +18,7 @@ from tests.command import Outcome, cdtool
 from tests.evaluation.judged_results import results as judged_results
 from tests.formats.mcap.small_files import small_file
 from tests.synthetic.builds import MISSED, build_results
+from tests.synthetic.force_rig import half_sine, write_protocol, write_rig
 
 ROOT = Path(__file__).parents[2]
 GATE = ROOT / "sample_logs" / "gate"
@@ -88,6 +89,10 @@ class Folder:
         return path
 
     @property
+    def gate_protocol(self) -> Path:
+        return GATE / "protocol.toml"
+
+    @property
     def store(self) -> Path:
         with StoreUse(self.path / "store").opened() as store:
             return store.folder
@@ -144,6 +149,11 @@ def _forecast(files: Folder, *more: Path) -> Outcome:
     logs = sorted((files.path / "season" / "free").iterdir())
     table = ("--ambient", files.path / "season" / "ambient.csv", "--false-alarm-budget", "1/100op")
     return cdtool("signature", "forecast", files.signature, *logs, *more, "-m", files.machine, *table)
+
+
+def _write_protocol(files: Folder, peaks: Sequence[float]) -> Outcome:
+    write_rig(files.path, [half_sine(peak) for peak in peaks])
+    return cdtool("protocol", "write", write_protocol(files.path), "-o", files.path / "p.html")
 
 
 def _simulate(kind: str, *arguments: object) -> tuple[Callable[[Folder], Outcome], Callable[[Folder], Outcome]]:
@@ -240,6 +250,15 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("signature update", 0): lambda f: _update(f, f.gate / "holdout" / "01.csv"),
     ("signature update", 2): lambda f: _update(f, f.absent),
     ("signature update", 3): lambda f: _update(f, f.gate / "holdout" / "01.csv", f.empty),
+    ("protocol init", 0): lambda f: cdtool("protocol", "init", f.benchmark(), "-o", f.path / "protocol.toml"),
+    ("protocol init", 2): lambda f: cdtool("protocol", "init", f.absent, "-o", f.path / "protocol.toml"),
+    ("protocol write", 0): lambda f: _write_protocol(f, (300.0, 310.0, 320.0)),
+    ("protocol write", 1): lambda f: cdtool("protocol", "write", f.gate_protocol, "-o", f.path / "p.html"),
+    ("protocol write", 2): lambda f: cdtool("protocol", "write", f.absent, "-o", f.path / "p.html"),
+    ("protocol write", 4): lambda f: _write_protocol(f, (300.0, 310.0)),
+    ("protocol check", 0): lambda f: cdtool("protocol", "check", f.gate_protocol),
+    ("protocol check", 2): lambda f: cdtool("protocol", "check", f.machine),
+    ("protocol check", 4): lambda f: cdtool("protocol", "check", write_protocol(f.path, valid_until="2026-01-16")),
     ("store status", 0): lambda f: cdtool("store", "status", f.store),
     ("store status", 2): lambda f: cdtool("store", "status", f.absent),
     ("store gc", 0): lambda f: cdtool("store", "gc", f.store),

@@ -9,8 +9,12 @@ import pytest
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.builds.comparison import compare_builds
+from cdtool.evaluation.protocol.assessment import assess_point, judge
+from cdtool.evaluation.protocol.plan import MachineParticulars, MeasuringPoint, TestPlan
+from cdtool.evaluation.protocol.protocol import FileDigest, Protocol
 from cdtool.foreign_files import refuse_other_kind
 from cdtool.report.outputs import check_outputs, write_outputs
+from cdtool.report.protocol.document import ProtocolReport
 from cdtool.report.writers import WRITERS, known_suffixes, writer_of
 from cdtool.report.writers.base import Report, Subject
 from tests.report.hostile import HOSTILE
@@ -31,12 +35,31 @@ def reports(request) -> dict[str, object]:
     del provenance["force_profiles"]  # a figure needs profiles with names
     benchmark = Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces)
     builds = [build_results({("momentum", f"stiff{added}"): [40.0 + late] * 12}, window_s={}) for late in (0.0, 5.0)]
-    return {"benchmark": benchmark, "comparison": compare_builds(builds[0], builds[1])}
+    return {
+        "benchmark": benchmark,
+        "comparison": compare_builds(builds[0], builds[1]),
+        "protocol": ProtocolReport(_protocol(added)),
+    }
+
+
+def _protocol(added: str) -> Protocol:
+    """Return a protocol of a point that is not measured yet."""
+    point = MeasuringPoint(name=f"edge{added}", repetitions=3)
+    plan = TestPlan(machine=MachineParticulars(type=f"door{added}"), points=(point,))
+    points = (assess_point(point, None, ()),)
+    files = (FileDigest(f"protocol{added}.toml", "0" * 64, "protocol"),)
+    return Protocol(plan, points, judge(plan, points, f"protocol{added}.toml"), files)
+
+
+def _skip_without_library(name: str) -> None:
+    if WRITERS.load(name).needs:
+        pytest.importorskip(WRITERS.load(name).needs)
 
 
 @pytest.mark.parametrize(("name", "suffix"), SUFFIXES)
 def test_what_it_writes_is_known_as_its_own_and_the_same_report_gives_the_same_bytes(name, suffix, reports, tmp_path):
     subject = WRITERS.load(name).subject
+    _skip_without_library(name)
     assert type(writer_of(tmp_path / f"report{suffix.upper()}", subject)) is WRITERS.load(name)
     contents = []
     for folder in ("a", "b", "a"):  # the third replaces the first
@@ -55,6 +78,7 @@ def test_what_it_writes_is_known_as_its_own_and_the_same_report_gives_the_same_b
 @pytest.mark.parametrize(("name", "suffix"), SUFFIXES)
 def test_it_replaces_no_file_of_another_program_unasked(name, suffix, tmp_path):
     subject = WRITERS.load(name).subject
+    _skip_without_library(name)
     for path in WRITERS.load(name)().files(tmp_path / f"report{suffix}"):
         path.write_bytes(b"written by hand")
         writes_folder = WRITERS.load(name).writes_folder

@@ -7,14 +7,17 @@ to the end of the record. The shipped file is limits.toml in this folder; a user
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.tables import Table, read_toml
 from cdtool.value_words import value_in_words
 
 _SHIPPED = Path(__file__).with_name("limits.toml")
+# Requirements on the measurement: they change no verdict on a contact, only what a test protocol concludes from it.
+_MEASURING = ("sample_rate_at_least_hz", "record_at_least_s", "obstacle_stiffness_n_per_mm", "measuring_source")
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,9 @@ class ForceProfile:
     """Named force limits in steps, with their source; the steps begin at 0 s and their times increase.
 
     `checked`: someone has checked the values against the text of the standard. `average_of`: the number of tests at one
-    point that are averaged; 1: each test is assessed on its own.
+    point that are averaged; 1: each test is assessed on its own. What a test protocol requires of a measurement, 0 for
+    no requirement, with `measuring_source`: the lowest sample rate [Hz], the shortest record after the onset [s], and
+    the stiffness of the obstacle, which is the spring of the force meter [N/mm].
     """
 
     name: str
@@ -41,11 +46,20 @@ class ForceProfile:
     steps: tuple[ForceStep, ...]
     average_of: int = 1
     note: str = ""
+    sample_rate_at_least_hz: float = 0.0
+    record_at_least_s: float = 0.0
+    obstacle_stiffness_n_per_mm: float = 0.0
+    measuring_source: str = ""
 
     @property
     def warning(self) -> str:
         """What a report has to state with results of this profile; empty if its values were checked."""
         return "" if self.checked else "values to be checked against the standard"
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """Return what determines a verdict, for provenance: without the requirements on the measurement."""
+        return {name: value for name, value in asdict(self).items() if name not in _MEASURING}
 
     def ends(self, step: int) -> float:
         """Return until when a step applies [s after the onset]; infinite for the last one."""
@@ -126,6 +140,10 @@ def _profile(name: str, table: Table) -> ForceProfile:
         steps=_steps(table),
         average_of=table.whole("average_of", 1, minimum=1),
         note=table.text("note", ""),
+        sample_rate_at_least_hz=table.number("sample_rate_at_least_hz", 0.0, minimum=0.0),
+        record_at_least_s=table.number("record_at_least_s", 0.0, minimum=0.0),
+        obstacle_stiffness_n_per_mm=table.number("obstacle_stiffness_n_per_mm", 0.0, minimum=0.0),
+        measuring_source=table.text("measuring_source", ""),
     )
     table.finish()
     return profile

@@ -9,8 +9,8 @@ onset. A verdict is evidence about recordings, not a certificate.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -23,6 +23,48 @@ from cdtool.plain_text import counted
 Outcome = Literal["pass", "fail", "not_assessable"]
 
 
+CauseKind = Literal[
+    "above_limit",
+    "above_limit_onset_unseen",
+    "no_sample",
+    "ends_before",
+    "ends_inside",
+    "onset_missing",
+    "samples_missing",
+    "may_exceed",
+    "onset_earlier",
+    "saturated",
+]
+_SENTENCES: Mapping[CauseKind, str] = {
+    "above_limit": "{peak:.4g} N where {limit:g} N are allowed, exceeded {after_ms:.1f} ms after the onset",
+    "above_limit_onset_unseen": (
+        "{peak:.4g} N where {limit:g} N are allowed, exceeded {after_ms:.1f} ms after it was first seen"
+    ),
+    "no_sample": "no load-cell sample while the limit holds",
+    "ends_before": "the record ends {end:.3g} s after the onset, before {begin:g} s",
+    "ends_inside": "the record ends {end:.3g} s after the onset, the limit holds until {until:g} s",
+    "onset_missing": "load-cell samples are missing for {missing_ms:.0f} ms where the contact may have begun",
+    "samples_missing": "load-cell samples are missing for {missing_ms:.0f} ms",
+    "may_exceed": (
+        "load-cell samples are missing for {missing_ms:.0f} ms, in which the force may have reached {most:.4g} N"
+    ),
+    "onset_earlier": "the onset may be up to {earlier_ms:.0f} ms earlier, and {largest:.4g} N are then too high",
+    "saturated": "the load cell was at its stop, {peak:.4g} N, below the limit of {limit:g} N",
+}
+
+
+@dataclass(frozen=True)
+class StepCause:
+    """Why a step of a profile does not pass, with the numbers of its sentence."""
+
+    kind: CauseKind
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    def sentence(self) -> str:
+        """Return the cause in words."""
+        return _SENTENCES[self.kind].format(**self.numbers)
+
+
 @dataclass(frozen=True)
 class StepVerdict:
     """One step of a profile and one test.
@@ -30,6 +72,7 @@ class StepVerdict:
     `peak` [N] at `peak_at` [s after the onset]: the largest force while the step applies; both NaN without a sample.
     `time_budget` [s after the onset]: when the force first exceeded the limit while the step applied, between samples
     by linear interpolation; infinite if never. An alarm that meets the limit must be raised, and take effect, earlier.
+    `cause`: why it does not pass, as `reason` states in words; None if it passes, or if only the words are stored.
     """
 
     step: ForceStep
@@ -38,6 +81,7 @@ class StepVerdict:
     peak_at: float
     time_budget: float
     reason: str = ""
+    cause: StepCause | None = None
 
 
 class _OfSteps:
@@ -183,47 +227,50 @@ def _judge_step(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepVerd
     inside = np.flatnonzero((curve.time >= step.from_s) & (curve.time < ends))
     if not len(inside):
         nan = float("nan")
-        why = _unseen(curve, step, ends) or "no load-cell sample while the limit holds"
-        return StepVerdict(step, "not_assessable", nan, nan, float("inf"), why)
+        return _unassessable(step, nan, nan, _unseen(curve, step, ends) or StepCause("no_sample"))
     highest = inside[int(np.argmax(curve.force[inside]))]
     peak, peak_at = float(curve.force[highest]), float(curve.time[highest])
     above = inside[curve.force[inside] > step.at_most_n]
     if len(above):
         budget = _crossing(curve, int(above[0]), step)
-        since = "it was first seen" if curve.hole else "the onset"
-        reason = f"{peak:.4g} N where {step.at_most_n:g} N are allowed, exceeded {1e3 * budget:.1f} ms after {since}"
-        return StepVerdict(step, "fail", peak, peak_at, budget, reason)
-    reason = _unseen(curve, step, ends) or _may_exceed(curve, step, ends)
-    if not reason and curve.clipped[inside].any():
-        reason = f"the load cell was at its stop, {peak:.4g} N, below the limit of {step.at_most_n:g} N"
-    return StepVerdict(step, "not_assessable" if reason else "pass", peak, peak_at, float("inf"), reason)
+        kind: CauseKind = "above_limit_onset_unseen" if curve.hole else "above_limit"
+        cause = StepCause(kind, {"peak": peak, "limit": step.at_most_n, "after_ms": 1e3 * budget})
+        return StepVerdict(step, "fail", peak, peak_at, budget, cause.sentence(), cause)
+    unknown = _unseen(curve, step, ends) or _may_exceed(curve, step, ends)
+    if not unknown and curve.clipped[inside].any():
+        unknown = StepCause("saturated", {"peak": peak, "limit": step.at_most_n})
+    if unknown:
+        return _unassessable(step, peak, peak_at, unknown)
+    return StepVerdict(step, "pass", peak, peak_at, float("inf"))
 
 
-def _unseen(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
-    """Return which part of a step is not recorded; empty if all of it is."""
+def _unassessable(step: ForceStep, peak: float, peak_at: float, cause: StepCause) -> StepVerdict:
+    return StepVerdict(step, "not_assessable", peak, peak_at, float("inf"), cause.sentence(), cause)
+
+
+def _unseen(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepCause | None:
+    """Return which part of a step is not recorded; None if all of it is."""
     if curve.end < step.from_s:
-        return f"the record ends {curve.end:.3g} s after the onset, before {step.from_s:g} s"
+        return StepCause("ends_before", {"end": curve.end, "begin": step.from_s})
     if math.isfinite(ends) and ends - curve.end > curve.longest_step:
-        return f"the record ends {curve.end:.3g} s after the onset, the limit holds until {ends:g} s"
+        return StepCause("ends_inside", {"end": curve.end, "until": ends})
     if curve.hole and step.from_s == 0.0:
-        return f"load-cell samples are missing for {1e3 * curve.hole:.0f} ms where the contact may have begun"
+        return StepCause("onset_missing", {"missing_ms": 1e3 * curve.hole})
     begins, stops = curve.holes()
     missing = float(np.sum(np.maximum(np.minimum(stops, ends) - np.maximum(begins, step.from_s), 0.0)))
-    return f"load-cell samples are missing for {1e3 * missing:.0f} ms" if missing > 0.0 else ""
+    return StepCause("samples_missing", {"missing_ms": 1e3 * missing}) if missing > 0.0 else None
 
 
-def _may_exceed(curve: ForceTimeCurve, step: ForceStep, ends: float) -> str:
-    """Return how the limit may have been exceeded between two samples, or if the contact began earlier; or empty."""
+def _may_exceed(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepCause | None:
+    """Return how the limit may have been exceeded between two samples, or if the contact began earlier; or None."""
     most, hole = curve.could_reach(step.from_s, ends)
     if most > step.at_most_n:
-        return (
-            f"load-cell samples are missing for {1e3 * hole:.0f} ms, in which the force may have reached {most:.4g} N"
-        )
+        return StepCause("may_exceed", {"missing_ms": 1e3 * hole, "most": most})
     earlier = (curve.time >= step.from_s - curve.uncertainty) & (curve.time < step.from_s)
     largest = float(np.max(curve.force[earlier], initial=0.0))
     if step.from_s > 0.0 and largest > step.at_most_n:
-        return f"the onset may be up to {1e3 * curve.uncertainty:.0f} ms earlier, and {largest:.4g} N are then too high"
-    return ""
+        return StepCause("onset_earlier", {"earlier_ms": 1e3 * curve.uncertainty, "largest": largest})
+    return None
 
 
 def _crossing(curve: ForceTimeCurve, first: int, step: ForceStep) -> float:

@@ -151,6 +151,11 @@ def encoded(figure: Figure, suffix: str) -> bytes:
     return drawn.getvalue()
 
 
+def svg_text(figure: Figure) -> str:
+    """Return a figure as SVG, to be put into a document."""
+    return encoded(figure, ".svg").decode("utf-8")
+
+
 def write(
     axes: Axes,
     text: str,

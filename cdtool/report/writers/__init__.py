@@ -21,6 +21,8 @@ WRITERS = Registry(
         "figure": "cdtool.report.writers.figure:Figure",
         "comparison_markdown": "cdtool.report.writers.comparison_markdown:ComparisonMarkdown",
         "comparison_json": "cdtool.report.writers.comparison_json:ComparisonJson",
+        "protocol_html": "cdtool.report.writers.protocol_html:ProtocolHtml",
+        "protocol_pdf": "cdtool.report.writers.protocol_pdf:ProtocolPdf",
     },
     contract=("name", "suffixes", "in_folder", "subject", "kinds", "files", "has_content", "write"),
 )

@@ -14,7 +14,7 @@ from cdtool.evaluation.traces.trace import Trace
 from cdtool.foreign_files import Kind
 from cdtool.report.model import Model, report_model
 
-Subject = Literal["benchmark", "comparison"]
+Subject = Literal["benchmark", "comparison", "protocol"]
 Content = TypeVar("Content")
 
 
@@ -42,12 +42,13 @@ class Report:
 
 
 class Writer(Generic[Content]):
-    """The base class of writers, of a `Report` or of a `BuildComparison`.
+    """The base class of writers, of a `Report`, of a `BuildComparison` or of a `ProtocolReport`.
 
-    `name` is the name it is registered under. `subject`: what it writes, the reports of a benchmark or the comparison
-    of two builds. `suffixes`: of the names that it writes for `--output`; none if it writes only into a report folder,
-    as `in_folder`. `kinds`: by suffix, what marks a file that it wrote; any other file of that name is replaced only
-    with `--force`. `writes_folder`: what it writes under a name of its suffix is a folder, which it checks itself.
+    `name` is the name it is registered under. `subject`: what it writes, the reports of a benchmark, the comparison of
+    two builds or a test protocol. `needs`: the library of an extra without which it cannot write. `suffixes`: of the
+    names that it writes for `--output`; none if it writes only into a report folder, as `in_folder`. `kinds`: by
+    suffix, what marks a file that it wrote; any other file of that name is replaced only with `--force`.
+    `writes_folder`: what it writes under a name of its suffix is a folder, which it checks itself.
     """
 
     name: ClassVar[str]
@@ -56,6 +57,7 @@ class Writer(Generic[Content]):
     in_folder: ClassVar[str] = ""
     kinds: ClassVar[Mapping[str, Kind]] = {}
     writes_folder: ClassVar[bool] = False
+    needs: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         """Raise ConfigurationError for an unknown subject, or a suffix that a name cannot have or without a kind."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -143,7 +143,7 @@ class BenchmarkFile:
             "synchronisation_s": "measured" if self.measures_synchronisation else self.synchronisation,
             "mass_before_cell_kg": self.mass_before_cell,
             "force_profiles": {
-                name: asdict(profile) for name in self.groups_of_impacts if (profile := self.impacts[name].force)
+                name: profile.described for name in self.groups_of_impacts if (profile := self.impacts[name].force)
             },
             "sections": self._in_words(self.sections),
         }
@@ -263,12 +263,15 @@ def read_benchmark_file(
     """
     file = location(path)
     root = Table(read_toml(file, "a benchmark file"), str(file))
+    root.raw("protocol")  # read by workflows/protocol
     if isinstance(root.raw("machine"), dict):
         text = f"{file}: is a machine file, not a benchmark file"
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
     base = file.parent
     machine_file = read_machine_file(joined(base, root.text("machine")))
-    wanted = root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
+    # A file for a force rig, whose recordings have only a force, names none.
+    names_none = not learning and root.raw("detectors") == []
+    wanted = () if names_none else root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
         raise root.fault("detectors", "contains a detector twice", "list each detector once")

@@ -1,0 +1,202 @@
+"""`cdtool protocol init|check|write`, and what `cdtool benchmark` shows of a protocol."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdtool.cli.console import leave, plain, print_json, say
+from cdtool.cli.options import ForceOption, JsonOption
+from cdtool.cli.place import Place, location
+from cdtool.errors import UsageError
+from cdtool.exit_status import Fact, statuses_words
+from cdtool.plain_text import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cdtool.evaluation.protocol.protocol import Protocol
+    from cdtool.evaluation.protocol.reasons import Outcome
+    from cdtool.workflows.protocol.checking import CheckedProtocol
+    from cdtool.workflows.protocol.protocol_file import ProtocolFile
+
+protocol = typer.Typer(
+    help="Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+)
+_FACTS = {"fail": (Fact.FORCE_VIOLATED,), "incomplete": (Fact.INCOMPLETE,), "pass": ()}
+_SHOWN = 10
+
+
+@protocol.callback()
+def _protocol() -> None:
+    """Draft and check the file of a test protocol, and write it; `cdtool benchmark -p` adds latencies."""
+
+
+@protocol.command("init", epilog=statuses_words("protocol init"))
+def init(
+    benchmark: Annotated[
+        Place | None,
+        typer.Argument(
+            parser=location, help="Benchmark file; without one, an empty plan is drafted.", metavar="[BENCHMARK]"
+        ),
+    ] = None,
+    output: Annotated[
+        Place, typer.Option("--output", "-o", parser=location, help="Protocol file to write (.toml).")
+    ] = Path("protocol.toml"),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+) -> None:
+    """Draft a protocol file: measuring points from the benchmark's groups, sample rate and speed from its recordings.
+
+    Example: cdtool protocol init sample_logs/gate/benchmark.toml -o protocol.toml
+    """
+    from cdtool.workflows.protocol.drafting import draft_protocol
+
+    drafted = draft_protocol(benchmark, output, force=force)
+    typer.echo(drafted.text)
+    typer.echo(f"{plain(drafted.path)} written: {counted(drafted.to_fill_in, 'value')} to fill in, then run")
+    typer.echo(f"  cdtool protocol check {_quoted(drafted.path)}")
+
+
+@protocol.command("check", epilog=statuses_words("protocol check"))
+def check(
+    file: Annotated[
+        Place,
+        typer.Argument(parser=location, help="Protocol file, or a benchmark file with [protocol].", metavar="FILE"),
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """List what is missing or contradictory in a protocol file, without reading a recording.
+
+    Exits with status 4 if anything is.
+
+    Example: cdtool protocol check sample_logs/gate/protocol.toml
+    """
+    from cdtool.workflows.protocol.checking import check_protocol
+
+    checked = check_protocol(file)
+    reasons = checked.verdict.reasons
+    if as_json:
+        items = [
+            {"kind": item.kind.value, "due": item.due, **{key: _plain(value) for key, value in item.values.items()}}
+            for item in reasons
+        ]
+        print_json({"complete": not reasons, "incomplete": items, "recordings": checked.recordings})
+    else:
+        _show_checked(checked)
+    leave(facts=[Fact.INCOMPLETE] if reasons else [])
+
+
+@protocol.command("write", epilog=statuses_words("protocol write"))
+def write(
+    file: Annotated[
+        Place,
+        typer.Argument(parser=location, help="Protocol file, or a benchmark file with [protocol].", metavar="FILE"),
+    ],
+    output: Annotated[
+        list[Place] | None,
+        typer.Option("--output", "-o", parser=location, help="Output, repeatable: .pdf or .html."),
+    ] = None,
+    force: ForceOption = False,
+) -> None:
+    """Write the protocol without running detectors, for recordings of a force rig that have only a force.
+
+    `cdtool benchmark -p` writes the same with their latencies. Exits with 1 if it fails and 4 if it is incomplete.
+
+    Example: cdtool protocol write sample_logs/gate/protocol.toml -o protocol.html
+    """
+    from cdtool.report.outputs import check_outputs, write_outputs
+    from cdtool.report.protocol.document import ProtocolReport
+    from cdtool.workflows.protocol.making import protocol as make
+
+    if not output:
+        raise UsageError("--output is missing", "add -o protocol.pdf or -o protocol.html")
+    check_outputs(output, force=force, subject="protocol")
+    names = [word for path in output for word in ("-o", path.name)]
+    made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
+    write_outputs(ProtocolReport(made), output, force=force, inputs=(file,), subject="protocol")
+    show_protocol(made, output)
+    leave(facts=facts_of(made.verdict.outcome))
+
+
+def _show_checked(checked: CheckedProtocol) -> None:
+    from cdtool.evaluation.protocol.reasons import Verdict
+    from cdtool.report.protocol.words import words_of
+
+    file, words = checked.file, words_of("en")
+    for name, count in checked.recordings.items():
+        typer.echo(f"{plain(name)}: {counted(count, 'recording')}")
+    for due, title in (("before_test", "before the test"), ("test_day", "on the day of the test")):
+        part = Verdict(tuple(item for item in checked.verdict.reasons if item.due == due))
+        sentences = words.reasons(part, "incomplete")
+        if sentences:
+            typer.echo(f"incomplete, {title}:")
+        for sentence in sentences:
+            say(f"- {sentence}", indent="  ")
+    for profile in {point.profile for point in file.plan.points if point.profile}:
+        if not file.profiles[profile].checked:
+            say(f"note: {profile}: {file.profiles[profile].warning}; the protocol states this")
+    done = not checked.verdict.reasons
+    typer.echo("complete; next, the protocol:" if done else "when these are settled, the protocol:")
+    folder = file.path.parent
+    benchmark = file.benchmark or folder / "benchmark.toml"
+    own = [] if benchmark == file.path else ["-p", _quoted(file.path)]
+    command = ["cdtool benchmark", _quoted(benchmark), *own] if checked.has_detectors else ["cdtool protocol write"]
+    if not checked.has_detectors:
+        command.append(_quoted(file.path))
+    typer.echo("  " + " ".join([*command, "-o protocol.pdf"]))
+
+
+def file_of_protocol(benchmark: Path, given: Path | None, targets: Sequence[Path]) -> ProtocolFile | None:
+    """Return the protocol file for the targets that are protocols; None without any.
+
+    Raises UsageError for a protocol without a file, or a file without a protocol to write.
+    """
+    from cdtool.workflows.protocol.protocol_file import has_protocol, read_protocol_file
+
+    if not targets:
+        if given is not None:
+            raise UsageError("-p: no protocol is written", "add -o protocol.pdf or -o protocol.html")
+        return None
+    if given is None and not has_protocol(benchmark):
+        raise UsageError(
+            f"--output is {plain(targets[0])}, and {plain(benchmark)} has no [protocol]",
+            f"draft one, cdtool protocol init {_quoted(benchmark)} -o protocol.toml, then -p protocol.toml",
+        )
+    return read_protocol_file(benchmark if given is None else given)
+
+
+def facts_of(outcome: Outcome) -> tuple[Fact, ...]:
+    """Return the facts of a protocol's verdict for the exit status."""
+    return _FACTS[outcome]
+
+
+def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
+    """Print the verdict of a protocol, the first of its reasons, and the next step."""
+    from cdtool.report.protocol.words import words_of
+
+    words = words_of("en")
+    typer.echo(f"protocol: {made.verdict.outcome}")
+    sentences = [*words.reasons(made.verdict, "fail"), *words.reasons(made.verdict, "incomplete")]
+    for sentence in sentences[:_SHOWN]:
+        say(f"- {sentence}", indent="  ")
+    if len(sentences) > _SHOWN:
+        typer.echo(f"  and {len(sentences) - _SHOWN} more, all in the protocol")
+    for path in written:
+        typer.echo(f"written: {plain(path)}")
+    if made.verdict.outcome == "incomplete":
+        typer.echo("next: settle what is incomplete, and write the protocol again")
+    else:
+        typer.echo("next: check entries, curves and limits against the standard, print and sign")
+
+
+def _plain(value: object) -> object:
+    return value if isinstance(value, int | float | str) else str(value)
+
+
+def _quoted(path: object) -> str:
+    return shlex.quote(plain(path))

@@ -1,0 +1,1 @@
+"""A test protocol: the plan of a force measurement, what was measured, and the verdict with its reasons."""

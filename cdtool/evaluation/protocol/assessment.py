@@ -1,0 +1,349 @@
+"""From measured contacts to the verdict of a test protocol.
+
+Conventions: the repetitions of a point are its recordings' contacts, in the order in which they are given. Pure
+functions: nothing is read here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Literal
+
+from cdtool.evaluation.force.curve import ForceTimeCurve
+from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.force.quantities import dynamic_time, time_above
+from cdtool.evaluation.force.verdict import ForceVerdict, PointVerdict, assess_force, averaged
+from cdtool.evaluation.protocol.plan import Instrument, MeasuringPoint, TestPlan, empty_entries
+from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Value, Verdict
+from cdtool.evaluation.truth.missing_samples import CellClock
+
+# Sample rates are alike within this share: a clock is not exact, and stamps jitter.
+_SAME_RATE = 0.02
+# A stated sample rate that differs by more than this share from the measured one is that of another instrument.
+_OTHER_RATE = 0.1
+_SAME_STIFFNESS = 0.02
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """One measured contact at a point.
+
+    `rest` [N]: the load cell's reading before the contact, which is subtracted; `drift` [N/s]: its drift, 0 unless
+    beyond doubt. `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
+    """
+
+    recording: str
+    sha256: str
+    contact: int
+    curve: ForceTimeCurve
+    verdict: ForceVerdict
+    rest: float
+    drift: float = 0.0
+    dynamic_time: float = math.nan
+    total_time: float = math.nan
+    latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        recording: tuple[str, str],
+        contact: int,
+        curve: ForceTimeCurve,
+        profile: ForceProfile,
+        rest: tuple[float, float] = (0.0, 0.0),
+        latencies_ms: Mapping[str, float | None] | None = None,
+    ) -> Repetition:
+        """Return a contact of a `recording` (name and SHA-256) with its quantities; `rest` is its level and drift."""
+        total = time_above(curve, profile.steps[-1].at_most_n).length if len(profile.steps) > 2 else math.nan
+        verdict = assess_force(curve, profile)
+        return cls(*recording, contact, curve, verdict, *rest, dynamic_time(curve, profile), total, latencies_ms or {})
+
+    @property
+    def sample_rate(self) -> float:
+        """Return the load cell's measured sample rate [Hz]: the inverse of the median step; NaN below two samples."""
+        clock = self.curve.clock
+        period = clock.period if clock else _median_step(self.curve)
+        return 1.0 / period if period > 0.0 else math.nan
+
+    @property
+    def largest_reading(self) -> float:
+        """Return the largest magnitude that the load cell had to show [N]: the peak and the level at rest."""
+        return self.curve.peak + abs(self.rest)
+
+
+@dataclass(frozen=True)
+class Unmeasured:
+    """A recording or contact of a point that does not count as a repetition, and why; `message`: that of an error."""
+
+    recording: str
+    kind: Literal["unreadable", "no_force", "in_progress"]
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class PointAssessment:
+    """A measuring point with its repetitions; `verdict` is None without a profile."""
+
+    point: MeasuringPoint
+    profile: ForceProfile | None
+    repetitions: tuple[Repetition, ...]
+    verdict: PointVerdict | None
+    reasons: tuple[Reason, ...]
+
+    @property
+    def needed(self) -> int:
+        """Return how many repetitions the point needs: as planned, and at least as many as the profile averages."""
+        return max(self.point.repetitions, self.profile.average_of if self.profile else 1)
+
+    @property
+    def outcome(self) -> str:
+        """Return pass, fail or incomplete."""
+        return Verdict(self.reasons).outcome
+
+
+def assess_point(
+    point: MeasuringPoint,
+    profile: ForceProfile | None,
+    repetitions: Sequence[Repetition],
+    unmeasured: Sequence[Unmeasured] = (),
+    instrument: Instrument | None = None,
+) -> PointAssessment:
+    """Assess the repetitions at a measuring point.
+
+    Parameters
+    ----------
+    point : MeasuringPoint
+        The point of the plan.
+    profile : ForceProfile or None
+        Its force limits; None: it cannot be assessed.
+    repetitions : sequence of Repetition
+        The contacts, all compared with this profile.
+    unmeasured : sequence of Unmeasured
+        Recordings of the point that do not count.
+    instrument : Instrument or None
+        The instrument that measured the force.
+
+    Returns
+    -------
+    PointAssessment
+        With every reason for which it does not pass; it passes without any.
+
+    Examples
+    --------
+    A point of which nothing was measured is incomplete.
+
+    >>> from cdtool.evaluation.force.limits import read_force_limits
+    >>> profile = read_force_limits()["en_12453_reducing_gap"]
+    >>> point = MeasuringPoint(name="edge", repetitions=3, obstacle_stiffness_n_per_mm=500.0)
+    >>> found = assess_point(point, profile, [])
+    >>> found.outcome, [reason.kind.value for reason in found.reasons]
+    ('incomplete', ['not_measured'])
+    """
+    verdict = averaged([item.verdict for item in repetitions], profile) if profile else None
+    needed = max(point.repetitions, profile.average_of if profile else 1)
+    reasons = [
+        *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
+        *_of_count(point, needed, len(repetitions), has_others=bool(unmeasured)),
+        *(_reason(ReasonKind(item.kind), point, recording=item.recording, message=item.message) for item in unmeasured),
+        *_repeated(point, repetitions),
+    ]
+    if profile and verdict and repetitions:
+        reasons += _exceeded(point, verdict, profile)
+        for number, item in enumerate(repetitions, 1):
+            reasons += _of_repetition(point, number, item, profile, instrument)
+    return PointAssessment(point, profile, tuple(repetitions), verdict, tuple(reasons))
+
+
+def check_point(point: MeasuringPoint, profile: ForceProfile | None, recordings: int) -> PointAssessment:
+    """Check the plan of a point against its profile, before its recordings are read.
+
+    Parameters
+    ----------
+    point : MeasuringPoint
+        The point of the plan.
+    profile : ForceProfile or None
+        Its force limits, if it has any.
+    recordings : int
+        The number of its recordings.
+
+    Returns
+    -------
+    PointAssessment
+        Without repetitions; with every reason that is known already.
+
+    Examples
+    --------
+    >>> found = check_point(MeasuringPoint(name="edge", repetitions=3), None, recordings=3)
+    >>> [reason.kind.value for reason in found.reasons]
+    ['no_profile']
+    """
+    needed = max(point.repetitions, profile.average_of if profile else 1)
+    reasons = [
+        *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
+        *_of_count(point, needed, recordings, has_others=False),
+    ]
+    return PointAssessment(point, profile, (), None, tuple(reasons))
+
+
+def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Sequence[Reason] = ()) -> Verdict:
+    """Return the verdict of a whole protocol.
+
+    Parameters
+    ----------
+    plan : TestPlan
+        The plan.
+    points : sequence of PointAssessment
+        Its assessed points.
+    file : str
+        Name of the file with the plan, for the reasons.
+    more : sequence of Reason
+        Other reasons, for example a benchmark file that cannot be read.
+
+    Returns
+    -------
+    Verdict
+        Fail if a point fails; otherwise incomplete if anything is missing; otherwise pass. All reasons are listed.
+
+    Examples
+    --------
+    >>> judge(TestPlan(), [], "protocol.toml").outcome
+    'incomplete'
+    """
+    reasons = [
+        *chain.from_iterable(point.reasons for point in points),
+        *more,
+        *_of_instruments(plan, [point.profile for point in points if point.profile]),
+        *([] if plan.points else [Reason(ReasonKind.NO_POINT, {"file": file})]),
+        *(Reason(ReasonKind.NO_VALUE, {"key": item.key, "file": file}, due=item.due) for item in empty_entries(plan)),
+    ]
+    return Verdict(tuple(sorted(reasons, key=lambda reason: reason.kind.outcome != "fail")))
+
+
+def _reason(kind: ReasonKind, point: MeasuringPoint, **values: str | float) -> Reason:
+    return Reason(kind, {"point": point.name, **values}, due="before_test" if kind in _BEFORE_TEST else "test_day")
+
+
+_BEFORE_TEST = (ReasonKind.NO_PROFILE, ReasonKind.TOO_FEW_PLANNED, ReasonKind.WRONG_STIFFNESS)
+
+
+def _of_plan(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason]:
+    """Yield how the plan of a point contradicts its profile."""
+    if 0 < point.repetitions < profile.average_of:
+        planned, needed = point.repetitions, profile.average_of
+        yield _reason(ReasonKind.TOO_FEW_PLANNED, point, planned=planned, needed=needed, profile=profile.name)
+    stiffness, required = point.obstacle_stiffness_n_per_mm, profile.obstacle_stiffness_n_per_mm
+    if stiffness and required and abs(stiffness - required) > _SAME_STIFFNESS * required:
+        yield _reason(ReasonKind.WRONG_STIFFNESS, point, stiffness=stiffness, needed=required, profile=profile.name)
+
+
+def _of_count(point: MeasuringPoint, needed: int, present: int, *, has_others: bool) -> Iterator[Reason]:
+    if present < needed:
+        # With recordings that do not count, these are the reason; the count is stated in any case.
+        kind = ReasonKind.TOO_FEW_REPETITIONS if present or has_others else ReasonKind.NOT_MEASURED
+        yield _reason(kind, point, present=present, needed=needed)
+    if point.peak_pressures_n_per_cm2 and len(point.peak_pressures_n_per_cm2) != present:
+        stated = len(point.peak_pressures_n_per_cm2)
+        yield _reason(ReasonKind.PRESSURES_MISSING, point, present=stated, needed=present)
+
+
+def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
+    """Yield each contact that is counted twice under two names: it is one measurement."""
+    first: dict[tuple[str, int], str] = {}
+    for item in repetitions:
+        known = first.setdefault((item.sha256, item.contact), item.recording)
+        if known != item.recording:
+            yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=known)
+
+
+def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:
+    for step in verdict.steps:
+        if step.outcome == "fail":
+            yield _reason(
+                ReasonKind.POINT_EXCEEDS,
+                point,
+                step=step.step.name,
+                force=step.force,
+                limit=step.step.at_most_n,
+                count=verdict.tests,
+                averaged="mean" if profile.average_of > 1 else "highest",
+            )
+
+
+def _of_repetition(
+    point: MeasuringPoint, number: int, item: Repetition, profile: ForceProfile, instrument: Instrument | None
+) -> Iterator[Reason]:
+    """Yield what is wrong with the data of a repetition."""
+    about: dict[str, str | float] = {"repetition": number, "recording": item.recording}
+    rate, least = item.sample_rate, profile.sample_rate_at_least_hz
+    if rate < (1.0 - _SAME_RATE) * least:
+        yield _reason(ReasonKind.RATE_TOO_LOW, point, **about, rate=rate, needed=least, profile=profile.name)
+    is_short = item.curve.end < profile.record_at_least_s
+    if is_short:
+        end, needed = item.curve.end, profile.record_at_least_s
+        yield _reason(ReasonKind.RECORD_TOO_SHORT, point, **about, end=end, needed=needed, profile=profile.name)
+    for step in item.verdict.steps:
+        if step.outcome == "not_assessable" and step.cause:
+            if is_short and step.cause.kind in ("ends_before", "ends_inside"):
+                continue
+            reason = _reason(ReasonKind.NOT_ASSESSABLE, point, **about, step=step.step.name)
+            yield Reason(reason.kind, reason.values, step.cause, reason.due)
+    if item.curve.saturated and not any(_is_saturated(step.cause) for step in item.verdict.steps):
+        yield _reason(ReasonKind.SATURATED, point, **about, peak=item.curve.peak)
+    yield from _of_drift(point, item, profile, about)
+    if instrument is not None:
+        yield from _of_instrument(point, item, instrument, about)
+
+
+def _is_saturated(cause: object) -> bool:
+    return getattr(cause, "kind", "") == "saturated"
+
+
+def _of_drift(
+    point: MeasuringPoint, item: Repetition, profile: ForceProfile, about: Mapping[str, str | float]
+) -> Iterator[Reason]:
+    """Yield the steps that pass only if the level at rest did not drift as it did before the contact."""
+    for number, step in enumerate(item.verdict.steps):
+        until = min(profile.ends(number), item.curve.end)
+        moved = abs(item.drift) * until
+        if step.outcome == "pass" and step.peak + moved > step.step.at_most_n:
+            name, limit = step.step.name, step.step.at_most_n
+            drift = item.drift
+            yield _reason(ReasonKind.DRIFT_DECIDES, point, **about, step=name, drift=drift, peak=step.peak, limit=limit)
+
+
+def _of_instrument(
+    point: MeasuringPoint, item: Repetition, instrument: Instrument, about: Mapping[str, str | float]
+) -> Iterator[Reason]:
+    if instrument.range_n and item.largest_reading > instrument.range_n:
+        reading, most = item.largest_reading, instrument.range_n
+        yield _reason(ReasonKind.BEYOND_RANGE, point, **about, reading=reading, range=most)
+    stated, rate = instrument.sample_rate_hz, item.sample_rate
+    if stated and math.isfinite(rate) and abs(rate - stated) > _OTHER_RATE * stated:
+        yield _reason(ReasonKind.RATE_DIFFERS, point, **about, rate=rate, stated=stated)
+
+
+def _of_instruments(plan: TestPlan, profiles: Sequence[ForceProfile]) -> Iterator[Reason]:
+    """Yield what is wrong with the instruments: calibrations on the test day, and the stated sample rate."""
+    if plan.force_instrument is None:
+        yield Reason(ReasonKind.NO_FORCE_INSTRUMENT)
+    day = plan.test.date
+    for item in plan.instruments:
+        name = " ".join(filter(None, (item.model or item.quantity, item.serial_number)))
+        if day and item.calibration_valid_until and item.calibration_valid_until < day:
+            values: dict[str, Value] = {"instrument": name, "valid_until": item.calibration_valid_until, "day": day}
+            yield Reason(ReasonKind.CALIBRATION_EXPIRED, values)
+        if day and item.calibrated_on and item.calibrated_on > day:
+            yield Reason(
+                ReasonKind.CALIBRATED_LATER, {"instrument": name, "calibrated": item.calibrated_on, "day": day}
+            )
+    force = plan.force_instrument
+    least = max((profile.sample_rate_at_least_hz for profile in profiles), default=0.0)
+    if force and force.sample_rate_hz and force.sample_rate_hz < least:
+        yield Reason(ReasonKind.STATED_RATE_TOO_LOW, {"rate": force.sample_rate_hz, "needed": least})
+
+
+def _median_step(curve: ForceTimeCurve) -> float:
+    return CellClock(curve.time).period

@@ -1,0 +1,101 @@
+"""Why a protocol does not say "pass": facts with their numbers; sentences are made where they are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from enum import Enum
+from typing import Literal
+
+from cdtool.evaluation.force.verdict import StepCause
+from cdtool.evaluation.protocol.plan import Due
+
+Outcome = Literal["pass", "fail", "incomplete"]
+Value = str | int | float | date
+
+
+class ReasonKind(Enum):
+    """What is wrong; the value is its name in the tables of sentences."""
+
+    POINT_EXCEEDS = "point_exceeds"
+    NO_VALUE = "no_value"
+    NO_POINT = "no_point"
+    NO_FORCE_INSTRUMENT = "no_force_instrument"
+    NO_PROFILE = "no_profile"
+    TOO_FEW_PLANNED = "too_few_planned"
+    TOO_FEW_REPETITIONS = "too_few_repetitions"
+    NOT_MEASURED = "not_measured"
+    NOT_ASSESSABLE = "not_assessable"
+    UNREADABLE = "unreadable"
+    NO_FORCE = "no_force"
+    IN_PROGRESS = "in_progress"
+    SAME_RECORDING = "same_recording"
+    CALIBRATION_EXPIRED = "calibration_expired"
+    CALIBRATED_LATER = "calibrated_later"
+    STATED_RATE_TOO_LOW = "stated_rate_too_low"
+    RATE_TOO_LOW = "rate_too_low"
+    RATE_DIFFERS = "rate_differs"
+    RECORD_TOO_SHORT = "record_too_short"
+    BEYOND_RANGE = "beyond_range"
+    SATURATED = "saturated"
+    DRIFT_DECIDES = "drift_decides"
+    WRONG_STIFFNESS = "wrong_stiffness"
+    PRESSURES_MISSING = "pressures_missing"
+    BENCHMARK_UNREADABLE = "benchmark_unreadable"
+
+    @property
+    def outcome(self) -> Outcome:
+        """Return what it leads to: only a measured force above its limit fails, everything else is incomplete."""
+        return "fail" if self is ReasonKind.POINT_EXCEEDS else "incomplete"
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One reason, with the values of its sentence; `cause` is that of a step that could not be assessed."""
+
+    kind: ReasonKind
+    values: Mapping[str, Value] = field(default_factory=dict)
+    cause: StepCause | None = None
+    due: Due = "before_test"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict of a protocol, with every reason.
+
+    Fail beats incomplete, incomplete beats pass: the reasons for both are listed, those of a fail first.
+    """
+
+    reasons: tuple[Reason, ...] = ()
+
+    @property
+    def outcome(self) -> Outcome:
+        """Return fail if any reason fails, otherwise incomplete if there is a reason, otherwise pass."""
+        return worst([reason.kind.outcome for reason in self.reasons])
+
+    def of(self, outcome: Outcome) -> tuple[Reason, ...]:
+        """Return the reasons that lead to an outcome."""
+        return tuple(reason for reason in self.reasons if reason.kind.outcome == outcome)
+
+
+def worst(outcomes: list[Outcome]) -> Outcome:
+    """Return the outcome of several.
+
+    Parameters
+    ----------
+    outcomes : list of str
+        Any number of outcomes.
+
+    Returns
+    -------
+    str
+        Fail if one fails, otherwise incomplete if one is incomplete, otherwise pass, also of none.
+
+    Examples
+    --------
+    >>> worst(["pass", "incomplete"]), worst(["incomplete", "fail"]), worst([])
+    ('incomplete', 'fail', 'pass')
+    """
+    order: tuple[Outcome, ...] = ("fail", "incomplete", "pass")
+    return min(outcomes, key=order.index, default="pass")

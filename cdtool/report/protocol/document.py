@@ -1,0 +1,376 @@
+"""The document of a test protocol: the verdict first, then what it rests on, then the signatures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition
+from cdtool.evaluation.protocol.plan import Instrument
+from cdtool.evaluation.protocol.protocol import Protocol
+from cdtool.plain_text import plain
+from cdtool.report.protocol.blocks import (
+    Block,
+    Curves,
+    Document,
+    Facts,
+    Grid,
+    Heading,
+    Items,
+    Paragraph,
+    Signatures,
+    VerdictBox,
+)
+from cdtool.report.protocol.curve_drawing import curve_drawings
+from cdtool.report.protocol.words import Words, words_of
+
+_CHECKED_STEPS = 3
+
+
+@dataclass(frozen=True)
+class ProtocolReport:
+    """What the writers of a protocol write: the protocol, and its document, which is made once."""
+
+    protocol: Protocol
+
+    @cached_property
+    def document(self) -> Document:
+        """The document in the language of the plan."""
+        return protocol_document(self.protocol)
+
+
+def protocol_document(protocol: Protocol) -> Document:
+    """Return the document of a protocol in the language of its plan; the same for the same protocol."""
+    words = words_of(protocol.plan.language)
+    day = protocol.plan.test.date
+    number = protocol.plan.number
+    return Document(
+        title=words("document.title"),
+        number=words("document.number", number=plain(number)) if number else "",
+        language=words.language,
+        data_hash=words("document.data_hash", hash=protocol.data_sha256),
+        page=words("document.page", page="{page}", pages="{pages}"),
+        day=(day.year, day.month, day.day) if day else None,
+        blocks=(
+            *_cover(protocol, words),
+            *_machine(protocol, words),
+            *_instruments(protocol, words),
+            *_plan(protocol, words),
+            *_results(protocol, words),
+            *_curves(protocol, words),
+            *_latencies(protocol, words),
+            *_checks(protocol, words),
+            *_deviations(protocol, words),
+            *_limits(protocol, words),
+            *_provenance(protocol, words),
+            *_signatures(protocol, words),
+        ),
+    )
+
+
+def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
+    verdict, points = protocol.verdict, protocol.points
+    failed = sum(point.outcome == "fail" for point in points)
+    text = words(f"verdict.{verdict.outcome}_text", points=len(points), failed=failed)
+    is_open = verdict.outcome == "fail" and verdict.of("incomplete")
+    if is_open:
+        text += " " + words("verdict.open_items", count=len(words.reasons(verdict, "incomplete")))
+    yield VerdictBox(verdict.outcome, words(f"verdict.{verdict.outcome}"), text)
+    plan = protocol.plan
+    shown = (
+        ("type", plan.machine.type),
+        ("serial_number", plan.machine.serial_number),
+        ("date", plan.test.date),
+        ("place", plan.test.place),
+        ("tester", plan.test.tester),
+        ("organisation", plan.test.organisation),
+        ("points", ", ".join(point.point.name for point in points)),
+    )
+    yield Facts(tuple((words(f"field.{name}"), plain(words.value(value or None))) for name, value in shown))
+    for outcome in ("fail", "incomplete"):
+        sentences = words.reasons(verdict, outcome)
+        if sentences:
+            yield Heading(words(f"verdict.why_{outcome}"))
+            yield Items(tuple(map(plain, sentences)))
+    yield Heading(words("verdict.notices"))
+    yield Items(tuple(map(plain, _notices(protocol, words))))
+
+
+def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
+    profiles = {point.profile.name: point.profile for point in protocol.points if point.profile}
+    for profile in profiles.values():
+        if not profile.checked:
+            yield words("notice.unchecked", profile=profile.name, source=profile.source)
+    for point in protocol.points:
+        if point.verdict and point.profile and point.profile.average_of > 1:
+            for step in point.verdict.steps:
+                if step.above and step.outcome != "fail":
+                    values = {
+                        "count": step.above,
+                        "tests": point.verdict.tests,
+                        "step": words.name("step", step.step.name),
+                    }
+                    yield words("notice.single_above", point=point.point.name, **values)
+    if any(point.point.peak_pressures_n_per_cm2 for point in protocol.points):
+        yield words("notice.pressure")
+    yield words("notice.certificate")
+
+
+def _machine(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.machine"), page_break=True)
+    plan = protocol.plan
+    rows = [
+        (words(f"field.{item.name}"), plain(words.value(getattr(part, item.name) or None)))
+        for part in (plan.machine, plan.test)
+        for item in fields(part)
+        if getattr(part, item.name) not in ("", None) or item.metadata["due"] != "never"
+    ]
+    if plan.test.temperature_c == 0.0:
+        zero = words("field.temperature_c")
+        rows = [(label, words.number(0.0) if label == zero else value) for label, value in rows]
+    yield Facts(tuple(rows))
+
+
+def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.instruments"))
+    names = ("quantity", "model", "serial_number", "range", "accuracy_class", "sample_rate", "filter")
+    columns = tuple(words(f"column.{name}") for name in (*names, "calibrated_on", "calibration_valid_until"))
+    rows = []
+    for item in protocol.plan.instruments:
+        reach = f"{words.number(item.range_n)} N" if item.range_n else item.range
+        values = (
+            words.name("quantity", item.quantity),
+            item.model,
+            item.serial_number,
+            reach,
+            item.accuracy_class,
+            item.sample_rate_hz,
+        )
+        rows.append(_row(words, *values, item.filter, item.calibrated_on, item.calibration_valid_until))
+    yield _grid(columns, rows, widths=(5, 8, 6, 5, 5, 5, 6, 6, 6), numeric=(5,))
+
+
+def _plan(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.plan"))
+    names = ("point", "position", "region", "obstacle", "stiffness", "area", "speed", "repetitions")
+    columns = tuple(words(f"column.{name}") for name in names)
+    rows = []
+    for item in protocol.plan.points:
+        numbers = (item.obstacle_stiffness_n_per_mm, item.contact_area_mm2, item.speed_m_per_s, item.repetitions)
+        rows.append(_row(words, item.name, item.position, item.region, item.obstacle, *numbers))
+    if rows:
+        yield _grid(columns, rows, widths=(8, 12, 9, 9, 6, 5, 5, 6), numeric=(4, 5, 6, 7))
+    else:
+        yield Paragraph(words("text.no_point"))
+
+
+def _results(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.results"))
+    yield Paragraph(words("text.results"), "note")
+    for point in protocol.points:
+        yield Heading(plain(point.point.name), level=2)
+        yield from _matrix(point, words)
+
+
+def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
+    """Yield the repetitions of a point with the mean and the limits of its profile."""
+    profile, verdict = point.profile, point.verdict
+    if profile is None or verdict is None or not point.repetitions:
+        yield Paragraph(words("text.nothing_measured"))
+        return
+    pressures = point.point.peak_pressures_n_per_cm2
+    names = ("repetition", "recording", "dynamic_force", "dynamic_time", "static_force", "residual_force")
+    columns = [words(f"column.{name}") for name in (*names, *(["pressure"] if pressures else []), "result")]
+    rows = []
+    for number, item in enumerate(point.repetitions, 1):
+        peaks = _padded([step.peak for step in item.verdict.steps])
+        pressure = [pressures[number - 1] if number <= len(pressures) else None] if pressures else []
+        time = _time(item.dynamic_time, words)
+        cells = _row(words, number, item.recording, peaks[0], time, *peaks[1:], *pressure)
+        rows.append((*cells, words(f"outcome.{item.verdict.outcome}")))
+    first, *others = _padded([step.force for step in verdict.steps])
+    kind = "mean" if profile.average_of > 1 else "highest"
+    times = [item.dynamic_time for item in point.repetitions]
+    time = _time(sum(times) / len(times) if kind == "mean" else max(times), words)
+    blank = [""] if pressures else []
+    rows.append(
+        (*_row(words, words(f"row.{kind}"), "", first, time, *others, *blank), words(f"outcome.{point.outcome}"))
+    )
+    at_most = _padded([step.at_most_n for step in profile.steps])
+    limit_time = words.number(1e3 * profile.steps[1].from_s) if len(profile.steps) > 1 else ""
+    rows.append((*_row(words, words("row.limit"), profile.name, at_most[0], limit_time, *at_most[1:], *blank), ""))
+    count = len(point.repetitions)
+    numeric = tuple(range(2, len(columns) - 1))
+    widths = (4, 13, *(6 for _ in numeric), 8)
+    yield _grid(columns, rows, widths=widths, numeric=numeric, strong=(count, count + 1))
+
+
+def _time(seconds: float, words: Words) -> str:
+    """Return a time above a limit in ms, or that it has not ended."""
+    return words("document.never_ends") if math.isinf(seconds) else words.number(1e3 * seconds)
+
+
+def _padded(values: Sequence[float]) -> list[float | None]:
+    """Return the values of the first three steps of a profile; None for one that it does not have."""
+    return [values[number] if number < len(values) else None for number in range(_CHECKED_STEPS)]
+
+
+def _curves(protocol: Protocol, words: Words) -> Iterator[Block]:
+    shown = [point for point in protocol.points if point.profile and point.repetitions]
+    if not shown:
+        return
+    yield Heading(words("section.curves"), page_break=True)
+    for point in shown:
+        assert point.profile is not None
+        yield Heading(plain(point.point.name), level=2)
+        names = {"point": plain(point.point.name), "profile": point.profile.name}
+        for svg, count in curve_drawings(point, words):
+            yield Curves(svg, words("text.curve_caption", **names), words("text.curve_alt", count=count, **names))
+
+
+def _latencies(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.latencies"))
+    known = [item for point in protocol.points for item in point.repetitions if item.latencies_ms]
+    if not known:
+        yield Paragraph(words("text.no_latencies"))
+        return
+    yield Paragraph(words("text.latencies", nothing=words("document.nothing")), "note")
+    detectors = [name for name in protocol.detectors if any(name in item.latencies_ms for item in known)]
+    columns = [words("column.point"), words("column.repetition"), *(name.replace("_", " ") for name in detectors)]
+    rows = [
+        _row(words, point.point.name, number, *(item.latencies_ms.get(name) for name in detectors))
+        for point in protocol.points
+        for number, item in enumerate(point.repetitions, 1)
+    ]
+    numeric = tuple(range(1, len(columns)))
+    yield _grid(columns, rows, widths=(5, 2, *(3 for _ in detectors)), numeric=numeric)
+
+
+def _checks(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.checks"))
+    if protocol.plan.instruments:
+        columns = [words(f"column.{name}") for name in ("model", "calibration_valid_until", "valid_on_test_day")]
+        rows = [
+            _row(words, item.model or item.quantity, item.calibration_valid_until, _validity(protocol, item, words))
+            for item in protocol.plan.instruments
+        ]
+        yield _grid(columns, rows, widths=(5, 3, 4))
+    names = ("point", "repetition", "sample_rate", "record", "missing", "saturated", "largest_reading", "rest", "drift")
+    columns = [words(f"column.{name}") for name in names]
+    rows = [
+        _check_row(point, number, item, protocol.plan.force_instrument, words)
+        for point in protocol.points
+        for number, item in enumerate(point.repetitions, 1)
+    ]
+    if rows:
+        yield _grid(columns, rows, widths=(5, 2, 5, 5, 3, 3, 5, 3, 2), numeric=(1, 2, 3, 6, 7, 8))
+
+
+def _validity(protocol: Protocol, item: Instrument, words: Words) -> str:
+    """Return whether a calibration is valid on the day of the test; a dash where one of the days is not known."""
+    day, since, until = protocol.plan.test.date, item.calibrated_on, item.calibration_valid_until
+    if day is None or since is None or until is None:
+        return words("document.nothing")
+    return words("document.yes" if since <= day <= until else "document.no")
+
+
+def _check_row(
+    point: PointAssessment, number: int, item: Repetition, instrument: Instrument | None, words: Words
+) -> tuple[str, ...]:
+    profile = point.profile
+    assert profile is not None, "a repetition has a profile"
+    rate = _needed(item.sample_rate, profile.sample_rate_at_least_hz, words)
+    record = _needed(item.curve.end, profile.record_at_least_s, words)
+    missing, saturated = (
+        words("document.yes" if is_so else "document.no")
+        for is_so in (item.curve.has_missing_samples, item.curve.saturated)
+    )
+    reading = words.number(item.largest_reading)
+    if instrument and instrument.range_n:
+        reading = f"{reading} / {words.number(instrument.range_n)}"
+    return _row(words, point.point.name, number, rate, record, missing, saturated, reading, item.rest, item.drift)
+
+
+def _needed(measured: float, needed: float, words: Words) -> str:
+    """Return a measured value, with the required one if there is one."""
+    if not needed:
+        return words.number(measured)
+    return words("column.measured_needed", measured=measured, needed=needed)
+
+
+def _deviations(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.deviations"))
+    rows = [
+        _row(words, f"{item.point}: {item.text}" if item.point else item.text, item.reason)
+        for item in protocol.plan.deviations
+    ]
+    excluded = words("role.excluded")
+    rows += [_row(words, f"{item.recording} ({excluded})", item.reason) for item in protocol.excluded]
+    if rows:
+        yield _grid([words("column.what"), words("column.reason")], rows, widths=(1, 1))
+    else:
+        yield Paragraph(words("text.no_deviations"))
+
+
+def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
+    profiles = {point.profile.name: point.profile for point in protocol.points if point.profile}
+    if not profiles:
+        return
+    yield Heading(words("section.limits"))
+    for profile in profiles.values():
+        yield Heading(plain(profile.name), level=2)
+        checked = words("document.yes" if profile.checked else "document.no")
+        yield Facts(
+            (
+                (words("column.profile"), plain(profile.title)),
+                (words("column.source"), plain(profile.source)),
+                (words("column.checked"), checked),
+            )
+        )
+        columns = [words(f"column.{name}") for name in ("step", "from", "at_most")]
+        rows = [_row(words, words.name("step", step.name), step.from_s, step.at_most_n) for step in profile.steps]
+        yield _grid(columns, rows, widths=(4, 2, 2), numeric=(1, 2))
+        if profile.measuring_source:
+            numbers = {
+                "rate": profile.sample_rate_at_least_hz,
+                "record": profile.record_at_least_s,
+                "stiffness": profile.obstacle_stiffness_n_per_mm,
+            }
+            yield Paragraph(words("text.measuring", source=profile.measuring_source, **numbers), "note")
+
+
+def _provenance(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.provenance"))
+    yield Paragraph(words("text.provenance", version=protocol.tool_version))
+    yield Paragraph(plain(protocol.command), "code")
+    columns = [words(f"column.{name}") for name in ("file", "role", "sha256")]
+    rows = [_row(words, item.name, words(f"role.{item.role}"), item.sha256) for item in protocol.files]
+    yield _grid(columns, rows, widths=(5, 4, 12), typed=(2,))
+    yield Paragraph(words("text.hash"), "note")
+    yield Facts(((words("document.data_hash_label"), protocol.data_sha256),))
+
+
+def _signatures(protocol: Protocol, words: Words) -> Iterator[Block]:
+    yield Heading(words("section.signature"))
+    yield Paragraph(words("text.signature"))
+    people = ((words("sign.tester"), plain(protocol.plan.test.tester)), (words("sign.reviewer"), ""))
+    yield Signatures(people, words("sign.place_date"), words("sign.signature"))
+
+
+def _row(words: Words, *values: object) -> tuple[str, ...]:
+    return tuple(plain(words.value(value)) for value in values)
+
+
+def _grid(
+    columns: Sequence[str],
+    rows: Sequence[tuple[str, ...]],
+    *,
+    widths: Sequence[int],
+    numeric: Sequence[int] = (),
+    strong: Sequence[int] = (),
+    typed: Sequence[int] = (),
+) -> Grid:
+    is_numeric = tuple(number in numeric for number in range(len(columns)))
+    return Grid(tuple(columns), tuple(rows), is_numeric, tuple(widths), tuple(strong), tuple(typed))

@@ -1,0 +1,170 @@
+"""Assign recordings to the measuring points of a protocol, and measure the force of each repetition.
+
+A point names its recordings by `logs`, as files on a disk are usually named after the point, or by a `group` of the
+benchmark file. A contact is a repetition; a recording with several contacts holds several.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cdtool.errors import ConfigurationError, nearest
+from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition, Unmeasured, assess_point
+from cdtool.evaluation.protocol.plan import MeasuringPoint
+from cdtool.evaluation.results import Skipped
+from cdtool.recording import Recording
+from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
+from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
+from cdtool.workflows.contacts.matched_log import force_curves
+from cdtool.workflows.protocol.protocol_file import ProtocolFile
+from cdtool.workflows.runs import find_logs, resolve_all
+
+
+@dataclass(frozen=True)
+class PointLogs:
+    """The recordings of a point, each with its group in the benchmark file."""
+
+    point: MeasuringPoint
+    logs: tuple[tuple[str, Path], ...]
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Which recordings belong to which point, and which are excluded with their reasons."""
+
+    points: tuple[PointLogs, ...]
+    excluded: Mapping[Path, str]
+
+
+def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
+    """Return the recordings of each point, without the excluded ones.
+
+    Parameters
+    ----------
+    file : ProtocolFile
+        The protocol file.
+    setup : BenchmarkFile
+        Its benchmark file, which scores all of these recordings.
+
+    Returns
+    -------
+    Assignment
+        The recordings of each point in order. A pattern without a file, as before the test, is left out.
+
+    Raises
+    ------
+    ConfigurationError
+        A group is unknown; a recording is in no group of impacts, or belongs to two points.
+
+    Examples
+    --------
+    >>> from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
+    >>> from cdtool.workflows.protocol.protocol_file import read_protocol_file
+    >>> setup = read_benchmark_file("sample_logs/gate/benchmark.toml")
+    >>> assignment = assign(read_protocol_file("sample_logs/gate/protocol.toml"), setup)
+    >>> [len(item.logs) for item in assignment.points]
+    [4, 4]
+    """
+    scored = [(name, log) for name, group in setup.impacts.items() if not group.is_impact_free for log in group.logs]
+    groups = dict(zip(resolve_all(log for _, log in scored), scored, strict=True))
+    excluded: dict[Path, str] = {}
+    for number, item in enumerate(file.plan.exclusions, 1):
+        for log in _found(item.logs, file, f"exclusion[{number}]"):
+            excluded[_scored_log(log, groups, file, f"exclusion[{number}]")[1]] = item.reason
+    owner: dict[Path, int] = {}
+    points = []
+    for number, point in enumerate(file.plan.points, 1):
+        key = f"point[{number}]"
+        if point.group:
+            logs = _of_group(point, setup, f"{file.path}: protocol.{key}.group")
+        else:
+            logs = [_scored_log(log, groups, file, key) for log in _found(point.logs, file, key)]
+        for _, log in logs:
+            if owner.setdefault(log, number) != number:
+                raise ConfigurationError(
+                    f"{file.path}: protocol.{key}: {log} is also of the point {owner[log]}",
+                    "a recording belongs to one point",
+                )
+        points.append(PointLogs(point, tuple((group, log) for group, log in logs if log not in excluded)))
+    return Assignment(tuple(points), excluded)
+
+
+def profiles_of(item: PointLogs, file: ProtocolFile, setup: BenchmarkFile) -> ForceProfile | None:
+    """Return the force profile of a point: its own, else that of the group of its first recording or of its name."""
+    names = [group for group, _ in item.logs] or ([item.point.group] if item.point.group in setup.impacts else [])
+    return file.profile_of(item.point, setup.impacts[names[0]].force if names else None)
+
+
+def _found(patterns: Sequence[str], file: ProtocolFile, key: str) -> Iterator[Path]:
+    """Yield the files that patterns name; before the test there may be none."""
+    for pattern in patterns:
+        try:
+            yield from find_logs([pattern], file.path.parent, f"{file.path}: protocol.{key}.logs", runs=True)
+        except ConfigurationError:
+            continue
+
+
+def _scored_log(log: Path, groups: Mapping[Path, tuple[str, Path]], file: ProtocolFile, key: str) -> tuple[str, Path]:
+    """Return the group and the path of a log in the benchmark file."""
+    known = groups.get(log.resolve())
+    if known is None:
+        raise ConfigurationError(
+            f"{file.path}: protocol.{key}.logs: {log} is not in a group of [impacts] of the benchmark file",
+            "add it to a group there",
+        )
+    return known
+
+
+def _of_group(point: MeasuringPoint, setup: BenchmarkFile, key: str) -> list[tuple[str, Path]]:
+    names = [name for name, group in setup.impacts.items() if not group.is_impact_free]
+    if point.group not in names:
+        raise ConfigurationError(f"{key}: no group '{point.group}' in {setup.path}", nearest(point.group, names))
+    return [(point.group, log) for log in setup.impacts[point.group].logs]
+
+
+def measured_point(
+    item: PointLogs,
+    file: ProtocolFile,
+    setup: BenchmarkFile,
+    late: Mapping[tuple[str, str, int], Mapping[str, float | None]],
+) -> PointAssessment:
+    """Return a point with its repetitions; `late` are the latencies [ms] by group, recording and contact."""
+    profile = profiles_of(item, file, setup)
+    repetitions: list[Repetition] = []
+    unmeasured: list[Unmeasured] = []
+    for group, log in item.logs:
+        for read in logs_to_score(setup, group, log):
+            if isinstance(read, Skipped):
+                unmeasured.append(Unmeasured(read.recording, "unreadable", read.reason))
+            elif profile is not None:
+                mass = setup.rules_of(group).mass_before_cell
+                of_log, others = _measured(read, profile, mass)
+                repetitions += [
+                    replace(one, latencies_ms=late.get((group, one.recording, one.contact), {})) for one in of_log
+                ]
+                unmeasured += others
+    return assess_point(item.point, profile, repetitions, unmeasured, file.plan.force_instrument)
+
+
+def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[list[Repetition], list[Unmeasured]]:
+    """Return the contacts of a recording, and those that do not count."""
+    recording: Recording = read.recording
+    curves, problems = force_curves(recording, read.contacts, mass)
+    repetitions = [
+        Repetition.of(
+            (recording.name, recording.digest),
+            number,
+            curve,
+            profile,
+            (read.contacts[number - 1].rest, read.contacts[number - 1].drift),
+        )
+        for number, curve in curves.items()
+    ]
+    unmeasured = [Unmeasured(recording.name, "in_progress") for contact in read.contacts if contact.in_progress]
+    unmeasured += [Unmeasured(recording.name, "no_force", str(problem)) for problem in problems]
+    if "force" not in recording:
+        unmeasured.append(Unmeasured(recording.name, "no_force", "no load cell"))
+    return repetitions, unmeasured

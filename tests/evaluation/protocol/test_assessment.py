@@ -1,0 +1,252 @@
+"""From curves to the verdict of a protocol, and the table of edge cases of docs/protocol.md."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdtool.evaluation.force.curve import ForceTimeCurve
+from cdtool.evaluation.force.limits import read_force_limits
+from cdtool.evaluation.protocol.assessment import Repetition, Unmeasured, assess_point, check_point, judge
+from cdtool.evaluation.protocol.plan import (
+    Instrument,
+    MachineParticulars,
+    MeasuringPoint,
+    TestParticulars,
+    TestPlan,
+    empty_entries,
+)
+from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Verdict
+
+PROFILE = read_force_limits()["en_12453_reducing_gap"]
+TIME = np.arange(6000) * 1e-3
+POINT = MeasuringPoint(
+    name="edge",
+    position="closing edge",
+    region="gap of 300 mm",
+    obstacle_stiffness_n_per_mm=500.0,
+    contact_area_mm2=5027.0,
+    speed_m_per_s=0.2,
+    repetitions=3,
+    group="edge",
+)
+METER = Instrument(
+    quantity="force",
+    model="Rig",
+    serial_number="1",
+    calibrated_on=dt.date(2026, 1, 15),
+    calibration_valid_until=dt.date(2027, 1, 14),
+    range_n=2000.0,
+    accuracy_class="1",
+    sample_rate_hz=1000.0,
+    filter="none",
+)
+PLAN = TestPlan(
+    machine=MachineParticulars("door", "A", "1", "hall", "1.0"),
+    test=TestParticulars(tester="B", date=dt.date(2026, 3, 31), place="C", temperature_c=0.0),
+    instruments=(METER,),
+    points=(POINT,),
+)
+
+
+def curve(force: np.ndarray, time: np.ndarray = TIME, **more: object) -> ForceTimeCurve:
+    values = {"clipped": np.zeros(len(time), dtype=bool), "end": float(time[-1]), **more}
+    return ForceTimeCurve(time, force, **values)
+
+
+def sine(peak: float = 300.0) -> np.ndarray:
+    return np.where(TIME <= 0.3, peak * np.sin(np.pi * TIME / 0.3), 0.0)
+
+
+def repetition(force: ForceTimeCurve, number: int = 1, rest: tuple[float, float] = (0.0, 0.0)) -> Repetition:
+    return Repetition.of((f"{number}.csv", f"sha{number}"), 1, force, PROFILE, rest)
+
+
+def three(force: ForceTimeCurve, rest: tuple[float, float] = (0.0, 0.0)) -> list[Repetition]:
+    """Return three repetitions, the last of which has this force."""
+    return [repetition(curve(sine()), 1), repetition(curve(sine()), 2), repetition(force, 3, rest)]
+
+
+def outcome(repetitions: list[Repetition], **more: object) -> tuple[str, list[str]]:
+    found = assess_point(POINT, PROFILE, repetitions, instrument=METER, **more)
+    return found.outcome, [reason.kind.value for reason in found.reasons]
+
+
+def test_three_good_repetitions_pass():
+    assert outcome(three(curve(sine()))) == ("pass", [])
+
+
+CLIPPED = np.minimum(sine(600.0), 350.0)
+STOPPED = CLIPPED == 350.0
+EDGE_CASES = {
+    "double peak": (curve(np.maximum(sine(), np.roll(sine(200.0), 320))), (0.0, 0.0), "pass", []),
+    "double peak, the second after 0.75 s": (
+        curve(np.maximum(sine(), np.roll(sine(380.0), 900))),
+        (0.0, 0.0),
+        "pass",  # the mean of the three meets 150 N
+        [],
+    ),
+    "ringing": (curve(300.0 * np.exp(-TIME / 0.1) * np.cos(60.0 * TIME)), (0.0, 0.0), "pass", []),
+    "clipped sensor": (curve(CLIPPED, clipped=STOPPED), (0.0, 0.0), "incomplete", ["not_assessable"]),
+    "beyond the range": (curve(sine()), (1800.0, 0.0), "incomplete", ["beyond_range"]),
+    "baseline drift that decides": (curve(sine()), (0.0, 5.0), "incomplete", ["drift_decides"]),
+    "baseline drift that does not": (curve(sine()), (0.0, 0.5), "pass", []),
+    "contact that never ends": (curve(np.full(6000, 200.0)), (0.0, 0.0), "fail", ["point_exceeds"]),
+    "record that ends early": (
+        curve(sine()[:2000], TIME[:2000]),
+        (0.0, 0.0),
+        "incomplete",
+        ["record_too_short"],
+    ),
+    "missing samples": (
+        curve(np.delete(sine(), slice(100, 150)), np.delete(TIME, slice(100, 150))),
+        (0.0, 0.0),
+        "incomplete",
+        ["not_assessable"],
+    ),
+    "one force at the limit": (curve(sine(400.0)), (0.0, 0.0), "pass", []),
+    "one above the limit, the mean below": (curve(sine(500.0)), (0.0, 0.0), "pass", []),
+    "the mean above the limit": (curve(sine(700.0)), (0.0, 0.0), "fail", ["point_exceeds"]),
+    "slow sensor": (curve(sine()[::10], TIME[::10]), (0.0, 0.0), "incomplete", ["rate_too_low", "rate_differs"]),
+}
+
+
+@pytest.mark.parametrize("name", EDGE_CASES)
+def test_edge_cases_have_the_intended_answer(name):
+    force, rest, wanted, kinds = EDGE_CASES[name]
+    found, reasons = outcome(three(force, rest))
+    assert found == wanted
+    assert set(kinds) <= set(reasons)
+
+
+@given(st.floats(50.0, 390.0), st.floats(0.1, 0.99))
+def test_a_clipped_sensor_is_never_a_pass(peak, share):
+    force = np.minimum(sine(peak), share * peak)
+    clipped = force == share * peak
+    assert outcome(three(curve(force, clipped=clipped)))[0] != "pass"
+
+
+@given(st.integers(0, 2))
+def test_with_too_few_repetitions_nothing_passes(count):
+    found, reasons = outcome(three(curve(sine()))[:count])
+    assert found == "incomplete" and ("too_few_repetitions" if count else "not_measured") in reasons
+
+
+def test_more_repetitions_than_planned_all_count():
+    four = [*three(curve(sine())), repetition(curve(sine(100.0)), 4)]
+    found = assess_point(POINT, PROFILE, four, instrument=METER)
+    assert found.outcome == "pass" and found.verdict is not None and found.verdict.tests == 4
+    assert found.verdict.steps[0].force == pytest.approx(250.0, abs=0.1)
+
+
+@given(st.permutations([300.0, 250.0, 450.0]))
+def test_the_order_of_repetitions_changes_no_verdict(peaks):
+    items = [repetition(curve(sine(peak)), number) for number, peak in enumerate(peaks)]
+    assert outcome(items) == ("pass", [])
+
+
+def test_the_same_recording_under_two_names_is_not_two_measurements():
+    items = three(curve(sine()))
+    assert outcome([items[0], replace(items[1], sha256="sha1"), items[2]])[1] == ["same_recording"]
+    # Two contacts of one recording are two measurements.
+    assert outcome([items[0], replace(items[1], sha256="sha1", recording="1.csv", contact=2), items[2]])[0] == "pass"
+
+
+def test_a_contact_in_progress_is_named_and_not_counted():
+    found, reasons = outcome(three(curve(sine()))[:2], unmeasured=[Unmeasured("3.csv", "in_progress")])
+    assert (found, reasons) == ("incomplete", ["too_few_repetitions", "in_progress"])
+
+
+def test_a_contact_that_never_ends_has_an_infinite_dynamic_and_total_time():
+    item = repetition(curve(np.full(6000, 200.0)))
+    assert item.dynamic_time == np.inf and item.total_time == np.inf
+
+
+def test_fail_beats_incomplete_and_incomplete_beats_pass_and_all_reasons_stay():
+    fail, open_item = Reason(ReasonKind.POINT_EXCEEDS), Reason(ReasonKind.NO_VALUE)
+    assert [Verdict(reasons).outcome for reasons in ((), (open_item,), (open_item, fail))] == [
+        "pass",
+        "incomplete",
+        "fail",
+    ]
+    point = assess_point(POINT, PROFILE, three(curve(sine(700.0)))[1:], instrument=METER)
+    verdict = judge(PLAN, [point], "p.toml")
+    assert verdict.outcome == "incomplete"  # two of three: their mean is not the profile's
+    point = assess_point(POINT, PROFILE, [*three(curve(sine(900.0)))], [Unmeasured("4.csv", "unreadable", "x")])
+    verdict = judge(PLAN, [point], "p.toml")
+    assert verdict.outcome == "fail"
+    assert [reason.kind.value for reason in verdict.reasons] == ["point_exceeds", "unreadable"]
+
+
+@given(st.lists(st.sampled_from(list(ReasonKind)), max_size=6))
+def test_no_reason_is_ever_outvoted(kinds):
+    verdict = Verdict(tuple(Reason(kind) for kind in kinds))
+    assert (verdict.outcome == "pass") == (not kinds)
+    assert (verdict.outcome == "fail") == (ReasonKind.POINT_EXCEEDS in kinds)
+    assert len(verdict.of("fail")) + len(verdict.of("incomplete")) == len(kinds)
+
+
+def good() -> list:
+    return [assess_point(POINT, PROFILE, three(curve(sine())), instrument=METER)]
+
+
+def test_a_complete_plan_with_good_points_passes():
+    assert judge(PLAN, good(), "p.toml").outcome == "pass"
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"calibration_valid_until": dt.date(2026, 3, 30)}, "calibration_expired"),
+        ({"calibrated_on": dt.date(2026, 4, 1)}, "calibrated_later"),
+        ({"sample_rate_hz": 100.0}, "stated_rate_too_low"),
+        ({"serial_number": " "}, "no_value"),
+        ({"filter": ""}, "no_value"),
+        ({"quantity": "speed"}, "no_force_instrument"),
+    ],
+)
+def test_an_instrument_that_does_not_do_makes_it_incomplete(changes, kind):
+    verdict = judge(replace(PLAN, instruments=(replace(METER, **changes),)), good(), "p.toml")
+    assert verdict.outcome == "incomplete" and kind in [reason.kind.value for reason in verdict.reasons]
+
+
+def test_a_calibration_is_valid_on_its_first_and_last_day():
+    day = dt.date(2026, 3, 31)
+    meter = replace(METER, calibrated_on=day, calibration_valid_until=day)
+    assert judge(replace(PLAN, instruments=(meter,)), good(), "p.toml").outcome == "pass"
+
+
+@given(st.sampled_from(["type", "maker", "serial_number", "installation", "software_version"]))
+def test_a_missing_value_is_named_with_its_key_and_file(name):
+    plan = replace(PLAN, machine=replace(PLAN.machine, **{name: ""}))
+    verdict = judge(plan, good(), "p.toml")
+    assert [dict(reason.values) for reason in verdict.reasons] == [
+        {"key": f"protocol.machine.{name}", "file": "p.toml"}
+    ]
+
+
+def test_zero_degrees_are_a_temperature_and_zero_is_no_speed():
+    assert empty_entries(PLAN) == []
+    plan = replace(PLAN, points=(replace(POINT, speed_m_per_s=0.0),))
+    assert [item.key for item in empty_entries(plan)] == ["protocol.point[1].speed_m_per_s"]
+
+
+def test_the_plan_is_checked_before_anything_is_measured():
+    wrong = replace(POINT, repetitions=2, obstacle_stiffness_n_per_mm=100.0, peak_pressures_n_per_cm2=(1.0,))
+    kinds = [reason.kind.value for reason in check_point(wrong, PROFILE, recordings=0).reasons]
+    assert kinds == ["too_few_planned", "wrong_stiffness", "not_measured", "pressures_missing"]
+    assert check_point(POINT, PROFILE, recordings=3).reasons == ()
+
+
+def test_a_plan_names_each_point_once():
+    from cdtool.errors import UsageError
+
+    with pytest.raises(UsageError, match="two measuring points"):
+        replace(PLAN, points=(POINT, POINT))
+    with pytest.raises(UsageError, match="group and logs"):
+        replace(POINT, logs=("a.csv",))

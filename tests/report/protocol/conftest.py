@@ -1,0 +1,44 @@
+"""Three protocols of a door: one passes, one fails in German, one is incomplete with a very long name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cdtool.evaluation.protocol.protocol import Protocol
+from cdtool.report.protocol.blocks import Document
+from cdtool.report.protocol.document import protocol_document
+from cdtool.workflows.benchmark.benchmark import benchmark
+from cdtool.workflows.protocol.making import make_protocol
+from cdtool.workflows.protocol.protocol_file import read_protocol_file
+from tests.synthetic.force_rig import half_sine, write_log, write_protocol, write_rig
+
+LONG = "a_recording_with_a_very_long_name_and_no_place_to_break_20260331T101112_run_0001"
+DEVIATION = '[[protocol.deviation]]\ntext = "Kraftmessgerät höher befestigt"\nreason = "Podest <verbaut>"'
+
+
+def _made(folder: Path, path: Path) -> Protocol:
+    command = "cdtool benchmark benchmark.toml -p protocol.toml -o protocol.pdf"
+    return make_protocol(read_protocol_file(path), benchmark(folder / "benchmark.toml"), command)
+
+
+@pytest.fixture(scope="session")
+def protocols(tmp_path_factory) -> dict[str, Protocol]:
+    root = tmp_path_factory.mktemp("protocols")
+    peaks = {"pass": (300.0, 320.0, 450.0), "fail": (500.0, 520.0, 450.0), "incomplete": (300.0, 310.0)}
+    for name, forces in peaks.items():
+        write_rig(root / name, [half_sine(peak) for peak in forces])
+    write_log(root / "incomplete" / "edge" / f"{LONG}.csv", half_sine(200.0), seconds=5.0)
+    flaws = {
+        "pass": {},
+        "fail": {"language": "de", "more": DEVIATION},
+        "incomplete": {"valid_until": "2026-01-20", "more": "peak_pressures_n_per_cm2 = [12.5, 13, 14.25]"},
+    }
+    return {name: _made(root / name, write_protocol(root / name, **flaws[name])) for name in peaks}
+
+
+@pytest.fixture(scope="session")
+def documents(protocols) -> dict[str, Document]:
+    """Return the documents of these protocols."""
+    return {name: protocol_document(protocol) for name, protocol in protocols.items()}

@@ -1,0 +1,209 @@
+"""A test from a rig's recordings to its protocol: file, assignment, verdict."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+
+import cdtool
+from cdtool.errors import ConfigurationError, UsageError
+from cdtool.evaluation.protocol.plan import (
+    Deviation,
+    Exclusion,
+    Instrument,
+    MachineParticulars,
+    MeasuringPoint,
+    TestParticulars,
+)
+from cdtool.evaluation.protocol.protocol import Protocol
+from cdtool.workflows.protocol.checking import check_protocol
+from cdtool.workflows.protocol.drafting import draft_protocol
+from cdtool.workflows.protocol.making import make_protocol
+from cdtool.workflows.protocol.protocol_file import read_protocol_file
+from tests.synthetic.force_rig import half_sine, write_log, write_protocol, write_rig
+
+FORCES = (half_sine(300.0), half_sine(320.0), half_sine(340.0))
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("rig")
+    write_rig(folder, FORCES)
+    write_protocol(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def made(rig) -> Protocol:
+    return make_protocol(read_protocol_file(rig / "protocol.toml"), cdtool.benchmark(rig / "benchmark.toml"))
+
+
+def kinds(protocol: Protocol) -> list[str]:
+    return [reason.kind.value for reason in protocol.verdict.reasons]
+
+
+def test_three_good_repetitions_pass_with_their_quantities_and_latencies(made):
+    assert (made.verdict.outcome, kinds(made)) == ("pass", [])
+    (point,) = made.points
+    assert [round(item.curve.peak) for item in point.repetitions] == pytest.approx([300, 320, 340], abs=2)
+    for item, peak in zip(point.repetitions, (300.0, 320.0, 340.0), strict=True):
+        share = 150.0 / peak
+        assert item.dynamic_time == pytest.approx(0.3 - 0.6 / math.pi * math.asin(share), abs=2e-3)
+        assert item.sample_rate == pytest.approx(1000.0)
+        assert set(item.latencies_ms) == {"momentum"}
+
+
+def test_the_verdicts_are_those_of_the_benchmark_with_the_same_profile(rig, made):
+    text = (rig / "benchmark.toml").read_text(encoding="utf-8")
+    other = rig / "with_force.toml"
+    other.write_text(text + '[force]\nprofile = "en_12453_reducing_gap"\n', encoding="utf-8")
+    rows = cdtool.benchmark(other).results.forces
+    found = made.points[0].repetitions
+    assert [row.recording for row in rows] == [item.recording for item in found]
+    assert [row.peak_n for row in rows] == [item.curve.peak for item in found]
+    assert [row.verdict for row in rows] == [item.verdict.outcome for item in found]
+
+
+def test_every_file_is_named_with_its_hash_and_one_hash_stands_for_all(rig, made):
+    for item in made.files:
+        assert hashlib.sha256((rig / item.name).read_bytes()).hexdigest() == item.sha256
+    assert [item.role for item in made.files] == ["protocol", "benchmark", "machine", *["measured"] * 3]
+    lines = "".join(f"{item.sha256}  {item.name}\n" for item in made.files)
+    assert hashlib.sha256(lines.encode()).hexdigest() == made.data_sha256
+    changed = replace(made, files=made.files[:-1])
+    assert changed.data_sha256 != made.data_sha256
+
+
+def test_without_detectors_the_protocol_is_the_same_but_for_latencies(rig, made):
+    own = cdtool.protocol(rig / "protocol.toml")
+    assert (own.verdict, own.files, own.detectors) == (made.verdict, made.files, ())
+    for one, other in zip(own.points[0].repetitions, made.points[0].repetitions, strict=True):
+        assert one.latencies_ms == {} and one.verdict == other.verdict and one.curve.peak == other.curve.peak
+
+
+def test_a_recording_that_cannot_be_read_has_its_hash_too(tmp_path):
+    write_rig(tmp_path, FORCES)
+    (tmp_path / "edge" / "04.csv").write_text("no table\n", encoding="utf-8")
+    files = {item.name: (item.sha256, item.role) for item in cdtool.protocol(write_protocol(tmp_path)).files}
+    assert files["edge/04.csv"] == (hashlib.sha256(b"no table\n").hexdigest(), "measured")
+
+
+def test_an_excluded_recording_is_named_and_not_counted(tmp_path):
+    write_rig(tmp_path, (*FORCES, half_sine(900.0)))
+    more = '[[protocol.exclusion]]\nlogs = ["edge/04.csv"]\nreason = "the rig slipped"'
+    protocol = cdtool.protocol(write_protocol(tmp_path, more=more))
+    assert protocol.verdict.outcome == "pass" and len(protocol.points[0].repetitions) == 3
+    assert [(item.recording, item.reason) for item in protocol.excluded] == [("edge/04.csv", "the rig slipped")]
+    assert "excluded" in [item.role for item in protocol.files]
+
+
+def test_a_contact_without_a_force_or_that_cannot_be_read_is_a_reason(tmp_path):
+    write_rig(tmp_path, FORCES[:2])
+    write_log(tmp_path / "edge" / "03.csv", half_sine(5.0))
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert protocol.verdict.outcome == "incomplete"
+    assert kinds(protocol) == ["too_few_repetitions", "unreadable"]
+
+
+def test_a_point_names_its_logs_by_patterns(tmp_path):
+    write_rig(tmp_path, FORCES)
+    assert cdtool.protocol(write_protocol(tmp_path, logs='logs = ["edge/0[12].csv"]')).verdict.outcome == "incomplete"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"logs": 'group = "edges"'}, "no group 'edges'"),
+        ({"logs": 'logs = ["*.toml"]'}, "is not in a group of"),
+        ({"day": '"31.3.2026"'}, "write a day as 2026-03-31"),
+        ({"language": "fr"}, "protocol.language"),
+        ({"more": "speed = 1"}, "protocol.point[1].speed: unknown key"),
+        ({"more": "obstacle = 3"}, "protocol.point[1].obstacle"),
+        ({"more": '[[protocol.deviation]]\npoint = "x"\ntext = "a"\nreason = "b"'}, "a deviation names the point 'x'"),
+        ({"logs": 'group = "edge"\nlogs = ["a"]'}, "has a group and logs"),
+        ({"more": '[[protocol.point]]\nname = "b"\nprofile = "en_1"'}, "unknown force profile 'en_1'"),
+        ({"more": '[[protocol.point]]\nname = "b"\ngroup = "edge"'}, "is also of the point 1"),
+    ],
+)
+def test_a_wrong_file_names_file_and_key(changes, words, rig, tmp_path):
+    for name in ("benchmark.toml", "machine.toml", "edge"):
+        (tmp_path / name).symlink_to(rig / name)
+    path = write_protocol(tmp_path, **changes)
+    with pytest.raises((ConfigurationError, UsageError)) as fault:
+        check_protocol(path)
+    assert words in str(fault.value) and "protocol.toml" in str(fault.value)
+
+
+def test_a_table_in_the_benchmark_file_is_the_same_protocol(rig, made, tmp_path):
+    for name in ("machine.toml", "edge"):
+        (tmp_path / name).symlink_to(rig / name)
+    table = (rig / "protocol.toml").read_text(encoding="utf-8").replace('benchmark = "benchmark.toml"\n', "")
+    path = tmp_path / "benchmark.toml"
+    path.write_text((rig / "benchmark.toml").read_text(encoding="utf-8") + table, encoding="utf-8")
+    own = cdtool.protocol(path)
+    assert own.verdict.outcome == "pass" and own.files[0].role == "benchmark"
+
+
+def test_a_draft_knows_what_the_recordings_show_and_lists_the_rest(rig, tmp_path):
+    draft = draft_protocol(rig / "benchmark.toml", rig / "draft.toml")
+    plan = read_protocol_file(draft.path).plan
+    assert (plan.points[0].name, plan.points[0].group, plan.points[0].repetitions) == ("edge", "edge", 3)
+    assert plan.points[0].speed_m_per_s == pytest.approx(0.2)
+    assert plan.force_instrument is not None and plan.force_instrument.sample_rate_hz == pytest.approx(1000.0)
+    checked = check_protocol(draft.path)
+    empty = [reason for reason in checked.verdict.reasons if reason.kind.value == "no_value"]
+    # The profile is one of the values to fill in, and a reason of its own.
+    assert len(empty) + 1 == draft.to_fill_in and checked.recordings == {"edge": 3}
+    with pytest.raises(UsageError, match="already exists"):
+        draft_protocol(rig / "benchmark.toml", draft.path)
+    with pytest.raises(UsageError, match=r"\.toml"):
+        draft_protocol(rig / "benchmark.toml", tmp_path / "draft.txt")
+
+
+def test_a_draft_takes_the_test_points_of_the_benchmark_and_names_logs_relative_to_itself(rig, tmp_path):
+    text = (rig / "benchmark.toml").read_text(encoding="utf-8")
+    force = '[force]\nprofile = "en_12453_wide_gap"\n[points.low]\nlogs = ["edge/0[12].csv"]\n'
+    (rig / "points.toml").write_text(text + force, encoding="utf-8")
+    (rig / "plans").mkdir()
+    draft = draft_protocol(rig / "points.toml", rig / "plans" / "draft.toml")
+    (point,) = read_protocol_file(draft.path).plan.points
+    assert (point.name, point.profile, point.obstacle_stiffness_n_per_mm) == ("low", "en_12453_wide_gap", 500.0)
+    assert point.logs == ("../edge/01.csv", "../edge/02.csv") and point.repetitions == 3
+    assert check_protocol(draft.path).recordings == {"low": 2}
+
+
+def test_every_entry_is_on_the_page():
+    page = Path("docs/protocol.md").read_text(encoding="utf-8")
+    tables = {
+        "machine": MachineParticulars,
+        "test": TestParticulars,
+        "instrument": Instrument,
+        "point": MeasuringPoint,
+        "deviation": Deviation,
+        "exclusion": Exclusion,
+    }
+    due = {"before_test": "before", "test_day": "test day", "never": "no"}
+    for table, kind in tables.items():
+        for item in fields(kind):
+            row = re.compile(rf"\| `{table}\.{item.name}` \| [a-z ]+ \| {due[item.metadata['due']]} \| (.*) \|")
+            assert row.search(page)[1] == item.metadata["meaning"]
+
+
+def test_before_anything_is_recorded_a_plan_can_be_drafted_and_checked(tmp_path):
+    write_rig(tmp_path, [])
+    path = write_protocol(tmp_path)
+    reasons = {reason.kind.value: reason.due for reason in check_protocol(path).verdict.reasons}
+    assert reasons == {"not_measured": "test_day", "benchmark_unreadable": "test_day"}
+    draft = draft_protocol(None, tmp_path / "empty.toml")
+    assert [point.logs for point in read_protocol_file(draft.path).plan.points] == [("point_1/*.csv",)]
+
+
+def test_the_sample_gate_fails_and_says_what_is_incomplete():
+    protocol = cdtool.protocol("sample_logs/gate/protocol.toml")
+    assert protocol.verdict.outcome == "fail"
+    assert set(kinds(protocol)) == {"point_exceeds", "record_too_short"}
