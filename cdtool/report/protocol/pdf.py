@@ -33,8 +33,11 @@ def to_pdf(document: Document) -> bytes:
     import typst
     from matplotlib import get_data_path
 
-    fonts = Path(get_data_path()) / "fonts" / "ttf"
+    folder = Path(get_data_path()) / "fonts" / "ttf"
     text = json.dumps(asdict(document), ensure_ascii=False)
+    # Fonts that are installed with the libraries give the same pages on every computer.
+    has_every = _has_every_character(folder / _FALLBACK, text)
+    fonts = typst.Fonts(include_system_fonts=not has_every, font_paths=[str(folder)])
     try:
         made = typst.compile(
             page_file("protocol.typ").encode(),
@@ -42,9 +45,7 @@ def to_pdf(document: Document) -> bytes:
             sys_inputs={"document": text},
             # Level A: tagged, so that a reader without sight hears headings, tables and descriptions of the curves.
             pdf_standards=["a-2a", "ua-1"],
-            font_paths=[str(fonts)],
-            # Fonts that are installed with the libraries give the same pages on every computer.
-            ignore_system_fonts=_has_every_character(fonts / _FALLBACK, text),
+            font_paths=fonts,
         )
     except Exception as fault:
         raise OutputError(
