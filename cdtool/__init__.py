@@ -11,12 +11,13 @@ Every command is available as a function:
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
     cdtool.forecast_signature("gate.json", logs, "machine.toml", ...)   -> Forecasted: false alarms by temperature, date
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
-    cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> Detected
+    cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> DetectionResult; of a list DetectionResults
         cdtool.detect_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
     cdtool.explain("hit.csv", "machine.toml", signature="gate.json")    -> Explained
         cdtool.explain_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
-    cdtool.benchmark("benchmark.toml")                                  -> Benchmark
-    cdtool.score("triggers.csv", "benchmark.toml")                      -> Score
+    cdtool.benchmark("benchmark.toml")                                  -> BenchmarkResult
+    cdtool.score("triggers.csv", "benchmark.toml")                      -> BenchmarkResult
+        cdtool.read_results("results.json")                                 -> BenchmarkResult
     cdtool.compare("old.json", "new.json")                              -> BuildComparison
     cdtool.plan(missed_at_most="5%")                                    -> Plan
     cdtool.identify(logs, "machine.toml", "machine.toml")               -> IdentifiedMachine: parameters with errors
@@ -27,6 +28,9 @@ Every command is available as a function:
     cdtool.study_sensors("machine.toml", ...)                           -> SensorStudy
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
     cdtool.simulate_arm(folder, {"free": 14, "stiff": 30}, seed=1, trial=2)  -> the same
+
+The classes of the values that a notebook handles are here too: `Recording`, `Signal`, `Signature`, `CdtoolError` and
+others; see docs/python.md.
 """
 
 from __future__ import annotations
@@ -35,14 +39,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cdtool.clock import previous_value
+    from cdtool.detection import Alarm, Band, Signal, Status, Verdict
+    from cdtool.detectors.base import gain
+    from cdtool.errors import CdtoolError
+    from cdtool.machine_file import MachineFile, read_machine_file
+    from cdtool.notebook.benchmark_result import BenchmarkResult, benchmark, read_results, score
+    from cdtool.notebook.detection_result import DetectionResult, DetectionResults, detect, detect_runs
+    from cdtool.pipeline import Detection
+    from cdtool.recording import Contact, Recording, Series
     from cdtool.simulation.arm_recordings import write_arm_recordings as simulate_arm
     from cdtool.simulation.gate_recordings import write_gate_recordings as simulate_gate
+    from cdtool.thresholds.cusum import Cusum
+    from cdtool.thresholds.limit import Limit
+    from cdtool.thresholds.signature import Signature
     from cdtool.version import __version__
-    from cdtool.workflows.benchmark.benchmark import benchmark
     from cdtool.workflows.comparing import compare
     from cdtool.workflows.convert.converting import convert
     from cdtool.workflows.coverage import coverage
-    from cdtool.workflows.detection import detect, detect_runs
     from cdtool.workflows.explaining import explain, explain_runs
     from cdtool.workflows.identification.identifying import identify
     from cdtool.workflows.information import info
@@ -51,11 +65,9 @@ if TYPE_CHECKING:
     from cdtool.workflows.planning import plan
     from cdtool.workflows.recovering import recover
     from cdtool.workflows.runs import read_log as read
-    from cdtool.workflows.score_triggers import score
     from cdtool.workflows.signature.forecasting import forecast_signature
     from cdtool.workflows.signature.learning import learn_signature
-    from cdtool.workflows.signature.upkeep import check_signature
-    from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
+    from cdtool.workflows.signature.upkeep import check_signature, update_with_runs as update_signature
     from cdtool.workflows.study.study import study_sensors
     from cdtool.workflows.tuning.tuning import tune
 
@@ -67,12 +79,12 @@ _API = {
     "forecast_signature": "cdtool.workflows.signature.forecasting:forecast_signature",
     "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
     "coverage": "cdtool.workflows.coverage:coverage",
-    "detect": "cdtool.workflows.detection:detect",
-    "detect_runs": "cdtool.workflows.detection:detect_runs",
+    "detect": "cdtool.notebook.detection_result:detect",
+    "detect_runs": "cdtool.notebook.detection_result:detect_runs",
     "explain": "cdtool.workflows.explaining:explain",
     "explain_runs": "cdtool.workflows.explaining:explain_runs",
-    "benchmark": "cdtool.workflows.benchmark.benchmark:benchmark",
-    "score": "cdtool.workflows.score_triggers:score",
+    "benchmark": "cdtool.notebook.benchmark_result:benchmark",
+    "score": "cdtool.notebook.benchmark_result:score",
     "convert": "cdtool.workflows.convert.converting:convert",
     "identify": "cdtool.workflows.identification.identifying:identify",
     "inject": "cdtool.workflows.injecting:inject",
@@ -86,9 +98,47 @@ _API = {
     "tune": "cdtool.workflows.tuning.tuning:tune",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
+    "read_results": "cdtool.notebook.benchmark_result:read_results",
+    "read_machine_file": "cdtool.machine_file:read_machine_file",
+    "previous_value": "cdtool.clock:previous_value",
+    "BenchmarkResult": "cdtool.notebook.benchmark_result:BenchmarkResult",
+    "DetectionResult": "cdtool.notebook.detection_result:DetectionResult",
+    "DetectionResults": "cdtool.notebook.detection_result:DetectionResults",
+    "Recording": "cdtool.recording:Recording",
+    "Series": "cdtool.recording:Series",
+    "Contact": "cdtool.recording:Contact",
+    "Signal": "cdtool.detection:Signal",
+    "Status": "cdtool.detection:Status",
+    "Band": "cdtool.detection:Band",
+    "Alarm": "cdtool.detection:Alarm",
+    "Verdict": "cdtool.detection:Verdict",
+    "Detection": "cdtool.pipeline:Detection",
+    "MachineFile": "cdtool.machine_file:MachineFile",
+    "Signature": "cdtool.thresholds.signature:Signature",
+    "Limit": "cdtool.thresholds.limit:Limit",
+    "Cusum": "cdtool.thresholds.cusum:Cusum",
+    "gain": "cdtool.detectors.base:gain",
+    "CdtoolError": "cdtool.errors:CdtoolError",
 }
 
 __all__ = [
+    "Alarm",
+    "Band",
+    "BenchmarkResult",
+    "CdtoolError",
+    "Contact",
+    "Cusum",
+    "Detection",
+    "DetectionResult",
+    "DetectionResults",
+    "Limit",
+    "MachineFile",
+    "Recording",
+    "Series",
+    "Signal",
+    "Signature",
+    "Status",
+    "Verdict",
     "__version__",
     "benchmark",
     "check_signature",
@@ -100,6 +150,7 @@ __all__ = [
     "explain",
     "explain_runs",
     "forecast_signature",
+    "gain",
     "identify",
     "info",
     "init",
@@ -107,7 +158,10 @@ __all__ = [
     "inject",
     "learn_signature",
     "plan",
+    "previous_value",
     "read",
+    "read_machine_file",
+    "read_results",
     "recover",
     "score",
     "simulate_arm",

@@ -55,15 +55,41 @@ class MachineFile(StoresDerived):
         sources = (*self.columns.beside, *self.topics.beside)
         return tuple(dict.fromkeys(item.own_file.path_for(log) for item in sources if item.own_file))
 
-    def detector(self, name: str) -> Any:
-        """Return the detector of that (full or short) name with this file's gains."""
+    def detector(self, name: str | Any) -> Any:
+        """Return the detector of that (full or short) name with this file's gains; an instance as it is, checked."""
         registry = _registry("cdtool.detectors", "DETECTORS")
+        if not isinstance(name, str):
+            return registry.checked(name)
         full = registry.canonical(name)
         return registry.load(full)(**self.gains.get(full, {}))
 
 
 def read_machine_file(path: str | Path) -> MachineFile:
-    """Read and check a machine file; raises ConfigurationError."""
+    """Read and check a machine file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The machine file.
+
+    Returns
+    -------
+    MachineFile
+        The model of the machine, the map of its channels, and the gains of its detectors. Every function that takes
+        the name of a machine file takes this as well.
+
+    Raises
+    ------
+    ConfigurationError
+        The file cannot be read, or a key or a value is wrong; the message names it.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> gate = cdtool.read_machine_file("sample_logs/gate/machine.toml")
+    >>> gate.machine.name, gate.machine.joints, gate.machine.force_unit
+    ('gate', ('gate',), 'N')
+    """
     file = location(path)
     values = read_toml(file, "a machine file")
     root = Table(values, str(file))

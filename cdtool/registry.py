@@ -65,6 +65,14 @@ class Registry:
             return getattr(import_module(module), attribute)
         return self._load_plugin(full)
 
+    def checked(self, made: Any) -> Any:
+        """Return an instance of a class of one's own; raises UsageError if the class violates the contract."""
+        name = str(getattr(made, "name", type(made).__name__))
+        problem = f"has the name of a {self.kind} of cdtool itself" if name in self.table else ""
+        if problem := problem or self._breach(type(made), name):
+            raise UsageError(f"{self.kind} {type(made).__name__} {problem}", f"see docs/recipes/{self.kind}.md")
+        return made
+
     def broken_plugins(self) -> dict[str, CdtoolError]:
         """Return the installed plug-ins that cannot be used, and why."""
         found = {}

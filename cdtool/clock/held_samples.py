@@ -21,7 +21,33 @@ READ_MARKS = "Array(b1, 2, 'C', readonly=True)"
 
 
 def previous_value(series: Series, clock: FloatArray) -> FloatArray:
-    """Return the last sample at or before each time of `clock` [s] (m, J); NaN if it is missing or too old."""
+    """Return the last sample of a channel at or before each time of a clock.
+
+    Parameters
+    ----------
+    series : Series
+        The channel, values (n, J).
+    clock : ndarray of float, shape (m,)
+        Times [s], increasing.
+
+    Returns
+    -------
+    ndarray of float, shape (m, J)
+        The values; NaN where there is no sample before, it is missing, or it is too old to stand for the present.
+
+    Raises
+    ------
+    Nothing
+        A clock outside of the channel's time gives NaN.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from cdtool import Series, previous_value
+    >>> speed = Series(np.array([0.0, 0.01, 0.02]), np.array([0.1, 0.2, 0.3]), "m/s")
+    >>> previous_value(speed, np.array([0.005, 0.02]))[:, 0].tolist()
+    [0.1, 0.3]
+    """
     if is_on_clock(series, clock):
         return series.values
     values = np.empty((len(clock), series.joint_count))

@@ -26,6 +26,7 @@ from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import GROUND_TRUTH, Contact, Recording
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.baseline import Baseline
 from cdtool.thresholds.limit import Limit
@@ -33,7 +34,6 @@ from cdtool.workflows.contacts.matched_log import DetectedLog, match_log
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.detection_options import DetectionOptions
-from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import absent_truth, check_joints, named_on_load_side, read_named, reported, shown_path
 
 if TYPE_CHECKING:
@@ -68,6 +68,8 @@ class Detected:
     normals: NormalMotions = field(default_factory=NormalMotions)
     onset: str = ""
 
+    __repr__ = short_repr
+
     @property
     def joints(self) -> tuple[str, ...]:
         """Return the names of the signal's columns: the monitored joints."""
@@ -100,9 +102,8 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
 
     Examples
     --------
-    >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> found = detect_log(log, DetectionOptions(machine, detector="momentum", limit=[400.0]))
     >>> found.detections[0].verdict.outcome, found.detections[0].statistic.unit
     ('alarm', 'N')
     >>> latency = found.detections[0].verdict.alarms[0].time - found.contacts[0].start
@@ -116,8 +117,6 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     return found[0]
 
 
-detect = by_keywords(DetectionOptions, detect_log)
-
 
 @dataclass(frozen=True)
 class DetectedRuns:
@@ -126,6 +125,8 @@ class DetectedRuns:
     runs: tuple[Detected, ...]
     skipped: tuple[Skipped, ...] = ()
     findings: tuple[RecordingFinding, ...] = ()
+
+    __repr__ = short_repr
 
 
 def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
@@ -183,8 +184,6 @@ def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
     return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
 
 
-detect_runs = by_keywords(DetectionOptions, detect_log_runs)
-
 
 @dataclass(frozen=True)
 class _OneDetector:
@@ -217,10 +216,10 @@ class _OneDetector:
         ranges: PlausibleRanges | None = None
         normals, notes = NormalMotions(absent=Absence.BY_HAND), list[RecordingFinding]()
         if signature is not None:
-            from cdtool.signature_store import read_signature
+            from cdtool.workflows.signature.learning import signature_of
             from cdtool.workflows.signature.normal_runs import normals_of, notes_on
 
-            stored = read_signature(signature)
+            stored = signature_of(signature)
             instance = machine_file.detector(detector or stored.detector)
             stored.check(machine_file.machine, instance)
             if joints:

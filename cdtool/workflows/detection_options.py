@@ -15,7 +15,10 @@ from cdtool.operations import RunCut
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 
 if TYPE_CHECKING:
+    from cdtool.detectors.base import Detector
+    from cdtool.signature_file import SignatureFile
     from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
+    from cdtool.workflows.signature.learning import Learned
 
 
 @dataclass(frozen=True)
@@ -29,10 +32,10 @@ class DetectionOptions:
     benchmark : str, Path or PreparedBenchmark, optional
         A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors, and
         `signature`, which replaces its threshold.
-    signature : str or Path, optional
-        A signature file, which contains detector, threshold and activation.
-    detector : str, optional
-        Name or short name of the detector; needed with `limit` or `warm_up`.
+    signature : str, Path, Learned or SignatureFile, optional
+        A signature file or what was learned, which contains detector, threshold and activation.
+    detector : str or Detector, optional
+        Name or short name of the detector, or a detector of your own; needed with `limit` or `warm_up`.
     limit : sequence of float, optional
         Limit |i| < limit in the signal's unit, one number or one per joint, in place of a signature.
     warm_up : float, optional
@@ -56,8 +59,8 @@ class DetectionOptions:
     machine: str | Path | MachineFile | None = None
     _: KW_ONLY
     benchmark: str | Path | PreparedBenchmark | None = None
-    signature: str | Path | None = None
-    detector: str | None = None
+    signature: str | Path | Learned | SignatureFile | None = None
+    detector: str | Detector | None = None
     limit: Sequence[float] = ()
     warm_up: float | None = None
     joints: Sequence[str] = ()
@@ -79,6 +82,8 @@ class DetectionOptions:
             return self.benchmark
         from cdtool.workflows.benchmark.prepared_detector import prepare_benchmark
 
+        if not isinstance(self.detector, str | None):
+            raise UsageError("a benchmark file names its detectors", "give the name of one of them")
         return prepare_benchmark(self.benchmark, detector=self.detector, signature=self.signature)
 
     @property

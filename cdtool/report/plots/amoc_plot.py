@@ -59,8 +59,13 @@ def plot_amoc(evaluated: Evaluated, path: Path) -> None:
 
     A lower curve is better. Left of the lowest observable rate only an upper bound is known, which is written.
     """
+    save(amoc_figure(evaluated), path)
+
+
+def amoc_figure(evaluated: Evaluated) -> Figure:
+    """Return the figure of `plot_amoc`, which a notebook shows."""
     with drawing():
-        save(_figure(evaluated), path)
+        return _figure(evaluated)
 
 
 def _figure(evaluated: Evaluated) -> Figure:

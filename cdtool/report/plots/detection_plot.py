@@ -61,9 +61,13 @@ def plot_detected(found: Detected, path: Path) -> None:
 
     Raises UsageError, CdtoolError (see `save`).
     """
+    save(detection_figure(found), path)
+
+
+def detection_figure(found: Detected) -> Figure:
+    """Return the figure of `plot_detected`, which a notebook shows."""
     with drawing():
-        figure = _figure(found)
-        save(figure, path)
+        return _figure(found)
 
 
 def _figure(found: Detected) -> Figure:

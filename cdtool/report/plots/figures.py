@@ -80,9 +80,9 @@ def drawing() -> Iterator[None]:
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size [inch] that arranges itself; for use within `drawing()`."""
-    from matplotlib.figure import Figure as NewFigure
+    from cdtool.report.plots.shown_figure import ShownFigure
 
-    return NewFigure(figsize=(width, height), dpi=_DPI, layout="constrained")
+    return ShownFigure(encoded, figsize=(width, height), dpi=_DPI, layout="constrained")
 
 
 class Margins(NamedTuple):
@@ -102,10 +102,10 @@ def stacked_panels(
     Positions are given, not found by trial: it draws in half the time of a figure that arranges itself. For use
     within `drawing()`.
     """
-    from matplotlib.figure import Figure as NewFigure
+    from cdtool.report.plots.shown_figure import ShownFigure
 
     height = margins.top + sum(heights) + gap * (len(heights) - 1) + margins.bottom
-    figure = NewFigure(figsize=(width, height), dpi=_DPI)
+    figure = ShownFigure(encoded, figsize=(width, height), dpi=_DPI)
     panels: list[Axes] = []
     top = height - margins.top
     for panel in heights:
@@ -133,18 +133,22 @@ def text_width(texts: Iterable[str], size: float) -> float:
 
 def save(figure: Figure, path: Path) -> None:
     """Write a figure in the format of its suffix; raises UsageError for an unknown one, CdtoolError if it cannot."""
-    from importlib import import_module
-
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise UsageError(f"{plain(path)} does not name a figure", f"a name that ends in {', '.join(SUFFIXES)}")
+    write_bytes(path, encoded(figure, suffix))
+
+
+def encoded(figure: Figure, suffix: str) -> bytes:
+    """Return a figure in the format of a suffix of `SUFFIXES`; the same figure gives the same bytes."""
+    from importlib import import_module
+
     canvas = import_module(_BACKENDS[suffix]).FigureCanvas(figure)
-    kind = suffix[1:]
+    drawn = BytesIO()
     with drawing():
         _settle(figure)
-        drawn = BytesIO()
-        getattr(canvas, f"print_{kind}")(drawn, metadata=_METADATA[suffix])
-        write_bytes(path, drawn.getvalue())
+        getattr(canvas, f"print_{suffix[1:]}")(drawn, metadata=_METADATA[suffix])
+    return drawn.getvalue()
 
 
 def write(

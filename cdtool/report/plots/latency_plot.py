@@ -93,8 +93,13 @@ def plot_latencies(evaluated: Evaluated, path: Path) -> None:
 
     The median counts missed contacts as later than all others. Read it together with the counts at the right.
     """
+    save(latency_figure(evaluated), path)
+
+
+def latency_figure(evaluated: Evaluated) -> Figure:
+    """Return the figure of `plot_latencies`, which a notebook shows."""
     with drawing():
-        save(_figure(evaluated), path)
+        return _figure(evaluated)
 
 
 def _figure(evaluated: Evaluated) -> Figure:

@@ -44,8 +44,13 @@ def plot_survival(evaluated: Evaluated, path: Path) -> None:
 
     A missed contact leaves its curve at the end of its monitoring: a curve that ends above 0 never detects that share.
     """
+    save(survival_figure(evaluated), path)
+
+
+def survival_figure(evaluated: Evaluated) -> Figure:
+    """Return the figure of `plot_survival`, which a notebook shows."""
     with drawing():
-        save(_figure(evaluated), path)
+        return _figure(evaluated)
 
 
 def _figure(evaluated: Evaluated) -> Figure:

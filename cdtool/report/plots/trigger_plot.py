@@ -52,8 +52,13 @@ def plot_triggers(trace: Trace, path: Path) -> None:
 
     Raises UsageError, CdtoolError (see `save`).
     """
+    save(trigger_figure(trace), path)
+
+
+def trigger_figure(trace: Trace) -> Figure:
+    """Return the figure of `plot_triggers`, which a notebook shows."""
     with drawing():
-        save(_figure(trace), path)
+        return _figure(trace)
 
 
 def _figure(trace: Trace) -> Figure:

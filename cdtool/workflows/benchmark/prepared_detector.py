@@ -17,13 +17,14 @@ from cdtool.operations import Operation
 from cdtool.plain_text import counted
 from cdtool.plausible import LearnedRanges
 from cdtool.recording import Recording
-from cdtool.signature_store import read_signature
+from cdtool.signature_file import SignatureFile
 from cdtool.thresholds.base import is_per_run
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.learned_thresholds import ThresholdsByLog, learn_thresholds
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.scoring import Detect, DetectionOf, Scored, detect_with, score_runs
 from cdtool.workflows.runs import load_runs
+from cdtool.workflows.signature.learning import Learned, signature_of
 from cdtool.workflows.signature.normal_runs import normals_for, normals_of, notes_on
 
 
@@ -85,7 +86,7 @@ class PreparedBenchmark:
 
 
 def prepare_benchmark(
-    file: str | Path, *, detector: str | None = None, signature: str | Path | None = None
+    file: str | Path, *, detector: str | None = None, signature: str | Path | Learned | SignatureFile | None = None
 ) -> PreparedBenchmark:
     """Read a benchmark file and learn the threshold of one of its detectors, or use that of a signature file.
 
@@ -96,7 +97,7 @@ def prepare_benchmark(
     setup, measured = with_synchronisation(read_benchmark_file(file, detectors=(detector,) if detector else ()))
     machine_file = setup.machine_file
     if signature is not None:
-        stored = read_signature(signature)
+        stored = signature_of(signature)
         instance = machine_file.detector(detector or stored.detector)
         stored.check(machine_file.machine, instance)
         # Without `joints` in the file all joints are monitored; a signal of the whole machine has one column.

@@ -9,16 +9,21 @@ from typing import Any
 
 from cdtool.activation import Activation, ActivationSettings
 from cdtool.detection import WHOLE_MACHINE
+from cdtool.detectors.base import Detector
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.onset import OnsetRule
+from cdtool.html_table import html_table
 from cdtool.log_section import LogSection
 from cdtool.machine_file import MachineFile, fingerprint, machine_parameters, read_machine_file
 from cdtool.motion import MotionClass
 from cdtool.operations import Operation
+from cdtool.plain_text import counted
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
+from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.signature import Signature
@@ -43,6 +48,27 @@ class Learned:
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
 
+    __repr__ = short_repr
+
+    def save(self, path: str | Path) -> None:
+        """Write the signature file, as `cdtool learn-signature -o` does; raises SignatureError."""
+        write_signature(path, self.signature)
+
+    def _repr_html_(self) -> str:
+        """Return the classes of motion as a table, which a notebook shows."""
+        signature = self.signature
+        rows = [("all motions" if motion is None else motion.described, runs) for motion, runs in self.runs]
+        caption = f"{signature.detector} on {signature.machine}: {signature.described}"
+        left_out = f"{counted(len(self.skipped), 'entry')} left out: see skipped" if self.skipped else ""
+        return html_table(caption, ("class of motion", "runs"), rows, left_out)
+
+
+def signature_of(given: str | Path | Learned | SignatureFile) -> SignatureFile:
+    """Return the content of a signature file, read or just learned; raises SignatureError."""
+    if isinstance(given, Learned):
+        return given.signature
+    return given if isinstance(given, SignatureFile) else read_signature(given)
+
 
 @dataclass(frozen=True)
 class LearningOptions:
@@ -52,8 +78,8 @@ class LearningOptions:
     ----------
     machine : str, Path or MachineFile
         The machine file.
-    detector : str
-        Name or short name of the detector.
+    detector : str or Detector
+        Name or short name of the detector, or a detector of your own.
     rule : Threshold, optional
         Any threshold with its settings; by default a `Signature`.
     joints : sequence of str, optional
@@ -81,7 +107,7 @@ class LearningOptions:
     """
 
     machine: str | Path | MachineFile
-    detector: str
+    detector: str | Detector
     _: KW_ONLY
     rule: Threshold | None = None
     joints: Sequence[str] = ()
@@ -110,7 +136,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     -------
     Learned
         The content of a signature file, with one threshold per class of motion if the rule distinguishes classes, and
-        the runs left out. `cdtool.signature_store.write_signature` writes it.
+        the runs left out. `save` writes the file; `cdtool.detect` also takes it as it is.
 
     Raises
     ------

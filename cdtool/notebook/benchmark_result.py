@@ -1,0 +1,344 @@
+"""The result of a benchmark for Python: rows as DataFrames, the figures of its reports, and the reports themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cdtool.errors import UsageError, nearest
+from cdtool.evaluation.evaluated import Evaluated
+from cdtool.evaluation.frames import results_as_frame
+from cdtool.evaluation.results import Results
+from cdtool.evaluation.summary import FIGURES
+from cdtool.evaluation.traces.trace import Trace
+from cdtool.html_table import html_table
+from cdtool.notebook.presenting import presented
+from cdtool.plain_text import counted
+from cdtool.remote.remote_path import location
+from cdtool.workflows.benchmark.benchmark import Benchmark
+from cdtool.workflows.benchmark.benchmark import benchmark as run_benchmark
+from cdtool.workflows.benchmark.stored_outcomes import StoreReport
+from cdtool.workflows.reporting import load_report
+from cdtool.workflows.score_triggers import Score
+from cdtool.workflows.score_triggers import score as run_score
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+_COUNTS = ("contacts", "detected", "missed", "not_assessable", "false_alarms", "operations", "hours")
+_SHOWN = ("group", "detector", "detected", "missed", "not assessable", "median [ms]", "mean [ms]", "false alarms")
+
+
+@dataclass(frozen=True, repr=False)
+class BenchmarkResult:
+    """What a benchmark measured: DataFrames, figures and reports.
+
+    `contacts`, `false_alarms` and the other frames have a column per field of `results.json`, under the same names,
+    with units. `results` are the same rows as plain values, `evaluated` these with all statistics. `traces` are the
+    curves that the trigger plots show. A frame is made at its first use, and is the same one from then on.
+
+    Parameters
+    ----------
+    evaluated : Evaluated
+        The rows with their statistics.
+    traces : tuple of Trace
+        The curves that were kept.
+    inputs : tuple of Path
+        The files that were read; they are never overwritten.
+    seconds : mapping of str to float
+        The time of each step [s]; empty for results that were read from a file.
+    stored : StoreReport, optional
+        How much was in the store; None without one.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> result = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
+    >>> result
+    BenchmarkResult(1 detector, 3 groups, 20 recordings: ...)
+    >>> result.contacts.groupby("group", observed=True).latency_ms.median().round().astype(int).to_dict()
+    {'stiff': 63, 'soft': 119}
+    >>> result.summary().loc[("stiff", "momentum"), ["detected", "missed"]].tolist()
+    [4.0, 0.0]
+    """
+
+    evaluated: Evaluated
+    traces: tuple[Trace, ...] = ()
+    inputs: tuple[Path, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    stored: StoreReport | None = None
+
+    @classmethod
+    def of(cls, done: Benchmark | Score) -> BenchmarkResult:
+        """Return the result of a workflow."""
+        if isinstance(done, Score):
+            return cls(done.evaluated, done.traces, done.inputs)
+        return cls(done.evaluated, done.traces, done.inputs, done.seconds, done.stored)
+
+    @property
+    def results(self) -> Results:
+        """The rows and their provenance as plain values."""
+        return self.evaluated.results
+
+    @property
+    def headline(self) -> str:
+        """The conclusion in one line, as every report shows it."""
+        return self.results.conclusion.headline
+
+    @cached_property
+    def contacts(self) -> pd.DataFrame:
+        """A row per contact and detector; `latency_ms` is NaN unless `outcome` is "detected"."""
+        return self.frame("contacts")
+
+    @cached_property
+    def false_alarms(self) -> pd.DataFrame:
+        """A row per alarm without a contact."""
+        return self.frame("false_alarms")
+
+    @cached_property
+    def exposure(self) -> pd.DataFrame:
+        """A row per group and detector: how long and how often it was monitored."""
+        return self.frame("exposure")
+
+    @cached_property
+    def recordings(self) -> pd.DataFrame:
+        """A row per log that was scored."""
+        return self.frame("recordings")
+
+    @cached_property
+    def limits(self) -> pd.DataFrame:
+        """A row per limit that was checked."""
+        return self.frame("limits")
+
+    @cached_property
+    def skipped(self) -> pd.DataFrame:
+        """A row per log or detector that was left out, with the reason."""
+        return self.frame("skipped")
+
+    @cached_property
+    def findings(self) -> pd.DataFrame:
+        """A row per finding about a log that was used."""
+        return self.frame("findings")
+
+    def frame(self, table: str) -> pd.DataFrame:
+        """Return one kind of rows as a new DataFrame.
+
+        Parameters
+        ----------
+        table : str
+            The name of the rows in `results.json`: "contacts", "forces", "sweep", and so on.
+
+        Returns
+        -------
+        DataFrame
+            A column per field, all columns even without a row.
+
+        Raises
+        ------
+        UsageError
+            There are no rows of that name.
+        """
+        from cdtool.evaluation.results_folder import tables
+
+        if table not in tables():
+            raise UsageError(f"no table '{table}' in the results", nearest(table, tuple(tables())))
+        return results_as_frame(self.results, table)
+
+    def summary(self) -> pd.DataFrame:
+        """Return the statistics of each detector in each group: the metrics that `[limits]` may name.
+
+        Returns
+        -------
+        DataFrame
+            Index: group and detector, in the order of the benchmark file, changed conditions last. All columns are
+            floats, NaN where a metric is not known. The counts are first, because a latency means nothing without
+            them: `median_ms` and `p95_ms` count a missed contact as later than all others, `mean_ms` and `std_ms` are
+            those of the detected contacts.
+        """
+        import pandas as pd
+
+        items = (*self.evaluated.summaries, *self.evaluated.conditions)
+        names = [*_COUNTS, *(name for name in FIGURES if name not in _COUNTS)]
+        values = {name: [float(FIGURES[name](item)) for item in items] for name in names}
+        of_rows = {"group": self.results.every_group, "detector": self.results.detectors}
+        index = [pd.Categorical([getattr(item, name) for item in items], of_rows[name]) for name in of_rows]
+        return pd.DataFrame(values, index=pd.MultiIndex.from_arrays(index, names=list(of_rows)), dtype="float64")
+
+    @property
+    def plot(self) -> BenchmarkPlots:
+        """The figures of the reports, for a notebook: `result.plot.latency()`."""
+        return BenchmarkPlots(self)
+
+    def save(self, *targets: str | Path, force: bool = False) -> list[Path]:
+        """Write reports, as `cdtool benchmark -o` does.
+
+        Parameters
+        ----------
+        *targets : str or Path
+            A folder for all reports, or names that end in .html, .md, .json, .xml, .csv, .png, .parquet ...
+        force : bool, optional
+            Replace files that cdtool did not write.
+
+        Returns
+        -------
+        list of Path
+            The files; of a folder, its report.
+
+        Raises
+        ------
+        UsageError
+            A target cannot be written, or is a file that cdtool did not write.
+        """
+        from cdtool.report.outputs import write_outputs
+        from cdtool.report.writers.base import Report
+
+        report = Report(self.evaluated, self.traces)
+        return write_outputs(report, [location(target) for target in targets], force=force, inputs=self.inputs)
+
+    def __repr__(self) -> str:
+        results = self.results
+        size = ", ".join(
+            counted(len(rows), name)
+            for rows, name in (
+                (results.detectors, "detector"),
+                (results.every_group, "group"),
+                (results.recordings, "recording"),
+            )
+        )
+        headline = self.headline if len(self.headline) <= _LONGEST_HEADLINE else f"{self.headline[:_LONGEST_HEADLINE]}..."
+        return f"BenchmarkResult({size}: {headline})"
+
+    def _repr_html_(self) -> str:
+        """Return the statistics as a table, which a notebook shows."""
+        rows = [
+            (
+                item.group,
+                item.detector,
+                item.detected if item.contacts else None,
+                item.missed if item.contacts else None,
+                item.not_assessable if item.contacts else None,
+                item.median_ms,
+                item.mean_ms,
+                item.false_alarms if item.watched else None,
+            )
+            for item in self.evaluated.summaries
+        ]
+        return html_table(f"Benchmark: {self.headline}", _SHOWN, rows)
+
+
+_LONGEST_HEADLINE = 100
+
+
+@dataclass(frozen=True)
+class BenchmarkPlots:
+    """The figures of a benchmark's reports: each a `matplotlib.figure.Figure`, which Jupyter shows; no pyplot."""
+
+    result: BenchmarkResult
+
+    def latency(self) -> Figure:
+        """Return the latency of every contact, by group and detector, with the counts to read it with."""
+        from cdtool.report.plots.latency_plot import latency_figure
+
+        return _described(latency_figure(self.result.evaluated), "latency of every contact by group and detector")
+
+    def survival(self) -> Figure:
+        """Return the share of the contacts that are still undetected over the time since their onset."""
+        from cdtool.report.plots.survival_plot import survival_figure
+
+        return _described(survival_figure(self.result.evaluated), "share of the contacts still undetected over time")
+
+    def amoc(self) -> Figure:
+        """Return the median latency against the false alarms, with all limits moved; needs an impact-free group."""
+        from cdtool.report.plots.amoc_plot import amoc_figure
+
+        return _described(amoc_figure(self.result.evaluated), "median latency against false alarms")
+
+    def triggers(self, recording: str | None = None, *, group: str | None = None) -> Figure:
+        """Return all detectors below the load-cell curve of one recording.
+
+        Parameters
+        ----------
+        recording : str, optional
+            A recording, as `contacts.recording` names it, whose curves were kept; by default the one that shows most.
+        group : str, optional
+            Of one group only.
+
+        Returns
+        -------
+        Figure
+            The load cell, and a row per detector, the fastest first.
+
+        Raises
+        ------
+        UsageError
+            No curves of the recording or the group were kept.
+        """
+        from cdtool.report.plots.trigger_plot import most_informative, trigger_figure
+
+        found = [
+            trace
+            for trace in self.result.traces
+            if recording in (None, trace.recording) and group in (None, trace.group)
+        ]
+        if not found:
+            asked = recording or group or ""
+            known = dict.fromkeys(trace.recording if recording else trace.group for trace in self.result.traces)
+            hint = nearest(asked, tuple(known)) if known else "run the benchmark, or keep results.traces.json.gz"
+            raise UsageError(f"no curves of '{asked}' were kept" if asked else "no curves were kept", hint)
+        trace = most_informative(found)
+        return _described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
+
+
+def _described(figure: Any, description: str) -> Figure:
+    figure.description = description
+    shown: Figure = figure
+    return shown
+
+
+benchmark = presented(
+    run_benchmark,
+    BenchmarkResult.of,
+    "BenchmarkResult\n    DataFrames, figures and reports. Logs that cannot be read or scored are in `skipped`; so is a\n"
+    "    detector without one of its channels, all contacts of which are not assessable.",
+)
+score = presented(
+    run_score,
+    BenchmarkResult.of,
+    "BenchmarkResult\n    As that of `benchmark`. Of the file's limits, those on `*` and on detectors of the trigger file\n"
+    "    are checked.",
+)
+
+
+def read_results(file: str | Path) -> BenchmarkResult:
+    """Read the results of a benchmark from their file.
+
+    Parameters
+    ----------
+    file : str or Path
+        A results.json or results.parquet that `cdtool benchmark -o` or `BenchmarkResult.save` wrote. The curves of the
+        trigger plots are read from the file results.traces.json.gz beside it, if it is there.
+
+    Returns
+    -------
+    BenchmarkResult
+        The results, without the recordings.
+
+    Raises
+    ------
+    RecordingError
+        The file is damaged, or is not a results file.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> scored = cdtool.score("docs/examples/triggers.csv", "sample_logs/gate/benchmark.toml")
+    >>> _ = scored.save("results.json")
+    >>> cdtool.read_results("results.json").contacts.equals(scored.contacts)
+    True
+    """
+    evaluated, traces, _ = load_report(file)
+    return BenchmarkResult(evaluated, traces, (location(file),))
