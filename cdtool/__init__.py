@@ -67,7 +67,8 @@ if TYPE_CHECKING:
     from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.signature.forecasting import forecast_signature
     from cdtool.workflows.signature.learning import learn_signature
-    from cdtool.workflows.signature.upkeep import check_signature, update_with_runs as update_signature
+    from cdtool.workflows.signature.upkeep import check_signature
+    from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
     from cdtool.workflows.study.study import study_sensors
     from cdtool.workflows.tuning.tuning import tune
 

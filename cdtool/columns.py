@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # Codes are integers from -2^52 down by less than 2^48: float64 represents integers down to -2^53 exactly.
 _FIRST_CODE, _CODE_BYTES = 2**52, 6
@@ -38,6 +39,8 @@ class Column:
     time: FloatArray | None = None
     unit: str | None = None
     words: Mapping[float, str] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
 
 class Categories:
@@ -78,3 +81,5 @@ class Piece:
     values: Mapping[str, FloatArray]
     rows: int
     origin: float = 0.0
+
+    __repr__ = short_repr

@@ -10,6 +10,7 @@ from dataclasses import Field, dataclass
 from typing import Any, ClassVar, Protocol, TypeGuard
 
 from cdtool.recording import FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 # A gain: one number for all joints, or one per joint (the thesis's diagonal gain matrix, 2.13 and 2.19).
 Gain = float | tuple[float, ...]
@@ -29,6 +30,8 @@ class Pendulum:
     other_speed: FloatArray
     other_acceleration: FloatArray
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class JointEquation:
@@ -42,6 +45,8 @@ class JointEquation:
     force: FloatArray
     viscous: float
     pendulum: Pendulum | None = None
+
+    __repr__ = short_repr
 
 
 class Machine(Protocol):

@@ -49,6 +49,6 @@ def _row(cells: Sequence[object]) -> str:
 
 
 def _text(cell: object) -> str:
-    if cell is None or (isinstance(cell, float) and cell != cell):  # noqa: PLR0124 - NaN
+    if cell is None or (isinstance(cell, float) and cell != cell):
         return "–"
     return escape(f"{cell:.4g}" if isinstance(cell, float) else str(cell))

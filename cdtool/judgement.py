@@ -19,6 +19,7 @@ from cdtool.motion.applicable import HOLD, Motion, judging_classes, speed_is_rec
 from cdtool.motion.evident_motion import evident_speed
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold, KnownBand, is_per_run, judges_whole_machine
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 from cdtool.thresholds.speed_range import over_speeds
@@ -39,6 +40,8 @@ class _Share:
     signal: Signal
     rows: slice
     judges: BoolArray
+
+    __repr__ = short_repr
 
     @cached_property
     def evaluated(self) -> tuple[Signal, Band]:
@@ -69,6 +72,8 @@ class Judgement:
     thresholds: tuple[FittedThreshold, ...]
     strokes: tuple[Stroke, ...]
     hold: float = HOLD
+
+    __repr__ = short_repr
 
     @property
     def classes(self) -> tuple[MotionClass, ...]:

@@ -19,6 +19,7 @@ from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.registry import Registry
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.tables import Table, read_toml
 
 
@@ -36,6 +37,8 @@ class MachineFile(StoresDerived):
     gains: Mapping[str, Mapping[str, Gain]]
     digest: str
     model: Any = None
+
+    __repr__ = short_repr
 
     @property
     def force_reduction(self) -> str:

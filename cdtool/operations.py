@@ -23,6 +23,7 @@ from cdtool.kernels import READ_ONLY, kernel
 from cdtool.median_kernel import quantile_of
 from cdtool.motion import MotionClass, leading_joint, motion_class
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 HOW_TO_CUT = ("whole", "motion", "trigger")
 # The forms of a cut into runs, for messages.
@@ -51,6 +52,8 @@ class Operation:
     number: int = 0
     log: Recording | None = None
     cut: str = "whole"
+
+    __repr__ = short_repr
 
     @property
     def whole(self) -> Recording:

@@ -22,6 +22,7 @@ from cdtool.motion.applicable import HOLD
 from cdtool.motion.speed_course import TOLERANCE
 from cdtool.operations import Operation
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold
 
 # With at least this share of samples at another speed, an operation without an alarm counts as another motion.
@@ -57,6 +58,8 @@ class Detection:
     threshold: FittedThreshold | None = None
     judgement: Judgement | None = None
     rows: slice = field(default_factory=lambda: slice(None))
+
+    __repr__ = short_repr
 
     def exceedance(self) -> FloatArray:
         """Return for each sample (n, J) the safety factor at which its limit would be met; -inf without a threshold."""

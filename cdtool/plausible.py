@@ -21,6 +21,7 @@ from cdtool.findings import Finding
 from cdtool.findings.channels import ImplausibleValues, Leap, LeapingValues, LearnedInOtherUnit
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 # No channel of a machine reaches this value in SI: 1e9 N m, rad/s or rad.
 IMPOSSIBLE = 1e9
@@ -74,6 +75,8 @@ class PlausibleRanges:
     """The plausible values of each channel."""
 
     channels: Mapping[str, ChannelRange]
+
+    __repr__ = short_repr
 
     @classmethod
     def learned(cls, recordings: Sequence[Recording]) -> Self:

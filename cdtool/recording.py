@@ -250,7 +250,13 @@ class Recording(StoresDerived):
     def _repr_html_(self) -> str:
         """Return the channels as a table, which a notebook shows."""
         rows = [
-            (name, series.unit or "–", series.joint_count, len(series), 1.0 / series.period if len(series) > 1 else None)
+            (
+                name,
+                series.unit or "–",
+                series.joint_count,
+                len(series),
+                1.0 / series.period if len(series) > 1 else None,
+            )
             for name, series in self.channels.items()
         ]
         caption = f"{self.name}: {self.duration:.3g} s, joints {', '.join(self.joints)}"

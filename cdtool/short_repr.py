@@ -69,7 +69,7 @@ class ShortRepr:
         """Set it before `dataclass` adds its own, which it does only in a class without one."""
         super().__init_subclass__(**named)
         if "__repr__" not in vars(cls):
-            cls.__repr__ = short_repr  # type: ignore[assignment, method-assign]
+            cls.__repr__ = short_repr  # type: ignore[method-assign]
 
 
 def _is_default(item: Field[Any], held: Any) -> bool:

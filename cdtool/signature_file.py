@@ -12,6 +12,7 @@ from cdtool.errors import SignatureError
 from cdtool.machine_file import fingerprint, machine_parameters
 from cdtool.plain_text import counted, digits, first_of
 from cdtool.plausible import PlausibleRanges
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.normal_motion import NormalMotion
 from cdtool.value_words import value_in_words
@@ -75,6 +76,8 @@ class SignatureFile:
     plausible: PlausibleRanges | None = None
     normal: tuple[NormalMotion, ...] | None = ()
     machine_parameters: Mapping[str, Any] | None = None
+
+    __repr__ = short_repr
 
     @property
     def threshold(self) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -34,3 +36,15 @@ def assert_same_bits(ours: Any, theirs: Any) -> None:
     np.testing.assert_array_equal(ours, theirs)
     if ours.dtype.kind == "f":
         np.testing.assert_array_equal(np.signbit(ours) & ~np.isnan(ours), np.signbit(theirs) & ~np.isnan(theirs))
+
+
+def every_value(value: Any) -> str:
+    """All values in a result, to compare results that have NaN, or a short `repr`."""
+    if is_dataclass(value) and not isinstance(value, type):
+        inner = ", ".join(f"{item.name}={every_value(getattr(value, item.name))}" for item in fields(value))
+        return f"{type(value).__name__}({inner})"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key!r}: {every_value(item)}' for key, item in value.items())}}}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(every_value, value))}]"
+    return repr(value)

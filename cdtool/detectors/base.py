@@ -16,6 +16,7 @@ from cdtool.dynamics import Gain, Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.kernels import kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -304,6 +305,8 @@ class Drive:
     missing: BoolArray
     speed_missing: BoolArray
     coupled: bool = False
+
+    __repr__ = short_repr
 
     @property
     def interrupted(self) -> BoolArray:

@@ -25,6 +25,7 @@ from cdtool.detectors.look import RED, Look
 from cdtool.dynamics import Gain, JointEquation, Machine
 from cdtool.kernels import read_only
 from cdtool.recording import FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 # The filter starts with the uncertainty of the friction that its drift gathers in this time [s].
 _INITIAL_DRIFT_TIME = 10.0
@@ -50,6 +51,8 @@ class JointMeasurements:
     missing: StatusArray
     acceleration_time: FloatArray
     acceleration: FloatArray
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

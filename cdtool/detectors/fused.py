@@ -16,6 +16,7 @@ from cdtool.detectors.look import TEAL, Look
 from cdtool.dynamics import Gain, Machine
 from cdtool.errors import RecordingError
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class _Column:
     values: FloatArray
     status: StatusArray
     lost: BoolArray
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

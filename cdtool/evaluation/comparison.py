@@ -13,6 +13,7 @@ from cdtool.evaluation.results import ContactResult, Results
 from cdtool.evaluation.rows import grouped, values_of
 from cdtool.evaluation.statistics.paired import Difference, holm, mcnemar_p, paired_difference
 from cdtool.evaluation.summary import campaigns
+from cdtool.short_repr import short_repr
 
 # A difference counts as shown below this, after correction.
 SIGNIFICANT = 0.05
@@ -73,6 +74,8 @@ class Comparison:
     only_first_missed: int
     only_second_missed: int
     missed_p: float
+
+    __repr__ = short_repr
 
     @property
     def faster(self) -> str | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cdtool.evaluation.limits import ALL, LimitRule
 from cdtool.evaluation.results import ContactResult
+from cdtool.short_repr import short_repr
 
 _DETECTED, _MISSED = "detected", "missed"
 # Neighbouring speeds that differ by a larger factor belong to different classes.
@@ -151,6 +152,8 @@ class CoverageMap:
     cells: Mapping[str, Mapping[CellKey, Cell]]
     speeds: tuple[SpeedClass, ...] = (SpeedClass(None, math.nan, math.nan),)
     speed_unit: str = "m/s"
+
+    __repr__ = short_repr
 
     def most_telling(self, count: int = 5) -> list[TellingCell]:
         """Return the cells that a test at the rig would tell most about: missed in part, near a limit, uncertain."""

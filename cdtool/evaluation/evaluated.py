@@ -10,6 +10,7 @@ from cdtool.evaluation.conclusion import conclude
 from cdtool.evaluation.limits import LimitRule, check_limits
 from cdtool.evaluation.results import Results
 from cdtool.evaluation.summary import Summary, at_worst, summarise, summarise_conditions, summarise_kinds
+from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Evaluated:
     comparisons: tuple[Comparison, ...]
     kinds: tuple[Summary, ...] = ()
     conditions: tuple[Summary, ...] = ()
+
+    __repr__ = short_repr
 
 
 def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:

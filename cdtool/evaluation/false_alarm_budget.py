@@ -18,6 +18,7 @@ from cdtool.evaluation.sweep import critical_factors, sweep
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted, digits
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 _FORM = re.compile(
     r"\s*([0-9.eE+-]+)\s*/\s*([0-9.eE+-]*)\s*(op|operation|operations|h|hour|hours)(?:\s+at\s+([0-9.]+)\s*%)?\s*"
@@ -133,6 +134,8 @@ class MonitoredRun:
     critical: float
     seconds: float
     alarms: Callable[[FloatArray], npt.NDArray[np.int64]]
+
+    __repr__ = short_repr
 
     @classmethod
     def of_each(cls, detection: Detection, activations: Sequence[Activation]) -> list[MonitoredRun]:

@@ -14,6 +14,7 @@ from typing import Any, Self
 from cdtool.evaluation.rows import picked, values_of
 from cdtool.findings import Finding
 from cdtool.frozen import frozen
+from cdtool.short_repr import short_repr
 
 SCHEMA_VERSION = 4
 # How reports introduce what is lost of a recording that was used.
@@ -312,6 +313,8 @@ class Results:
         default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
+
+    __repr__ = short_repr
 
     @property
     def every_group(self) -> tuple[str, ...]:

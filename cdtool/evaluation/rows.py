@@ -136,7 +136,7 @@ class Rows(Sequence[Row], Generic[Row]):
     __hash__ = None  # type: ignore[assignment]  # more rows can be added
 
     def __repr__(self) -> str:
-        return f"Rows({self.kind.__name__}, {list(self)!r})"
+        return f"Rows({self.kind.__name__}, {len(self)} rows)"
 
 
 class _Picked(Sequence[Row]):
@@ -173,7 +173,7 @@ class _Picked(Sequence[Row]):
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return repr(list(self))
+        return f"{len(self)} of {self.rows!r}"
 
 
 def values_of(rows: Sequence[Any], name: str) -> Sequence[Any]:

@@ -20,6 +20,7 @@ from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
 from cdtool.evaluation.statistics.small_sample import FEWEST, median_of, p95_of
 from cdtool.plain_text import counted
+from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ class Summary:
     later_ms: float = 0.0
     force_holes: int = 0
     alarming: int = 0
+
+    __repr__ = short_repr
 
     @property
     def watched(self) -> bool:

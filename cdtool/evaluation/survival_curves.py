@@ -12,6 +12,7 @@ from cdtool.evaluation.rows import grouped
 from cdtool.evaluation.statistics.kaplan_meier import Survival, survival
 from cdtool.evaluation.summary import latencies
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class SurvivalCurve:
     curve: Survival
     missed: FloatArray
     end: float
+
+    __repr__ = short_repr
 
 
 def survival_curves(results: Results) -> tuple[SurvivalCurve, ...]:

@@ -17,6 +17,7 @@ from cdtool.evaluation.truth.matching import windows
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.pipeline import Detection
 from cdtool.recording import BoolArray, Contact, FloatArray
+from cdtool.short_repr import short_repr
 
 _STATUS = "Array(uint8, 1, 'C', readonly=True)"
 # Multiples of the safety factor that is set: a quarter to four times, eight steps an octave.
@@ -32,6 +33,8 @@ class Swept:
 
     false_alarms: npt.NDArray[np.int64]
     latency: FloatArray
+
+    __repr__ = short_repr
 
 
 def sweep(

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from typing import Any, ClassVar, Literal
 
 from cdtool.frozen import frozen
+from cdtool.short_repr import short_repr
 
 Severity = Literal["note", "warning", "loss"]
 
@@ -97,6 +98,8 @@ class Finding:
     channel: str = ""
     severity: Severity = "warning"
     file: str = ""
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Raise TypeError for anything but a fact, where a plug-in makes it and not where it is shown."""

@@ -13,6 +13,7 @@ import numpy as np
 from cdtool.errors import RecordingError
 from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 # A step longer than this many usual steps of a channel is a gap: nothing is interpolated across it.
 _GAP_STEPS = 3.5
@@ -43,6 +44,8 @@ class AxisRun:
     reference_speed: FloatArray | None = None
     reference_torque: FloatArray | None = None
     derived: frozenset[str] = field(default_factory=frozenset)
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.torque)

@@ -13,6 +13,7 @@ import numpy as np
 
 from cdtool.identification.robot_regressor import Column, Regressor, stacked_torque
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # A column whose rest, after the projection on the others, is below this share of it is dependent on them.
 _DEPENDENT = 1e-9
@@ -44,6 +45,8 @@ class Grouping:
     base: tuple[int, ...]
     combination: FloatArray
     absent: tuple[int, ...]
+
+    __repr__ = short_repr
 
     @property
     def grouped(self) -> tuple[int, ...]:
@@ -82,6 +85,8 @@ class BaseParameterSet:
     excitation: FloatArray
     uncertainty: FloatArray
     identifiable: tuple[bool, ...]
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.names)

@@ -35,6 +35,7 @@ from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 # Directions of the unloaded robot's parameters that are excited less than this, relative to the most, are not fitted.
 _UNSEEN = 1e-7
@@ -115,6 +116,8 @@ class _Part:
     load: FloatArray
     moves: BoolArray
     times: FloatArray
+
+    __repr__ = short_repr
 
 
 def _run_part(run: RobotRun, index: int, regressor: Regressor, weights: FloatArray | None) -> _Part:

@@ -19,6 +19,7 @@ from cdtool.errors import UsageError
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import IdentificationError
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 IntArray = npt.NDArray[np.int64]
 
@@ -223,6 +224,8 @@ class FilteredRun:
     acceleration_noise: float
     unknown_speed: float = 0.0
 
+    __repr__ = short_repr
+
     @cached_property
     def sign(self) -> FloatArray:
         """Return the sign of the inner speed (n,), straight through the speeds at which it is unknown."""
@@ -408,6 +411,8 @@ class LinearFit:
     condition_number: float
     regressors: FloatArray = field(repr=False)
     instruments: FloatArray = field(repr=False)
+
+    __repr__ = short_repr
 
     @cached_property
     def influence(self) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cdtool.identification.filtered_regression import FilteredRun, IntArray
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # Knots of the friction spline: shares of the highest speed, closer together where the friction changes fast.
 _KNOTS = (0.0, 0.025, 0.0625, 0.16, 0.32, 0.64, 1.0)
@@ -74,6 +75,8 @@ class FrictionCurve:
     mean: FloatArray
     standard_error: FloatArray
     count: IntArray
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.abscissa)

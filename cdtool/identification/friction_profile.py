@@ -16,6 +16,7 @@ import numpy as np
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.start_ensemble import StartEnsemble, motor_speed
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # The motion is settled this long after it reached this share of the nominal speed, while it stays within a band [s, -].
 _SETTLED_AFTER, _REACHED, _BAND = 0.5, 0.95, 0.3
@@ -39,6 +40,8 @@ class FrictionProfile:
     spacing: float
     force: FloatArray
     level_deviation: float
+
+    __repr__ = short_repr
 
     def at(self, travelled: FloatArray) -> FloatArray:
         """Return the known deviation at distances travelled [m, rad]; 0 where it is not known."""

@@ -15,6 +15,7 @@ from cdtool.axis_model.parameters import AxisModel, Sensors
 from cdtool.errors import RecordingError
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 # What is compared: from this long before the contact, at least, to the separation or this long after the contact [s].
 _LEAD, _SHORTEST_LEAD, _LONGEST = 0.1, 0.03, 0.2
@@ -58,6 +59,8 @@ class LoadCellContact:
     level: float
     noise: tuple[float, float]
     is_motion_exact: bool = True
+
+    __repr__ = short_repr
 
     @property
     def margin(self) -> int:

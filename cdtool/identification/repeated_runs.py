@@ -11,6 +11,7 @@ import numpy as np
 from cdtool.identification.robot_dynamics import Window
 from cdtool.identification.robot_run import RobotRun
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # Runs are the same motion if their lengths differ by at most this share, and their positions (RMS) by this share of
 # the range of the joint that moves most.
@@ -23,6 +24,8 @@ class RepeatedRuns:
 
     floor: FloatArray
     pairs: int
+
+    __repr__ = short_repr
 
 
 def repeated_runs(runs: Sequence[RobotRun], half_width: float) -> RepeatedRuns:

@@ -36,6 +36,7 @@ from cdtool.identification.friction_curve import (
 from cdtool.identification.torque_lag import MotionColumns, apparent_lag, best_lag
 from cdtool.plain_text import counted
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 # Fewer equations than this identify nothing.
 _FEWEST_EQUATIONS = 50
@@ -108,6 +109,8 @@ class Residuals:
     friction: FloatArray
     residual: FloatArray
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class ForceError:
@@ -158,6 +161,8 @@ class PredictionModel:
     shape: FrictionShape
     mass: float
     coefficients: FloatArray
+
+    __repr__ = short_repr
 
     def force(self, run: FilteredRun) -> FloatArray:
         """Return the low-passed force (n,); NaN where the run is incomplete or moves in a direction not learned."""
@@ -347,6 +352,8 @@ class _Equations:
     rows: Sequence[IntArray]
     is_delayed: bool
 
+    __repr__ = short_repr
+
     @property
     def block(self) -> IntArray:
         """Return the strokes as blocks (m,); they are cut where a direction has fewer than 3."""
@@ -491,6 +498,8 @@ class _Solution:
     method: Method
     levels: tuple[FrictionLevel, ...]
     stribeck: tuple[float, float] | None = None  # Stribeck speed and its standard error
+
+    __repr__ = short_repr
 
     def value(self, **shares: float) -> tuple[float, float]:
         """Return a combination of named coefficients with its standard error."""
@@ -794,6 +803,8 @@ class _Samples:
     is_fast: BoolArray
     fold: IntArray
     columns: dict[FrictionShape, FloatArray]
+
+    __repr__ = short_repr
 
     def fitted(self, form: FrictionForm, chosen: BoolArray, loss: Loss) -> PredictionModel | None:
         """Return the model of a form with the smallest residual in the chosen rows; None with too few of them."""

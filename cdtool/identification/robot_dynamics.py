@@ -43,6 +43,7 @@ from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 Index = npt.NDArray[np.int64]
 
@@ -128,6 +129,8 @@ class TorqueError:
     cross_validated: FloatArray
     previous: FloatArray
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
@@ -142,6 +145,8 @@ class LeftOut:
     previous: FloatArray
     joints: Index
     blocks: Index
+
+    __repr__ = short_repr
 
     def of_joint(self, joint: int, is_previous: bool = False) -> FloatArray:
         """Return the residuals of a joint."""
@@ -184,6 +189,8 @@ class Equations:
     times: FloatArray
     runs: FloatArray
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class RobotFit:
@@ -204,6 +211,8 @@ class RobotFit:
     left_out: LeftOut
     condition_number: float
     equations: Equations
+
+    __repr__ = short_repr
 
 
 def identify_robot(runs: Sequence[RobotRun], machine: CoupledMachine, what: RobotParameters | None = None) -> RobotFit:
@@ -297,6 +306,8 @@ class Window:
     weights: FloatArray
     slope: FloatArray
     step: int
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, half_width: float, period: float) -> Window:
@@ -404,6 +415,8 @@ class _Solution:
     unbounded: FloatArray
     covariance: FloatArray
     blocks: Index
+
+    __repr__ = short_repr
 
     @property
     def block_count(self) -> int:
@@ -527,6 +540,8 @@ class _Transfer:
     excitation: FloatArray
     uncertainty: FloatArray
     together: float
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, solution: _Solution) -> _Transfer:

@@ -15,6 +15,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings.channels import DerivedSpeed
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 # A derivative is that of the cubic that fits best over this time to either side [s], or this number of samples.
 _HALF_WIDTH, _FEWEST_BESIDE = 0.05, 3
@@ -35,6 +36,8 @@ class RobotRun:
     position: FloatArray
     speed: FloatArray
     derived: frozenset[str] = field(default_factory=frozenset)
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         shape = np.shape(self.torque)

@@ -33,6 +33,7 @@ from cdtool.identification.estimate import (
 from cdtool.identification.observed_slope import observed_slope
 from cdtool.identification.speed_controller_kernel import PARAMETER_ORDER, simulate_controller
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 SECTION = "model.controller"
 
@@ -147,6 +148,8 @@ class _Sections:
     demand: FloatArray
     commands: FloatArray
 
+    __repr__ = short_repr
+
     def __len__(self) -> int:
         return len(self.output)
 
@@ -207,6 +210,8 @@ class _Fit:
     model: _Model
     residual: FloatArray
     jacobian: FloatArray
+
+    __repr__ = short_repr
 
     @property
     def cost(self) -> float:
@@ -386,6 +391,8 @@ class _Uncertainty:
 
     statistical: FloatArray
     systematic: FloatArray
+
+    __repr__ = short_repr
 
     @property
     def total(self) -> FloatArray:

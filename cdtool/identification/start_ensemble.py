@@ -12,6 +12,7 @@ import numpy as np
 
 from cdtool.identification.axis_run import AxisRun
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 # What is averaged: the rest before the start and the motion after it [s].
 BEFORE, AFTER = 0.3, 2.0
@@ -45,6 +46,8 @@ class StartEnsemble:
     nominal_speed: float
     members: tuple[tuple[int, int], ...]
 
+    __repr__ = short_repr
+
     def __len__(self) -> int:
         return len(self.mean["torque"])
 
@@ -56,6 +59,8 @@ class _Start:
     direction: int
     speed: float
     member: tuple[int, int]
+
+    __repr__ = short_repr
 
 
 def start_ensembles(runs: Sequence[AxisRun], before: float = BEFORE, after: float = AFTER) -> tuple[StartEnsemble, ...]:

@@ -23,6 +23,7 @@ from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import IdentificationError
 from cdtool.identification.load_cell_contact import contact_force
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 # Standard deviation of the low-pass of all channels [s].
 _SMOOTHING = 0.05
@@ -63,6 +64,8 @@ class _PressAndRelease:
     force: FloatArray
     sign: FloatArray
     period: float
+
+    __repr__ = short_repr
 
 
 def identify_torque_scale(

@@ -28,6 +28,7 @@ from cdtool.identification.filtered_regression import (
     shifted,
 )
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # A lag is there if it is this many times its standard error, and explains this share of the residual's variance.
 _SIGNIFICANT, _LEAST_EXPLAINED = 3.0, 0.05
@@ -44,6 +45,8 @@ class MotionColumns:
     run: FilteredRun
     columns: FloatArray
     rows: IntArray
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from cdtool.impact.contact_laws.base import ContactLaw, KeepsIndentation, Stores
 from cdtool.impact.effort import bounded
 from cdtool.impact.impact import Collision, Impact
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # The state: penetration, V_1, V_2, impulse, contact work, friction loss.
 _DEPTH, _SPEED_1, _SPEED_2, _IMPULSE, _WORK, _FRICTION = range(6)
@@ -42,6 +43,8 @@ class _Stretch:
     start: float
     end: float
     event: int | None
+
+    __repr__ = short_repr
 
     def forces(self, times: FloatArray) -> FloatArray:
         """Force [N] at times (n,)."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from cdtool.impact.restitution import Restitution, newton, poisson, stronge
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Impact:
     turn: int
     peak_force: float
     separated: bool
+
+    __repr__ = short_repr
 
     @property
     def duration(self) -> float:

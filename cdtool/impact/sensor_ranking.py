@@ -21,6 +21,7 @@ from cdtool.impact.sensors import QUANTITIES, Sensor
 from cdtool.impact.transmission import ElasticTransmission
 from cdtool.impact.transmission_simulation import SimulatedMotion, Start, simulate_impact
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 _SAMPLES = 10_000
 # A change that saves less than this share of the time is not a remedy.
@@ -40,6 +41,8 @@ class ImpactCase:
     obstacle: HuntCrossley
     speed: float
     window: float = 0.5
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         require_positive("speed", self.speed, "m/s")
@@ -82,6 +85,8 @@ class SensorResponse:
     remedy: str
     saving: float | None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Ranking:
@@ -98,6 +103,8 @@ class Ranking:
     contact_force: FloatArray
     swing_duration: float
     rigidity: Rigidity
+
+    __repr__ = short_repr
 
     @property
     def peak_force(self) -> float:

@@ -14,6 +14,7 @@ from cdtool.impact.drives import Drive
 from cdtool.impact.effort import bounded
 from cdtool.impact.transmission import Transmission
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 _MOST_CONTACTS = 200
 _SAMPLES_PER_CONTACT = 1000
@@ -63,6 +64,8 @@ class SimulatedMotion:
     motor_torque: FloatArray
     drive_force: FloatArray
     contacts: tuple[SimulatedContact, ...]
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

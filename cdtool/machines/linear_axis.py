@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from cdtool.machines.axis import Axis
 from cdtool.machines.joint_machine import LINEAR_UNITS
+from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,8 @@ class LinearAxis(Axis):
 
     inertia_key: ClassVar[str] = "load_mass"
     ratio_unit: ClassVar[str] = "m/rad"
+
+    __repr__ = short_repr
 
     @property
     def load_units(self) -> dict[str, str]:

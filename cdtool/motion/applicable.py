@@ -17,6 +17,7 @@ from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.speed_range import SpeedRange
 from cdtool.motion.strokes import Stroke
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 # What a threshold was learned for: one class, or several and the speeds between them.
 Motion = MotionClass | SpeedRange
@@ -33,6 +34,8 @@ class Judging:
     stroke: int
     motion: int
     where: BoolArray
+
+    __repr__ = short_repr
 
 
 def judging_classes(

@@ -10,6 +10,7 @@ import numpy as np
 from cdtool.clock import previous_value
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 ALIGNMENTS = ("time_then_position", "time", "position")
 # Shares of the nominal speed at which the stroke has begun, and at which it runs.
@@ -30,6 +31,8 @@ class Progress:
     elapsed: FloatArray
     travel: FloatArray
     running: BoolArray
+
+    __repr__ = short_repr
 
     def part(self, rows: slice) -> Progress:
         """Return the progress at some of the samples."""

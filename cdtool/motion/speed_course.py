@@ -16,6 +16,7 @@ from cdtool.kernels import READ_ONLY, kernel, read_only
 from cdtool.motion.progress import ALIGNMENTS, CONFIRM, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 
 # A speed fits within this many spreads of the mean.
 SPREADS = 5.5
@@ -65,6 +66,8 @@ class SpeedCurve(SendsFields):
     mean: FloatArray
     spread: FloatArray
 
+    __repr__ = short_repr
+
     @property
     def last(self) -> float:
         """The last grid point but one."""
@@ -86,6 +89,8 @@ class SpeedCourse(SendsFields):
     alignment: str
     by_time: SpeedCurve
     by_travel: SpeedCurve
+
+    __repr__ = short_repr
 
     @cached_property
     def content(self) -> tuple[object, ...]:

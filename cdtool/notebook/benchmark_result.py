@@ -16,7 +16,7 @@ from cdtool.evaluation.summary import FIGURES
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.html_table import html_table
 from cdtool.notebook.presenting import presented
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, shorten
 from cdtool.remote.remote_path import location
 from cdtool.workflows.benchmark.benchmark import Benchmark
 from cdtool.workflows.benchmark.benchmark import benchmark as run_benchmark
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+# A repr is one line.
+_LONGEST_HEADLINE = 100
 _COUNTS = ("contacts", "detected", "missed", "not_assessable", "false_alarms", "operations", "hours")
 _SHOWN = ("group", "detector", "detected", "missed", "not assessable", "median [ms]", "mean [ms]", "false alarms")
 
@@ -209,8 +211,7 @@ class BenchmarkResult:
                 (results.recordings, "recording"),
             )
         )
-        headline = self.headline if len(self.headline) <= _LONGEST_HEADLINE else f"{self.headline[:_LONGEST_HEADLINE]}..."
-        return f"BenchmarkResult({size}: {headline})"
+        return f"BenchmarkResult({size}: {shorten(self.headline, _LONGEST_HEADLINE)})"
 
     def _repr_html_(self) -> str:
         """Return the statistics as a table, which a notebook shows."""
@@ -228,9 +229,6 @@ class BenchmarkResult:
             for item in self.evaluated.summaries
         ]
         return html_table(f"Benchmark: {self.headline}", _SHOWN, rows)
-
-
-_LONGEST_HEADLINE = 100
 
 
 @dataclass(frozen=True)
@@ -302,14 +300,14 @@ def _described(figure: Any, description: str) -> Figure:
 benchmark = presented(
     run_benchmark,
     BenchmarkResult.of,
-    "BenchmarkResult\n    DataFrames, figures and reports. Logs that cannot be read or scored are in `skipped`; so is a\n"
-    "    detector without one of its channels, all contacts of which are not assessable.",
+    "BenchmarkResult\n    DataFrames, figures and reports. Logs that cannot be read or scored are in `skipped`; so is "
+    "a detector\n    without one of its channels, all contacts of which are not assessable.",
 )
 score = presented(
     run_score,
     BenchmarkResult.of,
-    "BenchmarkResult\n    As that of `benchmark`. Of the file's limits, those on `*` and on detectors of the trigger file\n"
-    "    are checked.",
+    "BenchmarkResult\n    As that of `benchmark`. Of the file's limits, those on `*` and on detectors of the trigger "
+    "file are\n    checked.",
 )
 
 

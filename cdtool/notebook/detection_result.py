@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
@@ -130,6 +130,7 @@ class DetectionResult:
 
         parts = [item.statistic for item in self.detections]
         time = np.concatenate([np.empty(0), *(part.time for part in parts)])
+        names = pd.Index([item.name for item in Status])
         columns: dict[str, object] = {}
         for column, joint in enumerate(self.joints):
             curves = {
@@ -139,7 +140,7 @@ class DetectionResult:
             }
             columns |= {f"{joint} {name}": np.concatenate([np.empty(0), *curve]) for name, curve in curves.items()}
             status = np.concatenate([np.empty(0, np.uint8), *(part.status[:, column] for part in parts)])
-            columns[f"{joint} status"] = pd.Categorical.from_codes(status, [item.name for item in Status])
+            columns[f"{joint} status"] = pd.Categorical.from_codes(status.astype(np.int64), names)
         return pd.DataFrame(columns, index=pd.Index(time, name="time_s"))
 
     def plot(self) -> Figure:
@@ -151,7 +152,7 @@ class DetectionResult:
         return figure
 
     def __repr__(self) -> str:
-        return f"DetectionResult({self.recording.name}, {self._detector}: {', '.join(self._words())})"
+        return f"DetectionResult({PurePath(self.recording.name).name}, {self._detector}: {', '.join(self._words())})"
 
     @property
     def _detector(self) -> str:
@@ -307,15 +308,9 @@ def _html(runs: Sequence[DetectionResult], caption: str, note: str) -> str:
     return html_table(caption, headings, rows, note)
 
 
-@overload
-def detect_logs(logs: str | Path, options: DetectionOptions) -> DetectionResult: ...
-
-
-@overload
-def detect_logs(logs: Sequence[str | Path], options: DetectionOptions) -> DetectionResults: ...
-
-
-def detect_logs(logs: str | Path | Sequence[str | Path], options: DetectionOptions) -> DetectionResult | DetectionResults:
+def detect_logs(
+    logs: str | Path | Sequence[str | Path], options: DetectionOptions
+) -> DetectionResult | DetectionResults:
     """Run one detector over one log or many: with a signature, with limits, or with those of the first seconds.
 
     Parameters

@@ -13,7 +13,9 @@ _Plain = TypeVar("_Plain")
 _Shown = TypeVar("_Shown")
 
 
-def presented(run: Callable[_Given, _Plain], show: Callable[[_Plain], _Shown], returns: str) -> Callable[_Given, _Shown]:
+def presented(
+    run: Callable[_Given, _Plain], show: Callable[[_Plain], _Shown], returns: str
+) -> Callable[_Given, _Shown]:
     """Return a function with the parameters of `run` whose result is what `show` makes of it.
 
     Its docstring is that of `run` with `returns` as the section Returns.

@@ -12,6 +12,7 @@ from cdtool.clock import previous_value
 from cdtool.detection import Band, Signal
 from cdtool.errors import NothingValidError, SignatureError, UsageError
 from cdtool.recording import FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.first_order import filtered_slope, low_passed
 from cdtool.thresholds.sections import sections
@@ -35,6 +36,8 @@ class FittedAdaptive:
     spread: FloatArray
     signed: bool
     safety_factor: float
+
+    __repr__ = short_repr
 
     def with_safety_factor(self, factor: float) -> FittedAdaptive:
         """Return the threshold with its limits `factor` standard deviations beyond what the references explain."""

@@ -19,6 +19,7 @@ from cdtool.motion import MotionClass
 from cdtool.motion.progress import ALIGNMENTS, RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.motion.speed_course import SpeedCourse
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.running_level_kernel import follow_level
 from cdtool.thresholds.signature_curve import Curve, resample
 from cdtool.value_words import value_in_words
@@ -66,6 +67,8 @@ class FittedSignature(SendsFields):
     by_position: Curve
     adaptive_level: float = 0.0
     speed_range: bool = False
+
+    __repr__ = short_repr
 
     def evaluate(self, recording: Recording, signal: Signal) -> tuple[Signal, Band]:
         """Return the signal and its band on the signal's clock; raises RecordingError without speed and position.

@@ -10,6 +10,7 @@ from cdtool.detection import Signal
 from cdtool.errors import SignatureError, UsageError
 from cdtool.motion.progress import Progress
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve
 
@@ -112,6 +113,8 @@ class _Part:
     first: tuple[FloatArray, FloatArray]
     updated: tuple[FloatArray, FloatArray]
     spread: FloatArray
+
+    __repr__ = short_repr
 
     def check(self, reserve: float, unit: str) -> None:
         """Raise SignatureError if a limit is lost, or further than `reserve` spreads from the first one."""

@@ -12,6 +12,7 @@ from cdtool.detection import Band, Signal
 from cdtool.errors import UsageError
 from cdtool.motion import MotionClass
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import with_limits
 from cdtool.thresholds.common_class import common_class
 from cdtool.thresholds.fitted_signature import known
@@ -38,6 +39,8 @@ class FittedTrendTable:
     limits: tuple[FittedLimit, ...]
     time_constant: float
     motion: MotionClass | None
+
+    __repr__ = short_repr
 
     @property
     def safety_factor(self) -> float:

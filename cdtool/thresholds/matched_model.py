@@ -17,6 +17,7 @@ from cdtool.detection import Evidence, Signal, Status, StatusArray
 from cdtool.errors import NothingValidError
 from cdtool.motion import MotionClass
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import exceedance
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.matched_banks_kernel import (
@@ -72,6 +73,8 @@ class Deviation:
     start: int
     place: npt.NDArray[np.int64]
     inside: BoolArray
+
+    __repr__ = short_repr
 
     def times(self, factor: float) -> Deviation:
         """Return the deviation times a factor."""
@@ -131,6 +134,8 @@ class MatchedModel(SendsFields):
     learned: FloatArray
     of_banks: FloatArray
     speeds: tuple[float, float]
+
+    __repr__ = short_repr
 
     @classmethod
     def blank(

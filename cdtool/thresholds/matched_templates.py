@@ -10,6 +10,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.matched_banks_kernel import FIRST, LAST
 
 # From this length on, the mean innovation before a template is subtracted [s].
@@ -168,6 +169,8 @@ class Design:
     prior: FloatArray
     slack: FloatArray
     reserve: FloatArray
+
+    __repr__ = short_repr
 
     @property
     def arguments(self) -> tuple[np.ndarray, ...]:

@@ -19,6 +19,7 @@ from cdtool.kernels import READ_ONLY, kernel
 from cdtool.motion import MotionClass
 from cdtool.motion.progress import RUNNING_SHARE, START_SHARE, Progress, progress
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.curve_lookup import look_up
 from cdtool.thresholds.signature_curve import Curve, resample
 
@@ -53,6 +54,8 @@ class NormalChannel:
     samples: NormalCurves
     level: NormalCurves
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Comparison(StoresDerived):
@@ -75,6 +78,8 @@ class Comparison(StoresDerived):
     reach: FloatArray
     level_reach: FloatArray
 
+    __repr__ = short_repr
+
     @cached_property
     def distance(self) -> FloatArray:
         """Return the distance of the values from the mean (n, J) [spreads]; NaN if unknown."""
@@ -94,6 +99,8 @@ class NormalMotion:
     joints: tuple[str, ...]
     runs: int
     channels: Mapping[str, NormalChannel]
+
+    __repr__ = short_repr
 
     def compare(
         self, recording: Recording, channel: str, start: float = -math.inf, end: float = math.inf
@@ -404,6 +411,8 @@ class NormalCurves(SendsFields):
     by_travel: Curve | None
     farthest_by_time: FloatArray
     farthest_by_travel: FloatArray
+
+    __repr__ = short_repr
 
     def at(self, where: Progress, least: float) -> tuple[FloatArray, FloatArray]:
         """Return mean and spread (n, J) at each location of a run; NaN where there are too few runs.

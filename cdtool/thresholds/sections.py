@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from cdtool.detection import Signal, Status
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 # (values, steps) -> output, all (m,); step: time since the previous sample [s], infinite where a section begins.
 ColumnFilter = Callable[[FloatArray, FloatArray], FloatArray]
@@ -26,6 +27,8 @@ class Sections:
     index: npt.NDArray[np.intp]
     step: FloatArray
     elapsed: FloatArray
+
+    __repr__ = short_repr
 
 
 def section_bounds(step: FloatArray) -> list[tuple[int, int]]:

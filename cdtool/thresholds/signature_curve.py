@@ -16,6 +16,7 @@ from cdtool.kernels import READ_ONLY, kernel, read_only
 from cdtool.motion.progress import Progress
 from cdtool.motion.smoothing import moving_mean
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.curve_lookup import LearnedColumn
 
 # A grid point has a limit once this share of the runs has been there.
@@ -40,6 +41,8 @@ class Curve(SendsFields):
     count: FloatArray
     mean: FloatArray
     squares: FloatArray
+
+    __repr__ = short_repr
 
     @classmethod
     def empty(cls, step: float, window: float, end: float, joints: int) -> Self:

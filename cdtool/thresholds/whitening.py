@@ -18,6 +18,7 @@ from cdtool.detection import Signal, Status
 from cdtool.errors import NothingValidError
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.recent import Recent
 from cdtool.thresholds.sections import filtered, section_bounds, sections
@@ -50,6 +51,8 @@ class Whitening:
     coefficients: FloatArray
     spread: FloatArray
     period: float
+
+    __repr__ = short_repr
 
     @classmethod
     def learned(cls, rule: Signature, order: int, pairs: Sequence[tuple[Recording, Signal]]) -> Self:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from cdtool.detectors.base import Detector
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import Threshold
 from cdtool.thresholds.stored import rule_to_dict
 
@@ -67,6 +68,8 @@ class Measured:
     assessable: BoolArray
     alarming: npt.NDArray[np.int64]
     reason: str = ""
+
+    __repr__ = short_repr
 
     @classmethod
     def unusable(cls, reason: str) -> Measured:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 # The multiples of a limit for which latencies are known: up to four times, in steps of 3 %.
 MULTIPLIERS: FloatArray = 1.03 ** np.arange(48.0)
@@ -35,6 +36,8 @@ class HeldOut:
     ratios: FloatArray
     seconds: float
     reason: str = ""
+
+    __repr__ = short_repr
 
     @classmethod
     def unusable(cls, reason: str) -> HeldOut:
@@ -71,6 +74,8 @@ class Pooled:
     alarming: int
     free: int
     multiplier: float
+
+    __repr__ = short_repr
 
 
 def pooled(budget: Budget, folds: Sequence[HeldOut], contacts: int, *, corrects: bool) -> Pooled | None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.tuning.candidate import Candidate, Measured
 from cdtool.tuning.coordinate_search import CoordinateSearch
 from cdtool.tuning.objective import Objective
@@ -34,6 +35,8 @@ class Scored:
     debounce: int
     costs: FloatArray
     score: float
+
+    __repr__ = short_repr
 
 
 @dataclass

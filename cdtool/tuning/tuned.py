@@ -13,6 +13,7 @@ from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_share
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.tuning.candidate import Candidate
 from cdtool.tuning.held_out import Pooled
 from cdtool.tuning.objective import Goal, Objective
@@ -50,6 +51,8 @@ class ChoiceResults:
     free: int
     score: float
     costs: FloatArray
+
+    __repr__ = short_repr
 
     @property
     def alarm_share(self) -> Interval:
@@ -172,6 +175,8 @@ class TunedDetector:
     rejected: tuple[Rejection, ...] = ()
     tried_costs: tuple[tuple[float, ...], ...] = ()
     why_not_nested: str = ""
+
+    __repr__ = short_repr
 
     @property
     def honest(self) -> ChoiceResults:

@@ -12,6 +12,7 @@ from cdtool.evaluation.coverage_map import CellKey, CoverageMap, MappedContact, 
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.traces.choice import MOST_SAMPLED, MOST_SLOW
 from cdtool.evaluation.traces.trace import Trace
+from cdtool.short_repr import short_repr
 from cdtool.workflows.benchmark.benchmark import benchmark
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
 from cdtool.workflows.benchmark.with_injected import injected_logs, with_groups
@@ -39,6 +40,8 @@ class Coverage:
     findings: tuple[RecordingFinding, ...]
     traces: Mapping[str, Trace] = field(default_factory=dict)
     inputs: tuple[Path, ...] = ()
+
+    __repr__ = short_repr
 
 
 def coverage(

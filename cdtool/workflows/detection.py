@@ -117,7 +117,6 @@ def detect_log(log: str | Path, options: DetectionOptions) -> Detected:
     return found[0]
 
 
-
 @dataclass(frozen=True)
 class DetectedRuns:
     """The results for the runs of a log, in its order; `skipped` are runs left out, `findings` concern the log."""
@@ -182,7 +181,6 @@ def detect_log_runs(log: str | Path, options: DetectionOptions) -> DetectedRuns:
     if not found:
         raise RecordingError(f"{path}: no run can be used, the first: {skipped[-1].reason}", "see cdtool info")
     return DetectedRuns(tuple(found), tuple(skipped), tuple(findings))
-
 
 
 @dataclass(frozen=True)

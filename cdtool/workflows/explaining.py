@@ -10,6 +10,7 @@ from cdtool.evaluation.explanation.explanation import Explanation, explain_opera
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.machine_file import MachineFile
 from cdtool.pipeline import Detection
+from cdtool.short_repr import short_repr
 from cdtool.workflows.detection import Detected, detect_log_runs
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.detector_inputs import inputs_of
@@ -22,6 +23,8 @@ class Explained:
 
     found: Detected
     explanations: tuple[tuple[Explanation, ...], ...]
+
+    __repr__ = short_repr
 
     @property
     def events(self) -> list[tuple[Detection, Explanation]]:
@@ -78,6 +81,8 @@ class ExplainedRuns:
     runs: tuple[Explained, ...]
     skipped: tuple[Skipped, ...] = ()
     findings: tuple[RecordingFinding, ...] = ()
+
+    __repr__ = short_repr
 
 
 def explain_log_runs(log: str | Path, options: DetectionOptions) -> ExplainedRuns:

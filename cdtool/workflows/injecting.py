@@ -13,6 +13,7 @@ from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.reading import read_as_logged
 from cdtool.log_section import LogSection
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.tables import read_toml
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
@@ -34,6 +35,8 @@ class Injected:
     folder: str
     logs: InjectedLogs
     copied: int
+
+    __repr__ = short_repr
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:

@@ -23,6 +23,7 @@ from cdtool.evaluation.statistics.spread import Spread, spread_of
 from cdtool.evaluation.summary import campaigns
 from cdtool.plain_text import counted, digits
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.workflows.keyword_options import by_keywords
 
 
@@ -44,6 +45,8 @@ class Answer:
     words: str
     needs: tuple[Need, ...]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -60,6 +63,8 @@ class Plan:
 
     answers: tuple[Answer, ...]
     measured: Measured | None = None
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, kw_only=True)

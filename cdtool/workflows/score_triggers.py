@@ -25,6 +25,7 @@ from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.registry import plugin_packages
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.benchmark.log_outcome import LogOutcome, Wanted, outcome_of
@@ -49,6 +50,8 @@ class Score:
     evaluated: Evaluated
     traces: tuple[Trace, ...]
     inputs: tuple[Path, ...] = ()
+
+    __repr__ = short_repr
 
 
 def score(

@@ -14,7 +14,8 @@ from cdtool.clock.stamps import EPOCH, ClockCleaner
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import SampleGaps, StrayStamps
-from cdtool.workflows.detection import detect
+from cdtool.workflows.detection import detect_log
+from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.information import info
 
 COUNT = 6106
@@ -131,7 +132,7 @@ def test_one_stray_stamp_does_not_change_the_verdict(tmp_path, row, stamp):
     log = tmp_path / "03.csv"
     log.write_text("\n".join(lines) + "\n")
     whole, stray = (
-        detect(path, gate / "machine.toml", detector="momentum", limit=[300.0])
+        detect_log(path, DetectionOptions(gate / "machine.toml", detector="momentum", limit=[300.0]))
         for path in (gate / "stiff" / "03.csv", log)
     )
     assert [alarm.time for item in whole.detections for alarm in item.verdict.alarms]

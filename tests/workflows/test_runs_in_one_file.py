@@ -254,8 +254,8 @@ def test_a_benchmark_file_detects_and_explains_a_run_with_the_window_of_its_grou
     path = folder / "windows.toml"
     path.write_text(together.read_text().replace("[impacts.stiff]", "[impacts.stiff]\nwindow_s = 0.7"))
     found = cdtool.detect(f"{folder}/all.csv#stiff_03", benchmark=path)
-    assert found.window == 0.7 and found.contacts
-    assert cdtool.detect(f"{folder}/all.csv#soft_03", benchmark=path).window == 1.0
+    assert found.detected.window == 0.7 and len(found.contacts)
+    assert cdtool.detect(f"{folder}/all.csv#soft_03", benchmark=path).detected.window == 1.0
     assert [run.recording.name for run in cdtool.detect_runs(folder / "all.csv", benchmark=path).runs] == [
         f"all.csv#{key}" for key in IDS
     ]

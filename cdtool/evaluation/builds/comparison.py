@@ -33,6 +33,7 @@ from cdtool.evaluation.comparison import SIGNIFICANT, check_significance
 from cdtool.evaluation.results import Results
 from cdtool.exit_status import Fact
 from cdtool.plain_text import counted, shorten
+from cdtool.short_repr import short_repr
 
 # Provenance keys of settings that define the results, and where the benchmark file sets them.
 _RULES = {
@@ -96,6 +97,8 @@ class BuildComparison:
     only_old: tuple[str, ...]
     only_new: tuple[str, ...]
     notes: tuple[str, ...]
+
+    __repr__ = short_repr
 
     @property
     def facts(self) -> tuple[Fact, ...]:

@@ -25,6 +25,7 @@ from cdtool.evaluation.results import ContactResult, ExposureResult, Results
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.paired import holm
 from cdtool.evaluation.summary import campaigns
+from cdtool.short_repr import short_repr
 
 NOTHING_SHOWN: Final = "no change shown"
 INCONCLUSIVE: Final = "inconclusive"
@@ -65,6 +66,8 @@ class Question:
     complete_change_p: float
     ranges: Ranges | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class BuildRow:
@@ -83,6 +86,8 @@ class BuildRow:
     one_not_assessable: int
     questions: tuple[Question, ...] = ()
     words: str = ""
+
+    __repr__ = short_repr
 
     @property
     def outcome(self) -> Outcome:

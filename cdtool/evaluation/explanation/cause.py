@@ -26,6 +26,7 @@ from cdtool.evaluation.explanation.departure import Track
 from cdtool.evaluation.explanation.transient import Loss, Transient, losses, shown_by_position, transients
 from cdtool.motion import MotionClass
 from cdtool.recording import Recording
+from cdtool.short_repr import short_repr
 
 # Transients and lost samples this long before the signal's last exit from its band may be the cause [s].
 _SHORTLY = 0.3
@@ -75,6 +76,8 @@ class Cause:
     shifts: tuple[Shift, ...] = ()
     transient: Transient | None = None
     loss: Loss | None = None
+
+    __repr__ = short_repr
 
     @property
     def channel(self) -> str:

@@ -21,6 +21,7 @@ from cdtool.evaluation.explanation.transient import Transient
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.median_kernel import median_of_known
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels_of
 
 # Two columns of a fit are the same straight line if the determinant is at most this share of its largest value.
@@ -87,6 +88,8 @@ class ComparedChannel:
     raw_level: FloatArray
     running: BoolArray
     limits: Limits
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, channel: str, joint: str, compared: Comparison, j: int) -> Self:

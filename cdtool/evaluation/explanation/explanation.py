@@ -20,6 +20,7 @@ from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.pipeline import Detection
 from cdtool.recording import GROUND_TRUTH, Contact
+from cdtool.short_repr import short_repr
 
 Role = Literal["detection", "further alarm", "in progress", "false alarm", "alarm"]
 
@@ -61,6 +62,8 @@ class AlarmExplanation:
     absent: Absence | None = None
     evidence: Evidence | None = None
 
+    __repr__ = short_repr
+
     @property
     def zero(self) -> float:
         """Return the time from which others count [s]: the contact's onset, else the alarm."""
@@ -92,6 +95,8 @@ class MissExplanation:
     inputs: tuple[str, ...]
     runs: int = 0
     absent: Absence | None = None
+
+    __repr__ = short_repr
 
     @property
     def zero(self) -> float:

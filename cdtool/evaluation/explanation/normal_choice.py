@@ -11,6 +11,7 @@ import numpy as np
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.median_kernel import median_of
 from cdtool.recording import FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.normal_motion import Comparison, NormalMotion
 
 # A class of motion fits if the leading joint's speed is within this many spreads of it, in the median up to the event.
@@ -37,6 +38,8 @@ class NormalMotions:
 
     motions: tuple[NormalMotion, ...] = ()
     absent: Absence = Absence.BY_HAND
+
+    __repr__ = short_repr
 
     def for_one_operation(self) -> NormalMotions:
         """Return a copy for the alarms of several detectors in one operation: it compares each channel only once."""

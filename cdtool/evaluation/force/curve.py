@@ -17,6 +17,7 @@ from cdtool.evaluation.truth.missing_samples import PERIODS, CellClock, cell_sam
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.motion import leading_joint
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
@@ -48,6 +49,8 @@ class ForceTimeCurve:
     before: float = float("nan")
     hole: float = 0.0
     uncertainty: float = 0.0
+
+    __repr__ = short_repr
 
     @property
     def saturated(self) -> bool:

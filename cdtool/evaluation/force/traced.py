@@ -14,6 +14,7 @@ from cdtool.evaluation.results import ForceResult, Results
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.rest_level import rest_before
 from cdtool.recording import Contact, FloatArray
+from cdtool.short_repr import short_repr
 
 # Onsets of a trace and of its row are the same number; a file may have rounded one.
 _SAME_ONSET = 1e-6
@@ -35,6 +36,8 @@ class TracedForce:
     force: FloatArray
     verdict: ForceVerdict
     alarms: Mapping[str, float]
+
+    __repr__ = short_repr
 
 
 def force_profiles(results: Results) -> dict[str, ForceProfile]:

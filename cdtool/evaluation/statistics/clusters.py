@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from cdtool.errors import UsageError
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 IntArray = npt.NDArray[np.intp]
 # More clusters than this are put together before they are resampled, flipped or exchanged.
@@ -37,6 +38,8 @@ class Clusters:
     values: FloatArray
     number: IntArray
     counts: IntArray
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.counts)

@@ -21,6 +21,7 @@ from cdtool.evaluation.synchronisation.smoothing import POINTS_PER_WIDTH, REACH,
 from cdtool.findings.channels import DerivedSpeed, IntegratedPosition
 from cdtool.plain_text import counted
 from cdtool.recording import Contact, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 # Delays up to this are found [s].
 LONGEST_DELAY = 0.25
@@ -58,6 +59,8 @@ class _Part:
     values: FloatArray
     order: int
     factor: float
+
+    __repr__ = short_repr
 
     @cached_property
     def period(self) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.synchronisation.delay import EventDelay
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 # From so many events on, intervals include the scatter between events, and a drift can be estimated.
 LEAST_EVENTS = 4
@@ -120,6 +121,8 @@ class _RobustLine:
     design: FloatArray
     residual: FloatArray
     bound: float
+
+    __repr__ = short_repr
 
     @property
     def scatter(self) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from cdtool.evaluation.synchronisation.smoothing import Grid
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 # Steps of Gauss and Newton; they end when the delay changes by less than this share of the grid's step.
 _STEPS, _ENOUGH = 20, 1e-4
@@ -60,6 +61,8 @@ class SmoothSignal:
 
     grid: Grid
     values: FloatArray
+
+    __repr__ = short_repr
 
 
 def delay_of(

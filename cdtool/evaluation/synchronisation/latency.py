@@ -16,6 +16,7 @@ from typing import Literal
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.synchronisation.combination import clock_line
 from cdtool.evaluation.synchronisation.delay import EventDelay
+from cdtool.short_repr import short_repr
 
 # What connects a channel with its reference.
 RestsOn = Literal["derivative", "two masses", "momentum balance", "deceleration"]
@@ -85,6 +86,8 @@ class ChannelLatency:
     stiff: Interval = _UNKNOWN
     soft: Interval = _UNKNOWN
     reason: str = ""
+
+    __repr__ = short_repr
 
     @property
     def assessable(self) -> bool:

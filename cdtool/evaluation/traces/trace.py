@@ -15,6 +15,7 @@ from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
 from cdtool.recording import Contact, FloatArray
+from cdtool.short_repr import short_repr
 
 Span = tuple[float, float]
 
@@ -32,6 +33,8 @@ class StatisticCurve:
     lower: FloatArray
     upper: FloatArray
     status: StatusArray
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, detection: Detection, joint: int) -> Self:
@@ -95,6 +98,8 @@ class Panel:
     why: tuple[str, ...] = ()
     rearmed: tuple[float, ...] = ()
 
+    __repr__ = short_repr
+
     @property
     def is_not_assessable(self) -> bool:
         """Whether no sample was assessable."""
@@ -121,6 +126,8 @@ class Trace:
     panels: tuple[Panel, ...]
     joints: int = 1
     chosen: str = ""
+
+    __repr__ = short_repr
 
     @property
     def shown(self) -> Contact | None:

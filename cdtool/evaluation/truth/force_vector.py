@@ -23,6 +23,7 @@ from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.evaluation.truth.rest_level import RunningRest
 from cdtool.evaluation.truth.rest_level_kernels import INTERVAL
 from cdtool.recording import BoolArray, Contact, FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 # The level of an axis after a contact that was in progress at the start is the median of this interval after it [s].
 _AFTER = 4 * INTERVAL
@@ -43,6 +44,8 @@ class ForceMagnitude(Series):
     noise: float
     step: float
     pressed_until: float
+
+    __repr__ = short_repr
 
     @property
     def rest(self) -> FloatArray:

@@ -19,6 +19,7 @@ import numpy as np
 
 from cdtool.detection import Alarm, Signal, Verdict
 from cdtool.recording import Contact
+from cdtool.short_repr import short_repr
 
 # What raises an alarm again within this time [s] is the same event.
 REARM = 0.5
@@ -45,6 +46,8 @@ class Match:
     watched: float = float("nan")
     reason: str = ""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Matching:
@@ -52,6 +55,8 @@ class Matching:
 
     matches: tuple[Match, ...]
     false_alarms: tuple[Alarm, ...]
+
+    __repr__ = short_repr
 
 
 def windows(contacts: Sequence[Contact], window: float) -> list[tuple[Contact, float, float]]:

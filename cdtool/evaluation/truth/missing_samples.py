@@ -15,6 +15,7 @@ import numpy as np
 
 from cdtool.errors import RecordingError
 from cdtool.recording import FloatArray, Series
+from cdtool.short_repr import short_repr
 
 CLOSE_ENOUGH = 5e-3
 # A step longer than so many periods is no jitter of a regular clock: the force in it is not simply what is beside it.
@@ -28,6 +29,8 @@ class CellClock:
     """The times of the samples of a load cell, `time` (n,) [s], and what its steps are like."""
 
     time: FloatArray
+
+    __repr__ = short_repr
 
     @property
     def period(self) -> float:
@@ -75,6 +78,8 @@ class CellSamples:
 
     clock: CellClock
     force: FloatArray
+
+    __repr__ = short_repr
 
     @property
     def time(self) -> FloatArray:

@@ -12,6 +12,7 @@ from cdtool.evaluation.statistics.trends import ChangeOverRuns
 from cdtool.evaluation.upkeep.deviation import Axis
 from cdtool.motion import MotionClass
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ class JointDrift:
     overall: Shown | None
     local: Shown | None
 
+    __repr__ = short_repr
+
     @property
     def shown(self) -> tuple[Shown, ...]:
         """The changes shown, a location first: it must be inspected before anything is learned."""
@@ -96,6 +99,8 @@ class DriftAudit:
     places: FloatArray
     joints: tuple[JointDrift, ...]
     not_assessable: tuple[tuple[str, str], ...]
+
+    __repr__ = short_repr
 
     @property
     def names(self) -> tuple[str, ...]:

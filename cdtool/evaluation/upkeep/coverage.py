@@ -19,6 +19,7 @@ from cdtool.operations import Operation
 from cdtool.pipeline import judge
 from cdtool.plain_text import counted, digits
 from cdtool.recording import Recording
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature import Signature
 from cdtool.thresholds.signature_curve import COVERAGE
@@ -52,6 +53,8 @@ class Coverage:
     runs_needed: int | None
     factor_needed: float
     gaps: tuple[NoLimit, ...]
+
+    __repr__ = short_repr
 
     @property
     def alarms(self) -> int:

@@ -19,6 +19,7 @@ from cdtool.evaluation.upkeep.deviation import Axis, deviations_of
 from cdtool.motion.progress import Progress
 from cdtool.pipeline import Detection
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 
 # A place has a mean where it holds at least so many samples.
@@ -41,6 +42,8 @@ class Demand:
     shift: FloatArray
     alarm: bool
 
+    __repr__ = short_repr
+
     @property
     def critical_factor(self) -> float:
         """Return the safety factor below which the run alarms."""
@@ -58,6 +61,8 @@ class Places:
     at: FloatArray
     by_time: int
     widths: tuple[float, float]
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, signature: FittedSignature) -> Places:

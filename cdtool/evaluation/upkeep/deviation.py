@@ -18,6 +18,7 @@ from cdtool.detection import Status
 from cdtool.evaluation.sweep import critical_factor
 from cdtool.pipeline import Detection
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.signature_curve import Curve
 
@@ -41,6 +42,8 @@ class Deviations:
     overall: FloatArray
     pooled: FloatArray
     beyond: FloatArray
+
+    __repr__ = short_repr
 
 
 def axis_of(signature: FittedSignature) -> Axis:

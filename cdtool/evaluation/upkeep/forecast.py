@@ -31,6 +31,7 @@ from cdtool.evaluation.upkeep.season_model import (
 from cdtool.motion import MotionClass
 from cdtool.plain_text import counted
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.fitted_signature import FittedSignature
 
 # Fewer runs or days, or temperatures over less [K], do not show how a machine depends on the weather.
@@ -61,6 +62,8 @@ class Coming:
     step: npt.NDArray[np.intp]
     starts: FloatArray
     runs: int
+
+    __repr__ = short_repr
 
     @classmethod
     def over_range(cls, temperatures: tuple[float, float] | None, begin: float, end: float, runs: int) -> Coming:
@@ -93,6 +96,8 @@ class ForecastCurve:
     high: FloatArray
     share: FloatArray
     beyond: BoolArray
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -291,6 +296,8 @@ class _Surface:
     axes: tuple[FloatArray, ...]
     mean: FloatArray
     std: FloatArray
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, model: SeasonModel, ranges: dict[Regressor, tuple[float, float]]) -> _Surface:

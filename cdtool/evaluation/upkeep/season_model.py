@@ -33,6 +33,7 @@ from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.trends import SIGNIFICANT
 from cdtool.evaluation.upkeep.demand import Demand
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.short_repr import short_repr
 
 Regressor = Literal["temperature", "time"]
 
@@ -91,6 +92,8 @@ class SeasonModel:
     levels: FloatArray
     residuals: FloatArray
     effects: tuple[Effect, ...]
+
+    __repr__ = short_repr
 
     @property
     def explained(self) -> float:

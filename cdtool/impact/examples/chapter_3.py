@@ -21,6 +21,7 @@ from cdtool.impact.restitution import (
     kelvin_voigt_restitution,
 )
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 
 # A body of 1 kg at 0.5 m/s, a stiffness as of plastic on steel with a radius of 1 mm, and a fairly lossy contact.
 _BODIES = Bodies(mass_1=1.0, speed_1=0.5)
@@ -37,6 +38,8 @@ class RestitutionCurve:
     exact: FloatArray
     hunt_crossley: FloatArray
     lankarani_nikravesh: FloatArray
+
+    __repr__ = short_repr
 
 
 def two_bodies() -> Impact:

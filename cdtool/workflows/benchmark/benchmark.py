@@ -25,6 +25,7 @@ from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges
 from cdtool.recording import FloatArray
 from cdtool.registry import plugin_packages
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import (
@@ -64,6 +65,8 @@ class Benchmark:
     seconds: Mapping[str, float]
     inputs: tuple[Path, ...] = ()
     stored: StoreReport | None = None
+
+    __repr__ = short_repr
 
     @property
     def results(self) -> Results:
@@ -235,6 +238,8 @@ class _LogScoring:
     ranges: LearnedRanges
     normals: NormalMotions
     runs: tuple[Operation, ...]
+
+    __repr__ = short_repr
 
     def __call__(
         self, group: str, path: Path, wanted: Wanted | None, detectors: tuple[str, ...] | None

@@ -37,6 +37,7 @@ from cdtool.identification.two_mass import TwoMassFit
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import BoolArray, FloatArray, Recording
+from cdtool.short_repr import short_repr
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification
 from cdtool.workflows.identification.identifying_contacts import scaled
@@ -78,6 +79,8 @@ class UnseenRun:
     moving: BoolArray
     of_runs: int
 
+    __repr__ = short_repr
+
     @property
     def residual(self) -> FloatArray:
         """Return measured minus predicted force (n,) [N, N m]."""
@@ -106,6 +109,8 @@ class StartComparison:
     deviation: Mapping[str, FloatArray]
     modelled: Mapping[str, FloatArray]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class ControllerComparison:
@@ -116,6 +121,8 @@ class ControllerComparison:
     measured: FloatArray
     computed: FloatArray
     is_command: bool
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,6 +35,7 @@ from cdtool.identification.unexplained_torque import without_unexplained
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.workflows.identification.identifying import IdentifiedMachine
 from cdtool.workflows.identification.machine_update import MachineChange
 
@@ -98,6 +99,8 @@ class UnseenTorque:
     predicted: FloatArray
     previous: FloatArray
 
+    __repr__ = short_repr
+
     @property
     def summary(self) -> dict[str, Any]:
         """Return the run, and the RMS of its residuals [N m, N], as JSON values."""
@@ -123,6 +126,8 @@ class JointFrictionCurve:
     speed: FloatArray
     new: FloatArray
     previous: FloatArray
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,6 +296,8 @@ class _Joint:
     fit: RobotFit
     previous: FloatArray
     runs: Sequence[RobotRun]
+
+    __repr__ = short_repr
 
     def unseen(self) -> UnseenTorque | None:
         """Return the torque along the run that is predicted worst, relative to the torque of all runs."""

@@ -21,6 +21,7 @@ from cdtool.formats.source import Format, Source
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
 from cdtool.machine_file import read_machine_file
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.tables import Table
 from cdtool.workflows.information import info
 from cdtool.workflows.init.benchmark_draft import draft_benchmark
@@ -51,6 +52,8 @@ class Drafted:
     left_out: tuple[str, ...]
     findings: tuple[Finding, ...]
     unmapped: tuple[Unmapped, ...] = ()
+
+    __repr__ = short_repr
 
 
 def init(
@@ -116,6 +119,8 @@ class DraftedStudy:
     text: str
     beside: tuple[str, ...]
     skipped: tuple[Skipped, ...]
+
+    __repr__ = short_repr
 
 
 def init_study(

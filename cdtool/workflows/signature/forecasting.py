@@ -20,6 +20,7 @@ from cdtool.evaluation.upkeep.season_model import SeasonRun
 from cdtool.operations import Operation
 from cdtool.pipeline import judge
 from cdtool.remote.remote_path import location, relative_name
+from cdtool.short_repr import short_repr
 from cdtool.signature_file import SignatureFile
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
@@ -81,6 +82,8 @@ class Forecasted:
     learned: int
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
+
+    __repr__ = short_repr
 
 
 def forecast_by(path: str | Path, options: ForecastOptions) -> Forecasted:

@@ -22,6 +22,7 @@ from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
 from cdtool.plain_text import counted
 from cdtool.remote.remote_path import location
+from cdtool.short_repr import short_repr
 from cdtool.signature_file import SignatureFile, with_run
 from cdtool.signature_store import read_signature, update_signature
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
@@ -51,6 +52,8 @@ class CheckedClass:
     coverage: Coverage | None
     drift: DriftAudit | None
 
+    __repr__ = short_repr
+
     @property
     def advice(self) -> str:
         """Return what to do, in one line."""
@@ -66,6 +69,8 @@ class Checked:
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Updated:
@@ -75,6 +80,8 @@ class Updated:
     added: tuple[str, ...]
     refused: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...] = ()
+
+    __repr__ = short_repr
 
 
 def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:

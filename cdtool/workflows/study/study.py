@@ -9,6 +9,7 @@ from pathlib import Path
 from cdtool.impact.sensor_ranking import Ranking, rank_sensors
 from cdtool.impact.waves import WaveCheck, check_waves
 from cdtool.machine_file import read_machine_file
+from cdtool.short_repr import short_repr
 from cdtool.workflows.study.study_file import read_study
 
 
@@ -25,6 +26,8 @@ class SensorStudy:
     ranking: Ranking
     waves: WaveCheck | None
     assumptions: tuple[str, ...]
+
+    __repr__ = short_repr
 
 
 def study_sensors(

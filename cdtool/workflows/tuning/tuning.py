@@ -18,6 +18,7 @@ from cdtool.kernel_warm_up import compile_loaded
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector, signal_of_log
+from cdtool.short_repr import short_repr
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.settings import with_context
@@ -160,6 +161,8 @@ class Tuning:
     is_nested: bool
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
+
+    __repr__ = short_repr
 
 
 def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> Tuning:

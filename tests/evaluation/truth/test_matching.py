@@ -124,7 +124,9 @@ def test_windows_never_overlap(onsets):
 
 
 def test_one_event_on_several_joints_is_one_false_alarm():
-    alarms = [Alarm(2.0 + 0.01 * joint, f"joint {joint}", "above", 2.0, 1.0, joint) for joint in range(6)] + [alarm(4.0)]
+    alarms = [Alarm(2.0 + 0.01 * joint, f"joint {joint}", "above", 2.0, 1.0, joint) for joint in range(6)] + [
+        alarm(4.0)
+    ]
     assert [item.time for item in match(alarms, [CONTACT], statistic()).false_alarms] == [2.0, 4.0]
 
 

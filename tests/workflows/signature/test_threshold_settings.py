@@ -199,7 +199,7 @@ def test_a_signature_file_gets_the_factor_that_a_benchmark_sets_for_the_same_bud
     write_signature(tmp_path / "s.json", learned)
     found = cdtool.detect(door / "hits.csv", door / "machine.toml", signature=tmp_path / "s.json", operations="motion")
     assert [found.detections[i].verdict.outcome for i in (1, 2, 5)] == ["alarm"] * 3
-    assert found.threshold.endswith(f"set for 1/8op on 24 operations, {wanted.alarms} alarms")
+    assert found.detected.threshold.endswith(f"set for 1/8op on 24 operations, {wanted.alarms} alarms")
 
 
 def test_a_factor_set_by_hand_is_refused_with_a_budget_and_shown_without(door):
