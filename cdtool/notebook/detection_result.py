@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, overload
 
 import numpy as np
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+_Settings = ParamSpec("_Settings")
 VERDICTS = ("alarm", "no alarm", "not_assessable")
 
 
@@ -364,7 +365,25 @@ def detect_logs(
     return DetectionResults(results.runs, [*skipped, *results._skipped], results.findings)
 
 
-detect = by_keywords(DetectionOptions, detect_logs)
+class _OneOrMany(Protocol[_Settings]):
+    """A function of one log or several: what it returns depends on that."""
+
+    @overload
+    def __call__(self, logs: str | Path, *values: _Settings.args, **named: _Settings.kwargs) -> DetectionResult: ...
+
+    @overload
+    def __call__(
+        self, logs: Sequence[str | Path], *values: _Settings.args, **named: _Settings.kwargs
+    ) -> DetectionResults: ...
+
+
+def _typed(_: Callable[_Settings, DetectionOptions], function: Any) -> _OneOrMany[_Settings]:
+    """Return a function of these options with its type."""
+    typed: _OneOrMany[_Settings] = function
+    return typed
+
+
+detect = _typed(DetectionOptions, by_keywords(DetectionOptions, detect_logs))
 detect_runs = presented(
     by_keywords(DetectionOptions, detect_log_runs),
     DetectionResults.of,

@@ -47,7 +47,7 @@ def test_contacts_are_found_in_both_directions_and_nothing_else(folder, tmp_path
     assert outcomes == ["no alarm", "alarm", "alarm", "no alarm", "no alarm", "alarm"]
     sides = [detection.verdict.alarms[0].side for detection in found.detections if detection.verdict.alarms]
     assert sides == ["below", "above", "below"]
-    assert [contact.start for contact in found.contacts] == pytest.approx([6.0, 10.0, 22.0], abs=0.01)
+    assert found.contacts.onset_s.tolist() == pytest.approx([6.0, 10.0, 22.0], abs=0.01)
 
 
 BENCHMARK = """
