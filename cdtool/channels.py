@@ -11,6 +11,7 @@ from typing import Literal, TypeVar
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
+from cdtool.short_repr import short_repr
 from cdtool.tables import Table
 from cdtool.units import RAW_UNITS, unit
 from cdtool.value_words import value_in_words
@@ -95,6 +96,8 @@ class ChannelSource:
     own_file: OwnFile | None = None
     kinds: tuple[tuple[float, str], ...] = ()
     words: bool = False
+
+    __repr__ = short_repr
 
     @property
     def described(self) -> str:
@@ -182,6 +185,8 @@ class ChannelMap:
     pins: TablePins = TablePins()
     named: bool = True
     beside: tuple[ChannelSource, ...] = ()
+
+    __repr__ = short_repr
 
     @property
     def worded(self) -> frozenset[str | int]:

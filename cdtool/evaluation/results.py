@@ -146,6 +146,8 @@ class ExposureResult:
     not_assessable: int = meant("operations that were nowhere assessable", default=0)
     not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
 
+    __repr__ = short_repr
+
 
 @frozen
 class ConditionResult:

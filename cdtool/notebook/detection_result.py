@@ -369,7 +369,9 @@ class _OneOrMany(Protocol[_Settings]):
     """A function of one log or several: what it returns depends on that."""
 
     @overload
-    def __call__(self, logs: str | Path, *values: _Settings.args, **named: _Settings.kwargs) -> DetectionResult: ...
+    def __call__(  # type: ignore[overload-overlap]  # a str is one log, not a sequence of them
+        self, logs: str | Path, *values: _Settings.args, **named: _Settings.kwargs
+    ) -> DetectionResult: ...
 
     @overload
     def __call__(

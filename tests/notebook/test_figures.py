@@ -56,7 +56,7 @@ def test_the_triggers_of_a_recording_or_group_are_chosen(result):
     name = next(trace.recording for trace in result.traces if trace.group == "soft")
     assert name in result.plot.triggers(name).description
     assert result.plot.triggers(group="soft").description.startswith("soft/")
-    with pytest.raises(UsageError, match="no curves of 'soft/99.csv' were kept"):
+    with pytest.raises(UsageError, match=r"no curves of 'soft/99\.csv' were kept"):
         result.plot.triggers("soft/99.csv")
     without = cdtool.BenchmarkResult(result.evaluated)
     with pytest.raises(UsageError, match="no curves were kept"):

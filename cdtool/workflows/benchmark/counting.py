@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from cdtool.evaluation.results import ExposureResult, SweepResult
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.workflows.benchmark.log_outcome import OperationOutcome
 
 
@@ -53,6 +54,8 @@ class SweepRows:
     # By detector and group: of each contact the latency with every factor, one contact after the other.
     _latency: dict[tuple[str, str], array[float]] = field(default_factory=dict)
     _blind: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+    __repr__ = short_repr
 
     def add(self, group: str, name: str, outcome: OperationOutcome) -> None:
         """Add one operation of the detector `name`."""

@@ -19,6 +19,7 @@ from cdtool.log_section import LogSection
 from cdtool.motion.applicable import HOLD
 from cdtool.plausible import PlausibleRanges
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.thresholds.stored import fitted_to_dict, rule_to_dict
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, ImpactGroup
 from cdtool.workflows.benchmark.learned import Learned
@@ -40,6 +41,8 @@ class Determinants:
     learned: Learned
     runs: Mapping[Path, Sources]
     factors: Mapping[str, FloatArray]
+
+    __repr__ = short_repr
 
     def log_key(self, group: str, path: Path, sources: Sources) -> str:
         """Return the key of the rows of a log that do not depend on the detectors."""

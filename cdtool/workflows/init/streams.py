@@ -14,6 +14,7 @@ from cdtool.clock.lower_rate import sampled_rows
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
+from cdtool.short_repr import short_repr
 from cdtool.workflows.init.joint_names import families_by_name
 
 _NUMBER = re.compile(r"\d+")
@@ -39,6 +40,8 @@ class Stream:
     topic: str = ""
     field: str = ""
     joints: tuple[str, ...] = ()
+
+    __repr__ = short_repr
 
     @property
     def width(self) -> int:
