@@ -66,8 +66,10 @@ class Registry:
         return self._load_plugin(full)
 
     def checked(self, made: Any) -> Any:
-        """Return an instance of a class of one's own; raises UsageError if the class violates the contract."""
+        """Return an instance of a class of this table or of one's own; raises UsageError if that has a fault."""
         name = str(getattr(made, "name", type(made).__name__))
+        if name in self.table and type(made) is self.load(name):
+            return made
         problem = f"has the name of a {self.kind} of cdtool itself" if name in self.table else ""
         if problem := problem or self._breach(type(made), name):
             raise UsageError(f"{self.kind} {type(made).__name__} {problem}", f"see docs/recipes/{self.kind}.md")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from cdtool.activation import DEBOUNCE_TIME, Activation
 from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, SignatureError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.frames import rows_as_frame
 from cdtool.evaluation.results import RecordingFinding, Skipped
+from cdtool.html_table import html_table
 from cdtool.kernel_warm_up import compile_loaded
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
@@ -58,6 +60,10 @@ from cdtool.workflows.signature.fitting import fitting, for_machine
 from cdtool.workflows.store.digest import code_version, digest_of
 from cdtool.workflows.tuning.journal import Journal
 from cdtool.workflows.tuning.recordings_to_tune import ReadRecordings, read_recordings, to_check
+from cdtool.workflows.tuning.tuned_rows import TunedRow, tuned_rows
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Which contacts a detector is tuned on.
 IMPACTS = ("real", "injected", "both")
@@ -163,6 +169,21 @@ class Tuning:
     findings: tuple[RecordingFinding, ...]
 
     __repr__ = short_repr
+
+    def summary(self) -> pd.DataFrame:
+        """Return a row per detector and group, the best detector first: what was achieved, and what the file has."""
+        order = {"detector": [item.detector for item in self.detectors], "group": list(self.groups)}
+        return rows_as_frame(TunedRow, list(tuned_rows(self.detectors)), order)
+
+    def _repr_html_(self) -> str:
+        """Return these results as a table, which a notebook shows."""
+        headings = ("detector", "group", "threshold", "mean [ms]", "default [ms]", "missed", "alarming free runs")
+        rows = []
+        for row in tuned_rows(self.detectors):
+            counts = (f"{row.missed} of {row.contacts}", f"{row.alarming} of {row.operations}")
+            rows.append((row.detector, row.group, row.threshold, row.mean_ms, row.default_mean_ms, *counts))
+        what = "of recordings that chose nothing" if self.is_nested else "apparent: of the recordings that chose"
+        return html_table(f"Tuned at {self.options.budget}, results {what}", headings, rows)
 
 
 def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> Tuning:
