@@ -41,7 +41,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cdtool.clock import previous_value
     from cdtool.detection import Alarm, Band, Signal, Status, Verdict
-    from cdtool.detectors.base import gain
     from cdtool.errors import CdtoolError
     from cdtool.machine_file import MachineFile, read_machine_file
     from cdtool.notebook.benchmark_result import BenchmarkResult, benchmark, read_results, score
@@ -118,7 +117,6 @@ _API = {
     "Signature": "cdtool.thresholds.signature:Signature",
     "Limit": "cdtool.thresholds.limit:Limit",
     "Cusum": "cdtool.thresholds.cusum:Cusum",
-    "gain": "cdtool.detectors.base:gain",
     "CdtoolError": "cdtool.errors:CdtoolError",
 }
 
@@ -151,7 +149,6 @@ __all__ = [
     "explain",
     "explain_runs",
     "forecast_signature",
-    "gain",
     "identify",
     "info",
     "init",

@@ -61,7 +61,7 @@ class BenchmarkResult:
     >>> import cdtool
     >>> result = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
     >>> result
-    BenchmarkResult(1 detector, 3 groups, 20 recordings: ...)
+    BenchmarkResult(1 detector, 3 groups, 12 recordings: all 9 limits are met)
     >>> result.contacts.groupby("group", observed=True).latency_ms.median().round().astype(int).to_dict()
     {'stiff': 63, 'soft': 119}
     >>> result.summary().loc[("stiff", "momentum"), ["detected", "missed"]].tolist()
@@ -233,7 +233,7 @@ class BenchmarkResult:
 
 @dataclass(frozen=True)
 class BenchmarkPlots:
-    """The figures of a benchmark's reports: each a `matplotlib.figure.Figure`, which Jupyter shows; no pyplot."""
+    """The plots that a benchmark's reports contain: each a `matplotlib.figure.Figure`, which Jupyter shows; no pyplot."""
 
     result: BenchmarkResult
 

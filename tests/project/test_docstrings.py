@@ -2,7 +2,7 @@
 
 Public is what a user of the Python API or the author of a plug-in calls:
 
-* every name of `cdtool.__all__`;
+* every function of `cdtool.__all__`; its classes need a summary, the results also an example;
 * every class in the tables of the detectors and the thresholds, and the methods of their contracts;
 * every public function of `cdtool.detectors.base`, `cdtool.detectors.filters` and `cdtool.thresholds.base`, which are
   the tools of a plug-in, and of `cdtool.evaluation.statistics`;
@@ -86,7 +86,13 @@ def names_of_functions() -> dict[str, Callable[..., Any]]:
 
 @cache
 def api() -> dict[str, Callable[..., Any]]:
-    return {f"cdtool.{name}": getattr(cdtool, name) for name in cdtool.__all__ if name != "__version__"}
+    return {f"cdtool.{name}": item for name, item in public().items() if not inspect.isclass(item)}
+
+
+@cache
+def public() -> dict[str, Any]:
+    """Every name of `cdtool.__all__` but the version: functions, and the classes of the values that a user handles."""
+    return {name: getattr(cdtool, name) for name in cdtool.__all__ if name != "__version__"}
 
 
 @cache
@@ -188,6 +194,26 @@ def test_the_public_functions_of_detectors_thresholds_and_evaluation_have_their_
         for name, function in names_of_functions().items()
     }
     assert not {name: found for name, found in faults.items() if found}
+
+
+def test_a_class_of_the_api_has_a_summary_of_one_line_and_its_methods_are_described():
+    faults = set()
+    for name, kind in public().items():
+        if inspect.isclass(kind):
+            texts_of = {name: inspect.getdoc(kind)}
+            own = {key: item for key, item in vars(kind).items() if not key.startswith("_")}
+            described_ones = {key: item for key, item in own.items() if callable(item) or isinstance(item, property)}
+            texts_of |= {f"{name}.{key}": inspect.getdoc(item) for key, item in described_ones.items()}
+            firsts = {key: (text or "").split("\n\n")[0] for key, text in texts_of.items()}
+            faults |= {key for key, first in firsts.items() if not first or first[-1] not in ".:?"}
+    assert not faults
+
+
+@pytest.mark.parametrize("name", ["BenchmarkResult", "DetectionResult", "DetectionResults"])
+def test_the_example_of_a_result_runs(name, folder):
+    test = examples_of(name, public()[name], {})
+    assert test.examples
+    assert not run([test])
 
 
 @pytest.mark.parametrize("name", sorted(rules()))

@@ -145,7 +145,7 @@ def explain_operation(
 
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0])
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[400.0]).detected
     >>> (alarm,) = explain_operation(found.detections[0], found.matchings[0], found.activation)
     >>> alarm.role, alarm.joint, alarm.debounce, alarm.absent.value
     ('detection', 'gate', 9, 'limits set by hand')
@@ -298,7 +298,7 @@ def explain_miss(
 
     >>> import cdtool
     >>> log, machine = "sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml"
-    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[4000.0])
+    >>> found = cdtool.detect(log, machine, detector="momentum", limit=[4000.0]).detected
     >>> miss = explain_miss(found.detections[0], found.matchings[0].matches[0], found.activation)
     >>> miss.outcome, miss.joint, miss.approaches[0].longest
     ('missed', 'gate', 0)

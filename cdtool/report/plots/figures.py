@@ -140,7 +140,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def encoded(figure: Figure, suffix: str) -> bytes:
-    """Return a figure in the format of a suffix of `SUFFIXES`; the same figure gives the same bytes."""
+    """Return a figure in the format of a suffix of `SUFFIXES`; equal figures give equal bytes."""
     from importlib import import_module
 
     canvas = import_module(_BACKENDS[suffix]).FigureCanvas(figure)

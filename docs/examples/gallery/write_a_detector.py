@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import cdtool
-from cdtool.detectors.base import require_channels
+from cdtool.detectors.base import gain, require_channels
 from cdtool.detectors.filters import low_pass, settling_time, started_at
 
 
@@ -19,7 +19,7 @@ from cdtool.detectors.filters import low_pass, settling_time, started_at
 class TorqueRate:
     """The rate of change of the low-passed drive force: an impact makes the controller push."""
 
-    cutoff: float = cdtool.gain(2.0, "Hz", "cut-off frequency of the low-pass")
+    cutoff: float = gain(2.0, "Hz", "cut-off frequency of the low-pass")
 
     name = "torque_rate"
     short_name = "tr"
