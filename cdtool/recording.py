@@ -259,7 +259,7 @@ class Recording(StoresDerived):
             )
             for name, series in self.channels.items()
         ]
-        caption = f"{self.name}: {self.duration:.3g} s, joints {', '.join(self.joints)}"
+        caption = f"{self.name}: {self.duration:.3g} s, joints: {', '.join(self.joints)}"
         return html_table(caption, ("channel", "unit", "columns", "samples", "rate [Hz]"), rows)
 
     def own_clock(self, clock: FloatArray) -> FloatArray | None:

@@ -233,7 +233,7 @@ class BenchmarkResult:
 
 @dataclass(frozen=True)
 class BenchmarkPlots:
-    """The plots that a benchmark's reports contain: each a `matplotlib.figure.Figure`, which Jupyter shows; no pyplot."""
+    """The plots of a benchmark's reports: each a `matplotlib.figure.Figure`, which Jupyter shows without pyplot."""
 
     result: BenchmarkResult
 

@@ -303,7 +303,7 @@ def _html(runs: Sequence[DetectionResult], caption: str, note: str) -> str:
         for row, detection, matching in zip(_operations(run), run.detections, run.detected.matchings, strict=True):
             first = detection.verdict.alarms[0] if detection.verdict.alarms else None
             latency = next((1e3 * item.latency for item in matching.matches if item.alarm), None)
-            alarm = (first.joint, first.time) if first else (None, None)
+            alarm = (first.joint, f"{first.time:.3f}") if first else (None, None)
             rows.append((row.operation, row.verdict.replace("_", " "), row.alarms, *alarm, row.contacts, latency))
     headings = ("operation", "verdict", "alarms", "joint", "first alarm [s]", "contacts", "latency [ms]")
     return html_table(caption, headings, rows, note)

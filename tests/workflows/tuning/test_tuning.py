@@ -82,6 +82,16 @@ def test_the_choice_is_faster_than_the_default_on_recordings_that_chose_nothing(
     assert len(tuned.chosen_in_folds) == 5 and sum("glr" in words for words in tuned.chosen_in_folds) >= 3
 
 
+def test_the_summary_for_a_notebook_has_these_results(done):
+    (tuned,) = done.detectors
+    summary = done.summary().set_index("group")
+    assert summary.index.tolist() == ["stiff", "soft"] and summary.nested.all()
+    assert summary.mean_ms.tolist() == [tuned.nested.groups[group].mean_ms for group in summary.index]
+    assert summary.default_mean_ms["soft"] == tuned.default_nested.groups["soft"].mean_ms
+    assert summary.alarming.tolist() == [tuned.nested.alarming] * 2
+    assert "of recordings that chose nothing" in done._repr_html_() and len(repr(done)) < 200
+
+
 def test_too_few_contacts_have_a_range_and_no_interval(done):
     results = done.detectors[0].honest.groups["stiff"]
     assert "10" in results.interval_ms.reason

@@ -1,0 +1,66 @@
+"""A detector that is defined in a notebook, or has other gains, is used by its instance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import cdtool
+from cdtool.detectors.base import gain
+from cdtool.detectors.momentum import Momentum
+from tests.notebook.values import FREE, GATE, LOG, MACHINE
+
+
+@dataclass(frozen=True)
+class Effort:
+    """The drive force, scaled."""
+
+    scale: float = gain(2.0, "1", "factor")
+
+    name: ClassVar[str] = "effort"
+    short_name: ClassVar[str] = "ef"
+    title: ClassVar[str] = "Effort"
+    needs: ClassVar[tuple[str, ...]] = ("torque",)
+    signed: ClassVar[bool] = True
+
+    def unit(self, machine):
+        return machine.force_unit
+
+    def signal(self, recording, machine):
+        torque = recording["torque"]
+        status = np.where(np.isfinite(torque.values), cdtool.Status.VALID, cdtool.Status.GAP).astype(np.uint8)
+        return cdtool.Signal(torque.time, self.scale * torque.values, status, self.unit(machine), self.signed)
+
+
+def test_a_detector_of_ones_own_is_learned_and_detects():
+    learned = cdtool.learn_signature(FREE, MACHINE, Effort())
+    found = cdtool.detect(LOG, MACHINE, signature=learned, detector=Effort())
+    assert learned.signature.detector == "effort" and found.contacts.detector.tolist() == ["effort"]
+    same = cdtool.detect(LOG, MACHINE, signature=cdtool.learn_signature(FREE, MACHINE, "pt"))
+    assert found.contacts.alarm_s.tolist() == same.contacts.alarm_s.tolist()
+
+
+def test_a_detector_with_other_gains_needs_a_signature_of_its_own():
+    learned = cdtool.learn_signature(FREE, MACHINE, Momentum(bandwidth=40.0))
+    assert cdtool.detect(LOG, MACHINE, signature=learned, detector=Momentum(bandwidth=40.0)).outcome == "alarm"
+    with pytest.raises(cdtool.CdtoolError, match=r"learned with bandwidth = 40\.0"):
+        cdtool.detect(LOG, MACHINE, signature=learned, detector=Momentum())
+
+
+def test_a_detector_that_violates_the_contract_is_refused_in_one_line():
+    class Nothing:
+        name = "nothing"
+
+    with pytest.raises(cdtool.CdtoolError, match="detector Nothing has no attribute 'short_name'"):
+        cdtool.detect(LOG, MACHINE, detector=Nothing(), limit=[1.0])
+    impostor = type("Impostor", (Effort,), {"name": "momentum"})
+    with pytest.raises(cdtool.CdtoolError, match="has the name of a detector of cdtool itself"):
+        cdtool.detect(LOG, MACHINE, detector=impostor(), limit=[1.0])
+
+
+def test_a_benchmark_file_takes_the_name_of_a_detector_only():
+    with pytest.raises(cdtool.CdtoolError, match="a benchmark file names its detectors"):
+        cdtool.detect(LOG, benchmark=GATE / "benchmark.toml", detector=Effort())
