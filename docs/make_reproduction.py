@@ -132,7 +132,8 @@ def example(work: Path, name: str, detector: str, image: str) -> None:
             free, "machine.toml", detector, rule=rule, joints=joints, activation=activation
         )
         write_signature("signature.json", learned.signature)
-        plot_detected(cdtool.detect("stiff/03.csv", "machine.toml", signature="signature.json"), IMAGES / image)
+        found = cdtool.detect("stiff/03.csv", "machine.toml", signature="signature.json")
+        plot_detected(found.detected, IMAGES / image)
 
 
 def impacts(work: Path) -> None:
