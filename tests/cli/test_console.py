@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from pathlib import Path
 from unittest import mock
 
@@ -48,17 +49,20 @@ def test_the_results_of_a_benchmark_are_explained_in_lines_of_100_columns(gate_f
     assert "followed back to half of it" in " ".join(done.out.split())
 
 
+BYTES = bytes(range(256)) * 4
+
+
 @pytest.mark.parametrize(
-    ("head", "step"),
+    ("content", "step"),
     [
-        (b"\x1f\x8b\x08", "unpack it first"),
-        (b"(\xb5/\xfd", "unpack it first"),
-        (b"PK\x03\x04", "save the sheet as CSV"),
+        (gzip.compress(b"\x89MCAP0\r\n" + BYTES), "unpack it first"),
+        (b"(\xb5/\xfd" + BYTES, "unpack it first"),
+        (b"PK\x03\x04" + BYTES, "save the sheet as CSV"),
     ],
     ids=["gzip", "zstd", "ZIP or Excel"],
 )
-def test_a_packed_log_or_a_workbook_gets_a_hint_how_to_convert_it(gate_folder, tmp_path, head, step):
-    (tmp_path / "log.csv").write_bytes(head + bytes(range(256)) * 4)
+def test_a_packed_log_or_a_workbook_gets_a_hint_how_to_convert_it(gate_folder, tmp_path, content, step):
+    (tmp_path / "log.csv").write_bytes(content)
     done = cdtool("detect", tmp_path / "log.csv", "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     assert done.status == 2 and step in done.err
 
