@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from cdtool.errors import OutputError, UsageError
 from cdtool.report.protocol.blocks import Document
 from cdtool.report.protocol.html import page_file
 
-# Level A: tagged, so that a reader without sight hears headings, tables and descriptions of the curves.
-_STANDARDS = ["a-2a", "ua-1"]
 # The font of every character that the text's own font does not have; it comes with matplotlib.
 _FALLBACK = "DejaVuSans.ttf"
 
@@ -37,12 +36,14 @@ def to_pdf(document: Document) -> bytes:
 
     fonts = Path(get_data_path()) / "fonts" / "ttf"
     text = json.dumps(asdict(document), ensure_ascii=False)
+    typeset: Any = typst.compile  # its stub requires one type for the text and the folders
     try:
-        made = typst.compile(
+        made = typeset(
             page_file("protocol.typ").encode(),
             format="pdf",
             sys_inputs={"document": text},
-            pdf_standards=_STANDARDS,
+            # Level A: tagged, so that a reader without sight hears headings, tables and descriptions of the curves.
+            pdf_standards=["a-2a", "ua-1"],
             font_paths=[str(fonts)],
             # Fonts that are installed with the libraries give the same pages on every computer.
             ignore_system_fonts=_has_every_character(fonts / _FALLBACK, text),
