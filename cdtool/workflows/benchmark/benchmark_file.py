@@ -269,9 +269,11 @@ def read_benchmark_file(
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
     base = file.parent
     machine_file = read_machine_file(joined(base, root.text("machine")))
-    # A file for a force rig, whose recordings have only a force, names none.
-    names_none = not learning and root.raw("detectors") == []
-    wanted = () if names_none else root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
+    # The recordings of a force rig may have only a force.
+    without_detectors = not learning and root.raw("detectors") == []
+    wanted = (
+        () if without_detectors else root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
+    )
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
         raise root.fault("detectors", "contains a detector twice", "list each detector once")
