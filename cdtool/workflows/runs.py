@@ -390,6 +390,8 @@ def absent_truth(recording: Recording) -> list[Finding]:
 def _glob(path: Path) -> Iterator[Path]:
     root = location(path.anchor) if path.is_absolute() else Path()
     pattern = path.relative_to(root).as_posix() if path.is_absolute() else str(path)
+    if pattern == ".":  # the root or the working folder itself, which is not a log
+        return iter(())
     # As in a shell, a name that begins with a dot must be matched explicitly. Incomplete files have such names.
     written_out = set(path.parts)
     return (

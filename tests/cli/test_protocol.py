@@ -62,7 +62,7 @@ def test_from_a_rig_s_logs_to_a_protocol_in_four_commands_each_named_by_the_one_
     assert drafted.status == 0, drafted.err
     (check,) = commands(drafted)
     incomplete = cdtool(*check)
-    assert incomplete.status == 4 and "Not filled in" in incomplete.out
+    assert incomplete.status == 4 and "Missing in protocol.toml" in incomplete.out
     fill_in(tmp_path / "study" / "protocol.toml")
     complete = cdtool(*check)
     assert complete.status == 0, complete.out

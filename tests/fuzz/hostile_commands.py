@@ -84,6 +84,28 @@ period = 0.001
 [model.drive]
 stiffness = 8e4
 """
+_PLAN = """[protocol]
+benchmark = "benchmark.toml"
+language = "de"
+[protocol.test]
+date = 2026-03-31
+temperature_c = 20.5
+[[protocol.instrument]]
+quantity = "force"
+calibrated_on = 2026-01-15
+calibration_valid_until = "2027-01-14"
+range_n = 10000
+sample_rate_hz = 200
+[[protocol.point]]
+name = "edge"
+repetitions = 3
+profile = "en_12453_wide_gap"
+logs = ["stiff/*.csv"]
+peak_pressures_n_per_cm2 = [12.5, 13]
+[[protocol.exclusion]]
+logs = ["stiff/02.csv"]
+reason = "slipped"
+"""
 # A command line, the file to mutate, and numeric options to set; {} stands for the folder.
 _COMMANDS: tuple[tuple[str, str], ...] = (
     ("info stiff/01.csv", "stiff/01.csv"),
@@ -116,6 +138,9 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("benchmark full.toml -o out.json", "full.toml"),
     ("benchmark full.toml -o out.json", "own.toml"),
     ("benchmark labelled.toml -o out.json", "labels.csv"),
+    ("protocol check plan.toml", "plan.toml"),
+    ("protocol write plan.toml -o out.html", "plan.toml"),
+    ("protocol write plan.toml -o out.html", "stiff/01.csv"),
     ("report results.json -o out.md -o out.xml -o out.csv", "results.json"),
     ("report results.json -o out.html", "results.json"),
     ("report results.json -o out.html", "results.traces.json.gz"),
@@ -220,6 +245,7 @@ def make_bench(folder: Path) -> None:
     (folder / "labelled.toml").write_text(labelled)
     (folder / "labels.csv").write_text(_LABELS)
     (folder / "inject.toml").write_text(_INJECT)
+    (folder / "plan.toml").write_text(_PLAN)
     (folder / "model.toml").write_text((folder / "machine.toml").read_text() + _MODEL)
     (folder / "triggers.csv").write_text(_TRIGGERS)
     (folder / "ambient.csv").write_text(_AMBIENT)

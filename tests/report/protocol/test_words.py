@@ -74,4 +74,4 @@ def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
 
 def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():
     reasons = tuple(Reason(ReasonKind.NO_VALUE, {"key": key, "file": "p.toml"}) for key in ("a", "b"))
-    assert words_of("en").reasons(Verdict(reasons), "incomplete") == ["Not filled in in p.toml: a, b"]
+    assert words_of("en").reasons(Verdict(reasons), "incomplete") == ["Missing in p.toml: a, b"]

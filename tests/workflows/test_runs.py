@@ -1,0 +1,16 @@
+"""Which logs a pattern of a benchmark file names."""
+
+from __future__ import annotations
+
+import pytest
+
+from cdtool.errors import ConfigurationError
+from cdtool.workflows.runs import find_logs
+
+
+@pytest.mark.parametrize("pattern", ["", ".", "/", "#", "#1"])
+def test_a_pattern_that_is_a_folder_or_the_root_matches_nothing(pattern, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for base in (tmp_path, tmp_path.relative_to(tmp_path)):
+        with pytest.raises(ConfigurationError, match="no file matches"):
+            find_logs([pattern], base, "learn.logs", runs=True)
