@@ -53,6 +53,8 @@ FAULTS = {
 }
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 _STATUS_OF = {signal.SIGTERM: 143, signal.SIGINT: 130}
+# Of commands that have done their work: it was in order, a limit is not met, something was left out, or is incomplete.
+_FINISHED = (0, 1, 3, 4)
 # Lines about the input, unrelated to writing.
 _OF_THE_WORK = ("warning: ", "note: ", "left out: ", "loss: ")
 _HEAVY = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg", "matplotlib.backends.backend_pdf")
@@ -157,7 +159,7 @@ def _run_once(inputs: Path) -> None:
     ):
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             status = _cdtool(words)
-        if status not in (0, 3):
+        if status not in _FINISHED:
             sys.exit(f"error: {' '.join(words)}: status {status}")
 
 
@@ -211,7 +213,7 @@ PROBLEMS = ("corrupt", "strays", "status", "lines")
 
 
 def _must(outcome: Outcome, words: Sequence[str]) -> None:
-    if outcome.status not in (0, 1, 3):
+    if outcome.status not in _FINISHED:
         sys.exit(f"error: {' '.join(words)}: status {outcome.status}\n{outcome.error}")
 
 
