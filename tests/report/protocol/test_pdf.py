@@ -15,6 +15,7 @@ from cdtool.report.protocol.blocks import Grid, Heading
 from cdtool.report.protocol.document import protocol_document
 from cdtool.report.protocol.pdf import to_pdf
 from tests.report.hostile import HOSTILE
+from tests.report.protocol.conftest import LONG
 
 CASES = ["pass", "fail", "incomplete"]
 
@@ -105,6 +106,16 @@ def test_the_text_holds_every_cell_of_the_document(name, documents, pypdf):
     cells = [cell for block in document.blocks if isinstance(block, Grid) for row in block.rows for cell in row]
     assert len(cells) > 60
     assert [cell for cell in cells if squeezed(cell) not in text] == []
+
+
+def test_names_and_numbers_can_be_searched_and_copied_unless_a_name_is_longer_than_its_column(documents, pypdf):
+    texts = []
+    for name in ("pass", "incomplete"):
+        pages = pypdf.PdfReader(io.BytesIO(to_pdf(documents[name]))).pages
+        texts.append(" ".join(" ".join(page.extract_text() for page in pages).split()))
+    assert "\u200b" not in texts[0]
+    assert "profile en_12453_reducing_gap were not" in texts[0] and "3 edge/03.csv 451 235.1" in texts[0]
+    assert LONG in squeezed(texts[1]) and LONG not in texts[1]
 
 
 @pytest.mark.parametrize("times", [1, 2, 4])
