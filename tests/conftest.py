@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,8 +18,9 @@ from cdtool.simulation.gate_recordings import as_recording
 from tests import markers
 from tests.synthetic.machines import ARM, GATE, arm_of, machine_of
 
-# Tests have no deadline: a busy machine takes longer for an example.
-settings.register_profile("untimed", deadline=None)
+# Tests have no deadline: a busy machine takes longer for an example. Each run tries other examples than the one before,
+# so that few of them are enough; for a long search: CDTOOL_EXAMPLES=2000.
+settings.register_profile("untimed", deadline=None, max_examples=int(os.environ.get("CDTOOL_EXAMPLES", "50")))
 settings.load_profile("untimed")
 
 
