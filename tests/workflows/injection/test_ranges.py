@@ -73,7 +73,7 @@ def test_the_range_contains_the_real_contacts_and_is_in_every_report(gate: Path)
     assert {f"injected_stiff{end}" for end in ("", "_rigid", "_limited", "_rigid_limited")} <= set(stated)
     assert stated["injected_stiff_rigid"]["assumed"] == ["drive rigid beyond its observed wind-up"]
     text = (gate / "r.md").read_text(encoding="utf-8")
-    assert text.index("## Injected contacts") < text.index("## real")
+    assert text.index("## Results") < text.index("<summary>Injected contacts (")
     assert "drive rigid beyond its observed wind-up" in text
     assert 'id="injected"' in (gate / "r.html").read_text(encoding="utf-8")
 
