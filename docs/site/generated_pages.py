@@ -122,37 +122,28 @@ def _value(item: Any) -> str:
 # --- Python
 
 
-_VALUES = (
-    "cdtool.recording.Series",
-    "cdtool.recording.Recording",
-    "cdtool.detection.Signal",
-    "cdtool.detection.Band",
-    "cdtool.detection.Verdict",
-    "cdtool.detection.Alarm",
-)
-
-
 def _python_pages() -> dict[str, str]:
-    functions = {name: place for name, place in _API.items() if not name.startswith("__")}
+    exported = {name: _exported(place) for name, place in _API.items() if not name.startswith("__")}
+    functions = {name: item for name, item in exported.items() if not inspect.isclass(item)}
     pages, rows, returned = {}, [], dict[str, Any]()
-    for name, place in functions.items():
-        module, _, attribute = place.partition(":")
-        function = getattr(import_module(module), attribute)
+    for name, function in functions.items():
         rows.append([f"[`cdtool.{name}`](functions.md#cdtool{name})", _summary(function)])
         # The names of other annotations are imported for type checkers only.
         result = getattr(import_module(function.__module__), str(function.__annotations__.get("return")), None)
         if inspect.isclass(result) and is_dataclass(result):
-            returned.setdefault(f"{result.__module__}.{result.__qualname__}", result)
+            returned.setdefault(_place(result), result)
     text = "# Functions of cdtool\n\n"
     text += "".join(f"## cdtool.{name}\n\n" + _directive("autofunction", f"cdtool.{name}") for name in functions)
     pages["reference/python/functions"] = text
     pages["reference/python/results"] = "# What the functions return\n\n" + "".join(map(_class_text, returned))
+    shown = set(returned)
     for title, registry in (("Detectors", DETECTORS), ("Thresholds", THRESHOLDS), ("Machines", MACHINES)):
-        classes = [registry.load(name) for name in registry.names(plugins=False)]
-        places = [f"{item.__module__}.{item.__qualname__}" for item in classes]
+        places = [_place(registry.load(name)) for name in registry.names(plugins=False)]
+        shown.update(places)
         pages[f"reference/python/{title.lower()}"] = f"# {title}\n\n" + "".join(map(_class_text, places))
-    about = "What travels between the functions: recordings, signals, bands, verdicts."
-    texts = (_class_text(place) for place in _VALUES if place not in returned)
+    about = "What travels between the functions: recordings, signals, bands, verdicts; and the error of all of them."
+    values = [_place(item) for item in exported.values() if inspect.isclass(item)]
+    texts = (_class_text(place) for place in values if place not in shown)
     pages["reference/python/values"] = f"# Values\n\n{about}\n\n" + "".join(texts)
     more = [
         ["[Results](results.md)", "what the functions return"],
@@ -168,6 +159,15 @@ def _python_pages() -> dict[str, str]:
         + _table(["page", "contents"], more)
     )
     return pages
+
+
+def _exported(place: str) -> Any:
+    module, _, attribute = place.partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def _place(item: Any) -> str:
+    return f"{item.__module__}.{item.__qualname__}"
 
 
 def _class_text(place: str) -> str:
