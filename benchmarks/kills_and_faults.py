@@ -11,7 +11,7 @@ belongs to it (results and traces, a converted log and its machine file), nothin
 documented one: 2 with one line "error: ...", 143, 130.
 
 python benchmarks/kills_and_faults.py                              # 500 and 500
-python benchmarks/kills_and_faults.py --kills 15 --faults 15     # as in CI
+python benchmarks/kills_and_faults.py --kills 10 --faults 10     # as in CI
 """
 
 from __future__ import annotations

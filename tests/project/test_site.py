@@ -5,6 +5,7 @@ The strict build itself is a step of `.ci/run`; it takes too long for a test.
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import runpy
@@ -14,6 +15,7 @@ from typing import Any
 
 import pytest
 
+import cdtool
 from cdtool import _API
 from cdtool.cli.app import COMMANDS
 from tests.project.pages import DOCS, PAGES, ROOT
@@ -71,8 +73,13 @@ def test_every_command_and_option_is_on_its_page(pages):
     assert all(f"[`cdtool {name}`]" in pages["reference/cli/index"] for name in COMMANDS)
 
 
-def test_every_function_and_field_is_on_a_generated_page(pages):
+def test_every_function_class_and_field_is_on_a_generated_page(pages):
+    of_classes = "".join(text for name, text in pages.items() if name.startswith("reference/python/"))
     for name in (name for name in _API if not name.startswith("__")):
+        exported = getattr(cdtool, name)
+        if inspect.isclass(exported):
+            assert f".. autoclass:: {exported.__module__}.{exported.__qualname__}\n" in of_classes
+            continue
         assert f".. autofunction:: cdtool.{name}\n" in pages["reference/python/functions"]
         assert re.search(rf"\[`cdtool\.{name}`\]\([^)]*\) \| \w", pages["reference/python/index"]), name
     schema = json.loads((DOCS / "results.schema.json").read_text(encoding="utf-8"))
