@@ -214,6 +214,7 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
     """
     reasons = [
         *chain.from_iterable(point.reasons for point in points),
+        *_at_two_points(points),
         *more,
         *_of_instruments(plan, [point.profile for point in points if point.profile]),
         *([] if plan.points else [Reason(ReasonKind.NO_POINT, {"file": file})]),
@@ -256,6 +257,16 @@ def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Itera
         known = first.setdefault((item.sha256, item.contact), item.recording)
         if known != item.recording:
             yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=known)
+
+
+def _at_two_points(points: Sequence[PointAssessment]) -> Iterator[Reason]:
+    """Yield each contact that is counted at a second point, under another name: it was measured at one."""
+    first: dict[tuple[str, int], tuple[int, str]] = {}
+    for number, item in enumerate(points):
+        for one in item.repetitions:
+            owner, known = first.setdefault((one.sha256, one.contact), (number, one.recording))
+            if owner != number:
+                yield _reason(ReasonKind.SAME_RECORDING, item.point, recording=one.recording, other=known)
 
 
 def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:

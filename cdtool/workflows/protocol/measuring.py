@@ -81,7 +81,8 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
         if point.group:
             logs = _of_group(point, setup, f"{file.path}: protocol.{key}.group")
         else:
-            logs = [_scored_log(log, groups, file, key) for log in _found(point.logs, file, key)]
+            # Two patterns may name one file: it is one recording.
+            logs = list(dict.fromkeys(_scored_log(log, groups, file, key) for log in _found(point.logs, file, key)))
         for _, log in logs:
             if owner.setdefault(log, number) != number:
                 raise ConfigurationError(

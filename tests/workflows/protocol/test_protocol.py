@@ -115,6 +115,25 @@ def test_a_point_names_its_logs_by_patterns(tmp_path):
     assert cdtool.protocol(write_protocol(tmp_path, logs='logs = ["edge/0[12].csv"]')).verdict.outcome == "incomplete"
 
 
+def test_a_file_that_two_patterns_of_a_point_name_is_one_repetition(tmp_path):
+    write_rig(tmp_path, FORCES[:1])
+    logs = 'logs = ["edge/*.csv", "edge/01.csv", "edge/../edge/01.csv"]'
+    protocol = cdtool.protocol(write_protocol(tmp_path, logs=logs))
+    assert (kinds(protocol), len(protocol.points[0].repetitions)) == (["too_few_repetitions"], 1)
+
+
+def test_a_copy_of_a_recording_at_another_point_is_no_measurement_of_it(tmp_path):
+    write_rig(tmp_path, (*FORCES, half_sine(310.0), half_sine(330.0), half_sine(1.0)))
+    (tmp_path / "edge" / "06.csv").write_bytes((tmp_path / "edge" / "01.csv").read_bytes())
+    path = write_protocol(tmp_path, logs='logs = ["edge/0[123].csv"]')
+    text = path.read_text(encoding="utf-8")
+    point = text[text.index("[[protocol.point]]") :].replace('"edge"', '"other"').replace("0[123]", "0[456]")
+    path.write_text(text + point, encoding="utf-8")
+    protocol = cdtool.protocol(path)
+    assert (protocol.verdict.outcome, kinds(protocol)) == ("incomplete", ["same_recording"])
+    assert protocol.verdict.reasons[0].values == {"point": "other", "recording": "edge/06.csv", "other": "edge/01.csv"}
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
