@@ -147,6 +147,7 @@ def assess_point(
     reasons = [
         *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
         *_of_count(point, needed, len(repetitions), has_others=bool(unmeasured)),
+        *_beyond_plan(point, profile, len(repetitions)),
         *(_reason(ReasonKind(item.kind), point, recording=item.recording, message=item.message) for item in unmeasured),
         *_repeated(point, repetitions),
     ]
@@ -184,6 +185,7 @@ def check_point(point: MeasuringPoint, profile: ForceProfile | None, recordings:
     reasons = [
         *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
         *_of_count(point, needed, recordings, has_others=False),
+        *_beyond_plan(point, profile, recordings),
     ]
     return PointAssessment(point, profile, (), None, tuple(reasons))
 
@@ -248,6 +250,12 @@ def _of_count(point: MeasuringPoint, needed: int, present: int, *, has_others: b
     if point.peak_pressures_n_per_cm2 and len(point.peak_pressures_n_per_cm2) != present:
         stated = len(point.peak_pressures_n_per_cm2)
         yield _reason(ReasonKind.PRESSURES_MISSING, point, present=stated, needed=present)
+
+
+def _beyond_plan(point: MeasuringPoint, profile: ForceProfile | None, present: int) -> Iterator[Reason]:
+    """Yield that more was measured than planned, where it is averaged: a touch between the tests lowers the mean."""
+    if profile and profile.average_of > 1 and 0 < point.repetitions < present:
+        yield _reason(ReasonKind.TOO_MANY_REPETITIONS, point, present=present, planned=point.repetitions)
 
 
 def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:

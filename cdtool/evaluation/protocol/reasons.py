@@ -25,6 +25,7 @@ class ReasonKind(Enum):
     NO_PROFILE = "no_profile"
     TOO_FEW_PLANNED = "too_few_planned"
     TOO_FEW_REPETITIONS = "too_few_repetitions"
+    TOO_MANY_REPETITIONS = "too_many_repetitions"
     NOT_MEASURED = "not_measured"
     NOT_ASSESSABLE = "not_assessable"
     UNREADABLE = "unreadable"

@@ -115,6 +115,17 @@ def test_a_point_names_its_logs_by_patterns(tmp_path):
     assert cdtool.protocol(write_protocol(tmp_path, logs='logs = ["edge/0[12].csv"]')).verdict.outcome == "incomplete"
 
 
+def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
+    def touch_then_impact(time):
+        return half_sine(30.0)(time + 2.0) + half_sine(405.0)(time)
+
+    write_rig(tmp_path, (touch_then_impact, half_sine(404.0), half_sine(403.0)), seconds=9.0)
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert "too_many_repetitions" in kinds(protocol) and protocol.verdict.outcome == "incomplete"
+    many = next(reason for reason in protocol.verdict.reasons if reason.kind.value == "too_many_repetitions")
+    assert many.values == {"point": "edge", "present": 4, "planned": 3}
+
+
 def test_a_file_that_two_patterns_of_a_point_name_is_one_repetition(tmp_path):
     write_rig(tmp_path, FORCES[:1])
     logs = 'logs = ["edge/*.csv", "edge/01.csv", "edge/../edge/01.csv"]'
