@@ -32,7 +32,8 @@ class Repetition:
     """One measured contact at a point.
 
     `rest` [N]: the load cell's reading before the contact, which is subtracted; `drift` [N/s]: its drift, 0 unless
-    beyond doubt. `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
+    beyond doubt; `rest_error` [N]: how far the rest may be wrong because the record begins shortly before the contact.
+    `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
     """
 
     recording: str
@@ -45,6 +46,7 @@ class Repetition:
     dynamic_time: float = math.nan
     total_time: float = math.nan
     latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
+    rest_error: float = 0.0
 
     @classmethod
     def of(
@@ -323,10 +325,13 @@ def _is_saturated(cause: object) -> bool:
 def _of_drift(
     point: MeasuringPoint, item: Repetition, profile: ForceProfile, about: Mapping[str, str | float]
 ) -> Iterator[Reason]:
-    """Yield the steps that pass only if the level at rest did not drift as it did before the contact."""
+    """Yield the steps that pass only if the level at rest is exact: no drift as before the contact, no early rise."""
     for number, step in enumerate(item.verdict.steps):
         until = min(profile.ends(number), item.curve.end)
         moved = abs(item.drift) * until
+        if step.outcome == "pass" and step.peak + item.rest_error > step.step.at_most_n:
+            most = {"peak": step.peak, "limit": step.step.at_most_n, "error": item.rest_error}
+            yield _reason(ReasonKind.REST_DECIDES, point, **about, step=step.step.name, **most)
         if step.outcome == "pass" and step.peak + moved > step.step.at_most_n:
             name, limit = step.step.name, step.step.at_most_n
             drift = item.drift

@@ -41,6 +41,7 @@ class ReasonKind(Enum):
     BEYOND_RANGE = "beyond_range"
     SATURATED = "saturated"
     DRIFT_DECIDES = "drift_decides"
+    REST_DECIDES = "rest_decides"
     WRONG_STIFFNESS = "wrong_stiffness"
     PRESSURES_MISSING = "pressures_missing"
     BENCHMARK_UNREADABLE = "benchmark_unreadable"

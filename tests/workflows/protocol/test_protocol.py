@@ -8,6 +8,7 @@ import re
 from dataclasses import fields, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cdtool
@@ -113,6 +114,17 @@ def test_a_contact_without_a_force_or_that_cannot_be_read_is_a_reason(tmp_path):
 def test_a_point_names_its_logs_by_patterns(tmp_path):
     write_rig(tmp_path, FORCES)
     assert cdtool.protocol(write_protocol(tmp_path, logs='logs = ["edge/0[12].csv"]')).verdict.outcome == "incomplete"
+
+
+@pytest.mark.parametrize(("slope", "reading"), [(150.0, 156.0), (400.0, 165.0)])
+def test_a_slow_contact_that_begins_with_the_record_does_not_pass_by_a_wrong_rest(slope, reading, tmp_path):
+    def ramp(time):
+        return np.where(time < 1.5, np.minimum(slope * (time + 3.0), reading), 0.0)
+
+    write_rig(tmp_path, (ramp, ramp, ramp))
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert protocol.points[0].repetitions[0].verdict.steps[1].peak < 150.0 < reading
+    assert kinds(protocol) == ["rest_decides"] * 3
 
 
 def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
