@@ -32,7 +32,8 @@ class Repetition:
     """One measured contact at a point.
 
     `rest` [N]: the load cell's reading before the contact, which is subtracted; `drift` [N/s]: its drift, 0 unless
-    beyond doubt. `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
+    beyond doubt; `rest_error` [N]: how far the rest may be wrong because the record begins shortly before the contact.
+    `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
     """
 
     recording: str
@@ -45,6 +46,7 @@ class Repetition:
     dynamic_time: float = math.nan
     total_time: float = math.nan
     latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
+    rest_error: float = 0.0
 
     @classmethod
     def of(
@@ -147,6 +149,7 @@ def assess_point(
     reasons = [
         *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
         *_of_count(point, needed, len(repetitions), has_others=bool(unmeasured)),
+        *_beyond_plan(point, profile, len(repetitions)),
         *(_reason(ReasonKind(item.kind), point, recording=item.recording, message=item.message) for item in unmeasured),
         *_repeated(point, repetitions),
     ]
@@ -184,6 +187,7 @@ def check_point(point: MeasuringPoint, profile: ForceProfile | None, recordings:
     reasons = [
         *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
         *_of_count(point, needed, recordings, has_others=False),
+        *_beyond_plan(point, profile, recordings),
     ]
     return PointAssessment(point, profile, (), None, tuple(reasons))
 
@@ -214,6 +218,7 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
     """
     reasons = [
         *chain.from_iterable(point.reasons for point in points),
+        *_at_two_points(points),
         *more,
         *_of_instruments(plan, [point.profile for point in points if point.profile]),
         *([] if plan.points else [Reason(ReasonKind.NO_POINT, {"file": file})]),
@@ -249,6 +254,12 @@ def _of_count(point: MeasuringPoint, needed: int, present: int, *, has_others: b
         yield _reason(ReasonKind.PRESSURES_MISSING, point, present=stated, needed=present)
 
 
+def _beyond_plan(point: MeasuringPoint, profile: ForceProfile | None, present: int) -> Iterator[Reason]:
+    """Yield that more was measured than planned, where it is averaged: a touch between the tests lowers the mean."""
+    if profile and profile.average_of > 1 and 0 < point.repetitions < present:
+        yield _reason(ReasonKind.TOO_MANY_REPETITIONS, point, present=present, planned=point.repetitions)
+
+
 def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
     """Yield each contact that is counted twice under two names: it is one measurement."""
     first: dict[tuple[str, int], str] = {}
@@ -256,6 +267,16 @@ def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Itera
         known = first.setdefault((item.sha256, item.contact), item.recording)
         if known != item.recording:
             yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=known)
+
+
+def _at_two_points(points: Sequence[PointAssessment]) -> Iterator[Reason]:
+    """Yield each contact that is counted at a second point, under another name: it was measured at one."""
+    first: dict[tuple[str, int], tuple[int, str]] = {}
+    for number, item in enumerate(points):
+        for one in item.repetitions:
+            owner, known = first.setdefault((one.sha256, one.contact), (number, one.recording))
+            if owner != number:
+                yield _reason(ReasonKind.SAME_RECORDING, item.point, recording=one.recording, other=known)
 
 
 def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:
@@ -304,10 +325,13 @@ def _is_saturated(cause: object) -> bool:
 def _of_drift(
     point: MeasuringPoint, item: Repetition, profile: ForceProfile, about: Mapping[str, str | float]
 ) -> Iterator[Reason]:
-    """Yield the steps that pass only if the level at rest did not drift as it did before the contact."""
+    """Yield the steps that pass only if the level at rest is exact: no drift as before the contact, no early rise."""
     for number, step in enumerate(item.verdict.steps):
         until = min(profile.ends(number), item.curve.end)
         moved = abs(item.drift) * until
+        if step.outcome == "pass" and step.peak + item.rest_error > step.step.at_most_n:
+            most = {"peak": step.peak, "limit": step.step.at_most_n, "error": item.rest_error}
+            yield _reason(ReasonKind.REST_DECIDES, point, **about, step=step.step.name, **most)
         if step.outcome == "pass" and step.peak + moved > step.step.at_most_n:
             name, limit = step.step.name, step.step.at_most_n
             drift = item.drift

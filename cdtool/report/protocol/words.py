@@ -63,6 +63,8 @@ class Words:
             values["step"] = self.name("step", str(values["step"]))
         if "averaged" in values:
             values["averaged"] = self(f"averaged.{values['averaged']}")
+        if reason.kind is ReasonKind.POINT_EXCEEDS:
+            values["force"] = self._above(float(reason.values["force"]), float(reason.values["limit"]))  # type: ignore[arg-type]  # numbers
         if reason.kind is ReasonKind.NO_VALUE:
             values["keys"] = values.pop("key")
         return self(f"reason.{reason.kind.value}", **values)
@@ -76,6 +78,11 @@ class Words:
             keys = ", ".join(str(reason.values["key"]) for reason in empty if reason.values["file"] == file)
             sentences.append(self("reason.no_value", file=file, keys=keys))
         return sentences
+
+    def _above(self, value: float, limit: float) -> str:
+        """Return a number above a limit with as many digits as show that it is above."""
+        digits = (count for count in range(_DIGITS, 17) if float(f"{value:.{count}g}") > limit)
+        return self.number(value, next(digits, 17))
 
     def _date(self, day: dt.date) -> str:
         return str(self.texts["date"]).format(

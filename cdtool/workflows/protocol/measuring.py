@@ -10,17 +10,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.evaluation.protocol.plan import MeasuringPoint
 from cdtool.evaluation.results import Skipped
-from cdtool.recording import Recording
+from cdtool.evaluation.truth.missing_samples import cell_samples
+from cdtool.recording import Contact, Recording
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
 from cdtool.workflows.contacts.matched_log import force_curves
 from cdtool.workflows.protocol.protocol_file import ProtocolFile
 from cdtool.workflows.runs import find_logs, resolve_all
+
+# A record that begins within this time [s] before a contact may show no rest at all: a slow contact begins with it.
+_EARLY = 0.6
+# Its first readings, over this time [s], are those nearest to the rest.
+_FIRST = 0.01
 
 
 @dataclass(frozen=True)
@@ -81,7 +89,8 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
         if point.group:
             logs = _of_group(point, setup, f"{file.path}: protocol.{key}.group")
         else:
-            logs = [_scored_log(log, groups, file, key) for log in _found(point.logs, file, key)]
+            # Two patterns may name one file: it is one recording.
+            logs = list(dict.fromkeys(_scored_log(log, groups, file, key) for log in _found(point.logs, file, key)))
         for _, log in logs:
             if owner.setdefault(log, number) != number:
                 raise ConfigurationError(
@@ -153,18 +162,23 @@ def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[lis
     """Return the contacts of a recording, and those that do not count."""
     recording: Recording = read.recording
     curves, problems = force_curves(recording, read.contacts, mass)
-    repetitions = [
-        Repetition.of(
-            (recording.name, recording.digest),
-            number,
-            curve,
-            profile,
-            (read.contacts[number - 1].rest, read.contacts[number - 1].drift),
-        )
-        for number, curve in curves.items()
-    ]
+    repetitions = []
+    for number, curve in curves.items():
+        contact = read.contacts[number - 1]
+        of_file = (recording.name, recording.digest)
+        measured = Repetition.of(of_file, number, curve, profile, (contact.rest, contact.drift))
+        repetitions.append(replace(measured, rest_error=_rest_error(recording, contact)))
     unmeasured = [Unmeasured(recording.name, "in_progress") for contact in read.contacts if contact.in_progress]
     unmeasured += [Unmeasured(recording.name, "no_force", str(problem)) for problem in problems]
     if "force" not in recording:
         unmeasured.append(Unmeasured(recording.name, "no_force", "no load cell"))
     return repetitions, unmeasured
+
+
+def _rest_error(recording: Recording, contact: Contact) -> float:
+    """Return by how much the rest before a contact differs from the first readings [N]; 0 of a record long enough."""
+    samples = cell_samples(recording["force"])
+    begin = float(samples.time[0])
+    if contact.start - begin > _EARLY or not np.isfinite(contact.rest):
+        return 0.0
+    return abs(contact.rest - float(np.mean(samples.force[samples.time <= begin + _FIRST])))

@@ -172,4 +172,5 @@ def _date(table: Table, name: str) -> dt.date:
     try:
         return dt.date.fromisoformat(table.text(name))
     except (ValueError, ConfigurationError) as fault:
-        raise table.fault(name, f"is {value_in_words(value)}", "write a day as 2026-03-31") from fault
+        shown = str(value) if isinstance(value, dt.datetime | dt.time) else value_in_words(value)
+        raise table.fault(name, f"is {shown}", "write a day as 2026-03-31") from fault

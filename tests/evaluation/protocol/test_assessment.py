@@ -137,10 +137,14 @@ def test_with_too_few_repetitions_nothing_passes(count):
     assert found == "incomplete" and ("too_few_repetitions" if count else "not_measured") in reasons
 
 
-def test_more_repetitions_than_planned_all_count():
+def test_more_repetitions_than_planned_all_count_and_are_incomplete_where_they_are_averaged():
     four = [*three(curve(sine())), repetition(curve(sine(100.0)), 4)]
+    assert assess_point(replace(POINT, repetitions=4), PROFILE, four, instrument=METER).outcome == "pass"
+    alone = replace(PROFILE, average_of=1)
+    assert assess_point(POINT, alone, four, instrument=METER).outcome == "pass"
     found = assess_point(POINT, PROFILE, four, instrument=METER)
-    assert found.outcome == "pass" and found.verdict is not None and found.verdict.tests == 4
+    assert [reason.kind.value for reason in found.reasons] == ["too_many_repetitions"]
+    assert found.outcome == "incomplete" and found.verdict is not None and found.verdict.tests == 4
     assert found.verdict.steps[0].force == pytest.approx(250.0, abs=0.1)
 
 

@@ -138,6 +138,15 @@ def test_hostile_names_are_text_and_the_same_document_gives_the_same_bytes(proto
     assert "#panic()" in "".join(page.extract_text() for page in pypdf.PdfReader(io.BytesIO(made)).pages)
 
 
+def test_a_long_name_of_a_point_breaks_in_its_heading(protocols, pypdf):
+    (point,) = protocols["pass"].points
+    long = replace(point, point=replace(point.point, name="Nebenschließkante" * 12))
+    made = to_pdf(protocol_document(replace(protocols["pass"], points=(long,))))
+    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(made)).pages]
+    # 176 mm hold about 100 characters.
+    assert max(len(line) for text in pages for line in text.splitlines() if "Nebenschließkante" in line) < 150
+
+
 def test_the_only_date_in_it_is_the_day_of_the_test(documents, pypdf):
     info = pypdf.PdfReader(io.BytesIO(to_pdf(documents["pass"]))).metadata
     assert str(info["/CreationDate"]).startswith("D:20260331")

@@ -75,3 +75,10 @@ def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
 def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():
     reasons = tuple(Reason(ReasonKind.NO_VALUE, {"key": key, "file": "p.toml"}) for key in ("a", "b"))
     assert words_of("en").reasons(Verdict(reasons), "incomplete") == ["Missing in p.toml: a, b"]
+
+
+def test_a_force_just_above_its_limit_is_shown_with_the_digits_that_exceed_it():
+    values = {"point": "edge", "step": "dynamic", "limit": 400.0, "count": 3, "averaged": "mean"}
+    words = words_of("de")
+    assert "400,04 N, Grenze 400 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**values, "force": 400.04}))
+    assert "Spitzenwerten 412,3 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**values, "force": 412.345}))

@@ -8,6 +8,7 @@ import re
 from dataclasses import fields, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cdtool
@@ -115,12 +116,54 @@ def test_a_point_names_its_logs_by_patterns(tmp_path):
     assert cdtool.protocol(write_protocol(tmp_path, logs='logs = ["edge/0[12].csv"]')).verdict.outcome == "incomplete"
 
 
+@pytest.mark.parametrize(("slope", "reading"), [(150.0, 156.0), (400.0, 165.0)])
+def test_a_slow_contact_that_begins_with_the_record_does_not_pass_by_a_wrong_rest(slope, reading, tmp_path):
+    def ramp(time):
+        return np.where(time < 1.5, np.minimum(slope * (time + 3.0), reading), 0.0)
+
+    write_rig(tmp_path, (ramp, ramp, ramp))
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert protocol.points[0].repetitions[0].verdict.steps[1].peak < 150.0 < reading
+    assert kinds(protocol) == ["rest_decides"] * 3
+
+
+def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
+    def touch_then_impact(time):
+        return half_sine(30.0)(time + 2.0) + half_sine(405.0)(time)
+
+    write_rig(tmp_path, (touch_then_impact, half_sine(404.0), half_sine(403.0)), seconds=9.0)
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert "too_many_repetitions" in kinds(protocol) and protocol.verdict.outcome == "incomplete"
+    many = next(reason for reason in protocol.verdict.reasons if reason.kind.value == "too_many_repetitions")
+    assert many.values == {"point": "edge", "present": 4, "planned": 3}
+
+
+def test_a_file_that_two_patterns_of_a_point_name_is_one_repetition(tmp_path):
+    write_rig(tmp_path, FORCES[:1])
+    logs = 'logs = ["edge/*.csv", "edge/01.csv", "edge/../edge/01.csv"]'
+    protocol = cdtool.protocol(write_protocol(tmp_path, logs=logs))
+    assert (kinds(protocol), len(protocol.points[0].repetitions)) == (["too_few_repetitions"], 1)
+
+
+def test_a_copy_of_a_recording_at_another_point_is_no_measurement_of_it(tmp_path):
+    write_rig(tmp_path, (*FORCES, half_sine(310.0), half_sine(330.0), half_sine(1.0)))
+    (tmp_path / "edge" / "06.csv").write_bytes((tmp_path / "edge" / "01.csv").read_bytes())
+    path = write_protocol(tmp_path, logs='logs = ["edge/0[123].csv"]')
+    text = path.read_text(encoding="utf-8")
+    point = text[text.index("[[protocol.point]]") :].replace('"edge"', '"other"').replace("0[123]", "0[456]")
+    path.write_text(text + point, encoding="utf-8")
+    protocol = cdtool.protocol(path)
+    assert (protocol.verdict.outcome, kinds(protocol)) == ("incomplete", ["same_recording"])
+    assert protocol.verdict.reasons[0].values == {"point": "other", "recording": "edge/06.csv", "other": "edge/01.csv"}
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"logs": 'group = "edges"'}, "no group 'edges'"),
         ({"logs": 'logs = ["*.toml"]'}, "is not in a group of"),
         ({"day": '"31.3.2026"'}, "write a day as 2026-03-31"),
+        ({"day": "2026-03-31T10:00:00"}, "is 2026-03-31 10:00:00 (write a day as 2026-03-31)"),
         ({"language": "fr"}, "protocol.language"),
         ({"more": "speed = 1"}, "protocol.point[1].speed: unknown key"),
         ({"more": "obstacle = 3"}, "protocol.point[1].obstacle"),
