@@ -6,7 +6,6 @@ import inspect
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import is_dataclass
 from enum import EnumType
 from importlib import import_module
 from pathlib import Path
@@ -128,9 +127,7 @@ def _python_pages() -> dict[str, str]:
     pages, rows, returned = {}, [], dict[str, Any]()
     for name, function in functions.items():
         rows.append([f"[`cdtool.{name}`](functions.md#cdtool{name})", _summary(function)])
-        # The names of other annotations are imported for type checkers only.
-        result = getattr(import_module(function.__module__), str(function.__annotations__.get("return")), None)
-        if inspect.isclass(result) and is_dataclass(result):
+        for result in _returned(function, exported):
             returned.setdefault(_place(result), result)
     text = "# Functions of cdtool\n\n"
     text += "".join(f"## cdtool.{name}\n\n" + _directive("autofunction", f"cdtool.{name}") for name in functions)
@@ -159,6 +156,16 @@ def _python_pages() -> dict[str, str]:
         + _table(["page", "contents"], more)
     )
     return pages
+
+
+def _returned(function: Any, exported: Mapping[str, Any]) -> list[Any]:
+    """Return the classes of cdtool that the docstring names as the result, or else the annotation."""
+    section = re.search(r"^Returns\n-+\n(.*)$", inspect.getdoc(function) or "", re.MULTILINE)
+    described = re.findall(r"\w+", section[1]) if section else []
+    # The names of some annotations are imported for type checkers only.
+    known = {**vars(import_module(function.__module__)), **exported}
+    found = [known.get(name) for name in described] or [known.get(str(function.__annotations__.get("return")))]
+    return [item for item in found if inspect.isclass(item) and item.__module__.startswith("cdtool.")]
 
 
 def _exported(place: str) -> Any:
