@@ -77,11 +77,11 @@ def _command_text(name: str, command: Any, level: int) -> str:
     lines = [f"{'#' * level} cdtool {name}\n"]
     for paragraph in (command.help or "").strip().split("\n\n"):
         example = re.fullmatch(r"Example: (.*)", " ".join(paragraph.split()))
-        lines.append(f"```text\n{example[1]}\n```\n" if example else paragraph.strip() + "\n")
+        lines.append(f"```text\n{example[1]}\n```\n" if example else _with_links(paragraph.strip()) + "\n")
     arguments = [item for item in command.params if item.param_type_name == "argument"]
     options = [item for item in command.params if item.param_type_name == "option" and not item.hidden]
     if arguments:
-        rows = [[f"`{item.metavar or item.name.upper()}`", _cell(item.help or "")] for item in arguments]
+        rows = [[f"`{item.metavar or item.name.upper()}`", _linked(item.help or "")] for item in arguments]
         lines.append(_table(["argument", "meaning"], rows))
     if options:
         lines.append(_table(["option", "meaning"], [_option(item) for item in options]))
@@ -89,6 +89,15 @@ def _command_text(name: str, command: Any, level: int) -> str:
         lines.append(f"Exit statuses: {', '.join(str(int(status)) for status in sorted(STATUSES_OF[name]))}"
                      " ([what they mean](index.md#exit-statuses)).\n")  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def _linked(help_text: str) -> str:
+    return _with_links(_cell(help_text))
+
+
+def _with_links(text: str) -> str:
+    """Turn the names of pages in a help text into links."""
+    return re.sub(r"\bdocs/([\w/-]+\.md)", r"[\1](../../\1)", text)
 
 
 def _option(item: Any) -> list[str]:
@@ -102,7 +111,7 @@ def _option(item: Any) -> list[str]:
         text += " Repeatable."
     if item.required:
         text += " Required."
-    return [_cell(f"{names} {value}"), _cell(text)]
+    return [_cell(f"{names} {value}"), _linked(text)]
 
 
 def _value(item: Any) -> str:

@@ -42,8 +42,7 @@ def test_the_navigation_names_every_page_once_and_only_pages_that_exist(navigati
     assert len(named) == len(set(named))
     for name in named:
         assert name in pages or (DOCS / f"{name}.md").is_file(), name
-    patterns = [item for part in parts for item in part.get("gathered", ())]
-    patterns += [item for items in navigation["below"].values() for item in items]
+    patterns = [item for items in navigation["below"].values() for item in items]
     reached = {(DOCS / f"{name}.md").resolve() for name in named}
     reached |= {file.resolve() for pattern in patterns for file in DOCS.glob(f"{pattern}.md")}
     missing = {page.resolve() for page in PAGES if page != ROOT / "README.md"} - reached
