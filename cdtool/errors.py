@@ -6,6 +6,8 @@ Conventions: one line with the file, the row or key and the value, then a hint w
 from __future__ import annotations
 
 from difflib import get_close_matches
+from itertools import takewhile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -26,6 +28,20 @@ class CdtoolError(Exception):
 
     def __str__(self) -> str:
         return f"{self.message} ({self.hint})" if self.hint else self.message
+
+    def _render_traceback_(self) -> list[str]:
+        """Return what Jupyter shows: the line of the caller and the error, without the frames inside cdtool.
+
+        `%debug` still stops where the error was raised.
+        """
+        import traceback
+
+        package = str(Path(__file__).parent)
+        calls = traceback.extract_tb(self.__traceback__)
+        callers = list(takewhile(lambda call: not call.filename.startswith(package), calls))
+        place = [f"line {callers[-1].lineno}: {callers[-1].line}"] if callers and callers[-1].line else []
+        hint = [f"next step: {self.hint}"] if self.hint else []
+        return [*place, f"{type(self).__name__}: {self.message}", *hint]
 
 
 class UsageError(CdtoolError):

@@ -220,17 +220,18 @@ class Recording(StoresDerived):
         seen = {name: series for name, series in self.channels.items() if name not in GROUND_TRUTH}
         return replace(self, channels=seen)
 
-    def to_frame(self, channels: Sequence[str] = ()) -> pd.DataFrame:
+    def to_frame(self, channels: str | Sequence[str] = ()) -> pd.DataFrame:
         """Return channels as a DataFrame with a row for each time at which one of them has a sample.
 
         A value is NaN where the channel has no sample at that time: nothing is interpolated, and `frame.ffill()` holds
         the last sample. The index is `time_s`; the columns are named as `cdtool convert` names them: `speed [m/s]`,
-        with several joints `speed arm [rad/s]`. Without `channels`: all of them. Raises RecordingError for a channel
-        that the recording does not have.
+        with several joints `speed arm [rad/s]`. `channels` is a name or several; without it: all of them. Raises
+        RecordingError for a channel that the recording does not have.
         """
         import pandas as pd
 
-        shown = {name: self[name] for name in channels or self.channels}
+        names = (channels,) if isinstance(channels, str) else channels
+        shown = {name: self[name] for name in names or self.channels}
         time = np.unique(np.concatenate([np.empty(0), *(series.time for series in shown.values())]))
         columns: dict[str, FloatArray] = {}
         for name, series in shown.items():

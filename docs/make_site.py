@@ -69,9 +69,7 @@ def add_navigation(target: Path, navigation: Mapping[str, Any]) -> None:
     for section in sections:
         text = [f"# {section['title']}\n", f"{section['text']}\n"]
         for part in section["part"]:
-            names = [*part["pages"], *_gathered(target, part.get("gathered", ()), part["pages"])]
-            if not names:
-                continue
+            names = part["pages"]
             rows = "".join(f"| [{_title(target, name)}]({name}.md) | {known.get(name, '')} |\n" for name in names)
             text += [f"## {part['title']}\n", f"| page | contents |\n|---|---|\n{rows}", _toctree(names, part["title"])]
         if section["name"] == "gallery":
@@ -125,7 +123,9 @@ def _descriptions() -> dict[str, str]:
         "../sample_logs/README": "the recordings that come with cdtool: simulated ones, and those of a real robot",
         "index": "all pages in one list",
     }
-    return dict(re.findall(r"^\| \[[^\]]*\]\(([\w/.-]+)\.md\) \| (.*) \|$", text, re.MULTILINE)) | own
+    row = re.compile(r"^\| \[[^\]]*\]\(([\w/.-]+)\.md\) \| (.*) \|$", re.MULTILINE)
+    examples = row.findall((DOCS / "gallery" / "index.md").read_text(encoding="utf-8"))
+    return {**{f"gallery/{name}": about for name, about in examples}, **dict(row.findall(text)), **own}
 
 
 def _pictures(target: Path) -> str:

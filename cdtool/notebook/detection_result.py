@@ -23,6 +23,7 @@ from cdtool.recording import Recording
 from cdtool.workflows.detection import Detected, DetectedRuns, contact_of, detect_log, detect_log_runs
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.keyword_options import by_keywords
+from cdtool.workflows.runs import several_logs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -331,7 +332,7 @@ def detect_logs(
     Raises
     ------
     UsageError
-        No threshold is given, or more than one; a single log is cut into several runs.
+        No threshold is given, or more than one; the list of logs is empty; a single log is cut into several runs.
     SignatureError
         The signature belongs to another machine or to other gains.
     RecordingError
@@ -349,6 +350,7 @@ def detect_logs(
     """
     if isinstance(logs, str | Path):
         return DetectionResult(detect_log(logs, options))
+    logs = several_logs(logs)
     options = replace(options, benchmark=options.prepared())  # learned once for all logs
     found: list[DetectedRuns] = []
     skipped: list[Skipped] = []

@@ -208,7 +208,8 @@ class _OneDetector:
         signature, detector, limit, joints = options.signature, options.detector, options.limit, options.joints
         if [signature is not None, bool(limit), options.warm_up is not None].count(True) != 1:
             hint = "give one of --signature FILE, --limit VALUE, --warm-up SECONDS"
-            raise UsageError("give a signature, a limit or a warm-up", hint)
+            in_python = "in Python signature=, limit=[...], warm_up="
+            raise UsageError("give a signature, a limit or a warm-up", f"{hint}; {in_python}")
         thresholds: tuple[FittedThreshold, ...]
         learned: set[str] = set()
         ranges: PlausibleRanges | None = None

@@ -69,6 +69,11 @@ class DetectionOptions:
     activation: ActivationSettings | None = None
     rules: ScoringRules | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse a limit that is a number and not a list."""
+        if isinstance(self.limit, int | float):
+            raise UsageError(f"limit is {self.limit}, not a list", f"give limit=[{self.limit}], or one per joint")
+
     def prepared(self) -> PreparedBenchmark | None:
         """Return the benchmark, read and learned, or None; raises UsageError for settings combined with it."""
         if self.benchmark is None:

@@ -230,6 +230,18 @@ class RunReading:
     progress: Progress | None = None
 
 
+def several_logs(logs: Sequence[str | Path]) -> list[str | Path]:
+    """Return the logs as a list; raises UsageError for a single path, and if there is none.
+
+    A text is a sequence of letters, and a pattern with a typing error matches nothing: neither is a list of logs.
+    """
+    if isinstance(logs, str | Path):
+        raise UsageError(f"{logs}: a single path, not a list of logs", "give a list, as sorted(Path(...).glob(...))")
+    if not (found := list(logs)):
+        raise UsageError("no log is given", "check the folder and the pattern that the list is made from")
+    return found
+
+
 def load_runs(
     paths: Sequence[Path], machine_file: MachineFile, reading: RunReading, ranges: PlausibleRanges | None = None
 ) -> Runs:

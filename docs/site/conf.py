@@ -107,6 +107,13 @@ def _as_rst(line: str) -> str:
     return bullet + "".join(parts)
 
 
+def front_page_title(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: nodes.document) -> None:
+    """Let the browser show "cdtool" for the front page, not "cdtool — cdtool"."""
+    del app, template, tree
+    if page == root_doc:
+        context["docstitle"] = ""
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the renderer of equations, and the reader of docstrings before numpydoc's."""
     app.add_html_math_renderer(
@@ -115,4 +122,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
         (lambda self, node: mathml(self, node, block=True), None),
     )
     app.connect("autodoc-process-docstring", plain_rst, priority=100)
+    app.connect("html-page-context", front_page_title)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

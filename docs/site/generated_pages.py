@@ -6,7 +6,6 @@ import inspect
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import is_dataclass
 from enum import EnumType
 from importlib import import_module
 from pathlib import Path
@@ -78,11 +77,11 @@ def _command_text(name: str, command: Any, level: int) -> str:
     lines = [f"{'#' * level} cdtool {name}\n"]
     for paragraph in (command.help or "").strip().split("\n\n"):
         example = re.fullmatch(r"Example: (.*)", " ".join(paragraph.split()))
-        lines.append(f"```text\n{example[1]}\n```\n" if example else paragraph.strip() + "\n")
+        lines.append(f"```text\n{example[1]}\n```\n" if example else _with_links(paragraph.strip()) + "\n")
     arguments = [item for item in command.params if item.param_type_name == "argument"]
     options = [item for item in command.params if item.param_type_name == "option" and not item.hidden]
     if arguments:
-        rows = [[f"`{item.metavar or item.name.upper()}`", _cell(item.help or "")] for item in arguments]
+        rows = [[f"`{item.metavar or item.name.upper()}`", _linked(item.help or "")] for item in arguments]
         lines.append(_table(["argument", "meaning"], rows))
     if options:
         lines.append(_table(["option", "meaning"], [_option(item) for item in options]))
@@ -90,6 +89,15 @@ def _command_text(name: str, command: Any, level: int) -> str:
         lines.append(f"Exit statuses: {', '.join(str(int(status)) for status in sorted(STATUSES_OF[name]))}"
                      " ([what they mean](index.md#exit-statuses)).\n")  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def _linked(help_text: str) -> str:
+    return _with_links(_cell(help_text))
+
+
+def _with_links(text: str) -> str:
+    """Turn the names of pages in a help text into links."""
+    return re.sub(r"\bdocs/([\w/-]+\.md)", r"[\1](../../\1)", text)
 
 
 def _option(item: Any) -> list[str]:
@@ -103,7 +111,7 @@ def _option(item: Any) -> list[str]:
         text += " Repeatable."
     if item.required:
         text += " Required."
-    return [_cell(f"{names} {value}"), _cell(text)]
+    return [_cell(f"{names} {value}"), _linked(text)]
 
 
 def _value(item: Any) -> str:
@@ -128,9 +136,7 @@ def _python_pages() -> dict[str, str]:
     pages, rows, returned = {}, [], dict[str, Any]()
     for name, function in functions.items():
         rows.append([f"[`cdtool.{name}`](functions.md#cdtool{name})", _summary(function)])
-        # The names of other annotations are imported for type checkers only.
-        result = getattr(import_module(function.__module__), str(function.__annotations__.get("return")), None)
-        if inspect.isclass(result) and is_dataclass(result):
+        for result in _returned(function, exported):
             returned.setdefault(_place(result), result)
     text = "# Functions of cdtool\n\n"
     text += "".join(f"## cdtool.{name}\n\n" + _directive("autofunction", f"cdtool.{name}") for name in functions)
@@ -159,6 +165,16 @@ def _python_pages() -> dict[str, str]:
         + _table(["page", "contents"], more)
     )
     return pages
+
+
+def _returned(function: Any, exported: Mapping[str, Any]) -> list[Any]:
+    """Return the classes of cdtool that the docstring names as the result, or else the annotation."""
+    section = re.search(r"^Returns\n-+\n(.*)$", inspect.getdoc(function) or "", re.MULTILINE)
+    described = re.findall(r"\w+", section[1]) if section else []
+    # The names of some annotations are imported for type checkers only.
+    known = {**vars(import_module(function.__module__)), **exported}
+    found = [known.get(name) for name in described] or [known.get(str(function.__annotations__.get("return")))]
+    return [item for item in found if inspect.isclass(item) and item.__module__.startswith("cdtool.")]
 
 
 def _exported(place: str) -> Any:

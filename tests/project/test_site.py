@@ -42,8 +42,7 @@ def test_the_navigation_names_every_page_once_and_only_pages_that_exist(navigati
     assert len(named) == len(set(named))
     for name in named:
         assert name in pages or (DOCS / f"{name}.md").is_file(), name
-    patterns = [item for part in parts for item in part.get("gathered", ())]
-    patterns += [item for items in navigation["below"].values() for item in items]
+    patterns = [item for items in navigation["below"].values() for item in items]
     reached = {(DOCS / f"{name}.md").resolve() for name in named}
     reached |= {file.resolve() for pattern in patterns for file in DOCS.glob(f"{pattern}.md")}
     missing = {page.resolve() for page in PAGES if page != ROOT / "README.md"} - reached
@@ -73,15 +72,20 @@ def test_every_command_and_option_is_on_its_page(pages):
     assert all(f"[`cdtool {name}`]" in pages["reference/cli/index"] for name in COMMANDS)
 
 
-def test_every_function_class_and_field_is_on_a_generated_page(pages):
-    of_classes = "".join(text for name, text in pages.items() if name.startswith("reference/python/"))
+def test_every_function_and_field_is_on_a_generated_page(pages):
+    python = {name: text for name, text in pages.items() if name.startswith("reference/python/")}
+    classes = [place for text in python.values() for place in re.findall(r"autoclass:: (\S+)", text)]
+    assert len(classes) == len(set(classes))
     for name in (name for name in _API if not name.startswith("__")):
-        exported = getattr(cdtool, name)
-        if inspect.isclass(exported):
-            assert f".. autoclass:: {exported.__module__}.{exported.__qualname__}\n" in of_classes
+        item = getattr(cdtool, name)
+        if inspect.isclass(item):
+            assert f"{item.__module__}.{item.__qualname__}" in classes, name
             continue
         assert f".. autofunction:: cdtool.{name}\n" in pages["reference/python/functions"]
         assert re.search(rf"\[`cdtool\.{name}`\]\([^)]*\) \| \w", pages["reference/python/index"]), name
+    for name in ("BenchmarkResult", "DetectionResult", "DetectionResults", "Learned", "Recording"):
+        assert re.search(rf"^## {name}$", pages["reference/python/results"], re.MULTILINE), name
+    assert not re.search(r"^## (Benchmark|Score|DetectedRuns)$", pages["reference/python/results"], re.MULTILINE)
     schema = json.loads((DOCS / "results.schema.json").read_text(encoding="utf-8"))
     for part in (schema, *schema["$defs"].values()):
         for field in part.get("properties", ()):

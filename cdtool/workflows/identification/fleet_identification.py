@@ -22,7 +22,7 @@ from cdtool.remote.remote_path import location
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification, identify
 from cdtool.workflows.log_groups import by_machine, day_in_path, day_of
-from cdtool.workflows.runs import find_logs, read_log, shown_path
+from cdtool.workflows.runs import find_logs, read_log, several_logs, shown_path
 
 # By machine, the logs of a machine are divided in their order into periods of at least so many logs, at most so many.
 _LOGS_PER_PERIOD, _MOST_PERIODS = 5, 8
@@ -208,7 +208,7 @@ def identify_fleet(
     not logged, as temperature: a change of the machine is not proven by one of its parameters.
     """
     machine_file = read_machine_file(location(machine))
-    paths = find_logs(map(str, logs), Path(), "LOGS")
+    paths = find_logs(map(str, several_logs(logs)), Path(), "LOGS")
     named = by_machine(paths, machine_file.machine.name)
     skipped: list[Skipped] = []
     if by is Division.DAY:

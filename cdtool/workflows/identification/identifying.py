@@ -56,7 +56,7 @@ from cdtool.workflows.identification.machine_update import (
     robot_files,
     updated_text,
 )
-from cdtool.workflows.runs import RunReading, Runs, find_logs, load_runs
+from cdtool.workflows.runs import RunReading, Runs, find_logs, load_runs, several_logs
 
 # Reasons that the message of an error lists.
 _MOST_REASONS = 3
@@ -345,7 +345,7 @@ def _impact_free(
     logs: Sequence[str | Path], key: str, machine_file: MachineFile, reading: RunReading
 ) -> tuple[Runs, list[Recording]]:
     """Return the runs of some logs, and their recordings; raises IdentificationError if none is impact-free."""
-    runs = load_runs(find_logs(map(str, logs), Path(), key), machine_file, reading)
+    runs = load_runs(find_logs(map(str, several_logs(logs)), Path(), key), machine_file, reading)
     recordings = [operation.recording for operation in runs.operations]
     if not recordings:
         reason = runs.skipped[0].reason if runs.skipped else "no log is given"

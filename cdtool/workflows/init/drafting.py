@@ -36,6 +36,7 @@ from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
 from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
+from cdtool.workflows.runs import several_logs
 
 # Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
 _SLOWEST = 2.0
@@ -168,7 +169,7 @@ def init_study(
     >>> "[impacts.stiff]" in study.text, "above_n" in study.text
     (True, True)
     """
-    target, paths = location(folder), [location(log) for log in logs]
+    target, paths = location(folder), [location(log) for log in several_logs(logs)]
     file = target / "benchmark.toml"
     _refuse_existing(force, file, *([target / "machine.toml"] if machine is None else []))
     target.mkdir(parents=True, exist_ok=True)

@@ -32,7 +32,7 @@ from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.log_groups import Split
-from cdtool.workflows.runs import PartOfLog, RunReading, Runs, check_joints, load_runs
+from cdtool.workflows.runs import PartOfLog, RunReading, Runs, check_joints, load_runs, several_logs
 from cdtool.workflows.signature.calibration import calibrate, in_fixed_order, kept
 from cdtool.workflows.signature.fitting import fitting, for_machine, signals_of, with_left_out
 from cdtool.workflows.signature.normal_runs import normal_motions
@@ -143,7 +143,8 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     SignatureError
         There are too few runs, or the detector is not assessable in them.
     UsageError
-        There are too few runs for the false-alarm budget, or the safety factor is set twice.
+        No log is given, or a path in place of a list; there are too few runs for the false-alarm budget, or the safety
+        factor is set twice.
     CdtoolError
         No log can be read.
 
@@ -170,7 +171,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
             f"leave the threshold out, or give {wanted.name}",
         )
     _refuse_by_hand(wanted, budget)
-    paths = [location(log) for log in logs]
+    paths = [location(log) for log in several_logs(logs)]
     part = _part(paths, options)
     workers = options.workers or Workers(options.jobs)
     reading = RunReading(operations, onset=options.onset, part=part, workers=workers, progress=options.progress)

@@ -31,7 +31,7 @@ from cdtool.thresholds.guarded_update import CAP, RESERVE, guarded
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.keyword_options import by_keywords
-from cdtool.workflows.runs import RunReading, Runs, load_runs
+from cdtool.workflows.runs import RunReading, Runs, load_runs, several_logs
 from cdtool.workflows.signature.fitting import Pair, signals_of
 from cdtool.workflows.signature.learning import learned_run
 from cdtool.workflows.signature.normal_runs import with_operation
@@ -141,7 +141,7 @@ class SeasonOptions:
         operations = _cut(file, self.operations)
         workers = self.workers or Workers(self.jobs)
         reading = RunReading(operations, onset=self.onset, workers=workers, progress=self.progress)
-        return load_runs([location(log) for log in self.logs], machine_file, reading, file.plausible)
+        return load_runs([location(log) for log in several_logs(self.logs)], machine_file, reading, file.plausible)
 
 
 @dataclass(frozen=True, kw_only=True)
