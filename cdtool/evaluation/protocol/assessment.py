@@ -33,7 +33,7 @@ class Repetition:
 
     `rest` [N]: the load cell's reading before the contact, which is subtracted; `drift` [N/s]: its drift, 0 unless
     beyond doubt; `rest_error` [N]: how far the rest may be wrong because the record begins shortly before the contact.
-    `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
+    `losses`: what the reader of the recording could not keep, in words. `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
     """
 
     recording: str
@@ -47,6 +47,7 @@ class Repetition:
     total_time: float = math.nan
     latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
     rest_error: float = 0.0
+    losses: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -157,6 +158,7 @@ def assess_point(
         reasons += _exceeded(point, verdict, profile)
         for number, item in enumerate(repetitions, 1):
             reasons += _of_repetition(point, number, item, profile, instrument)
+        reasons += _lost(point, repetitions)
     return PointAssessment(point, profile, tuple(repetitions), verdict, tuple(reasons))
 
 
@@ -316,6 +318,13 @@ def _of_repetition(
     yield from _of_drift(point, item, profile, about)
     if instrument is not None:
         yield from _of_instrument(point, item, instrument, about)
+
+
+def _lost(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
+    """Yield each loss of a recording once: what was dropped may hold a force, or a whole contact."""
+    for recording, losses in {item.recording: item.losses for item in repetitions}.items():
+        for loss in losses:
+            yield _reason(ReasonKind.DATA_LOST, point, recording=recording, message=loss)
 
 
 def _is_saturated(cause: object) -> bool:

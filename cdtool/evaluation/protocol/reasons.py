@@ -38,6 +38,7 @@ class ReasonKind(Enum):
     RATE_TOO_LOW = "rate_too_low"
     RATE_DIFFERS = "rate_differs"
     RECORD_TOO_SHORT = "record_too_short"
+    DATA_LOST = "data_lost"
     BEYOND_RANGE = "beyond_range"
     SATURATED = "saturated"
     DRIFT_DECIDES = "drift_decides"

@@ -162,12 +162,15 @@ def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[lis
     """Return the contacts of a recording, and those that do not count."""
     recording: Recording = read.recording
     curves, problems = force_curves(recording, read.contacts, mass)
+    # A loss of the machine's own channels does not concern the force.
+    others = {name for name in recording.channels if name != "force"}
+    losses = tuple(str(item) for item in recording.findings if item.severity == "loss" and item.channel not in others)
     repetitions = []
     for number, curve in curves.items():
         contact = read.contacts[number - 1]
         of_file = (recording.name, recording.digest)
         measured = Repetition.of(of_file, number, curve, profile, (contact.rest, contact.drift))
-        repetitions.append(replace(measured, rest_error=_rest_error(recording, contact)))
+        repetitions.append(replace(measured, rest_error=_rest_error(recording, contact), losses=losses))
     unmeasured = [Unmeasured(recording.name, "in_progress") for contact in read.contacts if contact.in_progress]
     unmeasured += [Unmeasured(recording.name, "no_force", str(problem)) for problem in problems]
     if "force" not in recording:

@@ -127,6 +127,18 @@ def test_a_slow_contact_that_begins_with_the_record_does_not_pass_by_a_wrong_res
     assert kinds(protocol) == ["rest_decides"] * 3
 
 
+def test_rows_that_the_reader_drops_are_never_a_pass(tmp_path):
+    write_rig(tmp_path, (*FORCES, half_sine(900.0)))
+    header, rest = (tmp_path / "edge" / "04.csv").read_text(encoding="utf-8").split("\n", 1)
+    (tmp_path / "edge" / "04.csv").unlink()
+    # The rig appended the next test: its clock begins again.
+    with (tmp_path / "edge" / "03.csv").open("a", encoding="utf-8") as opened:
+        opened.write(rest)
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert header and (protocol.verdict.outcome, kinds(protocol)) == ("incomplete", ["data_lost"])
+    assert "run backward" in str(protocol.verdict.reasons[0].values["message"])
+
+
 def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
     def touch_then_impact(time):
         return half_sine(30.0)(time + 2.0) + half_sine(405.0)(time)
