@@ -27,6 +27,7 @@ class ReasonKind(Enum):
     TOO_FEW_REPETITIONS = "too_few_repetitions"
     TOO_MANY_REPETITIONS = "too_many_repetitions"
     NOT_MEASURED = "not_measured"
+    NO_FILE = "no_file"
     NOT_ASSESSABLE = "not_assessable"
     UNREADABLE = "unreadable"
     NO_FORCE = "no_force"
