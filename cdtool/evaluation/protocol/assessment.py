@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Literal
 
+import numpy as np
+
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.quantities import dynamic_time, time_above
@@ -25,6 +27,10 @@ _SAME_RATE = 0.02
 # A stated sample rate that differs by more than this share from the measured one is that of another instrument.
 _OTHER_RATE = 0.1
 _SAME_STIFFNESS = 0.02
+# A log repeats each reading of a slower cell. A steady force repeats, too: this share of the changes follows the one
+# before as soon as the cell can, and a curve with fewer changes shows nothing.
+_SOONEST = 0.1
+_ENOUGH_CHANGES = 20
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,8 @@ class Repetition:
 
     `rest` [N]: the load cell's reading before the contact, which is subtracted; `drift` [N/s]: its drift, 0 unless
     beyond doubt; `rest_error` [N]: how far the rest may be wrong because the record begins shortly before the contact.
-    `latencies_ms`: of each detector, None for a contact that it missed or could not assess.
+    `losses`: what the reader of the recording could not keep, in words. `latencies_ms`: of each detector, None for a
+    contact that it missed or could not assess.
     """
 
     recording: str
@@ -47,6 +54,7 @@ class Repetition:
     total_time: float = math.nan
     latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
     rest_error: float = 0.0
+    losses: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -65,10 +73,13 @@ class Repetition:
 
     @property
     def sample_rate(self) -> float:
-        """Return the load cell's measured sample rate [Hz]: the inverse of the median step; NaN below two samples."""
+        """Return the load cell's measured sample rate [Hz]; NaN below two samples.
+
+        It is the inverse of the median step, divided by how often the log repeats each reading.
+        """
         clock = self.curve.clock
         period = clock.period if clock else _median_step(self.curve)
-        return 1.0 / period if period > 0.0 else math.nan
+        return 1.0 / (period * _repeats(self.curve)) if period > 0.0 else math.nan
 
     @property
     def largest_reading(self) -> float:
@@ -157,6 +168,7 @@ def assess_point(
         reasons += _exceeded(point, verdict, profile)
         for number, item in enumerate(repetitions, 1):
             reasons += _of_repetition(point, number, item, profile, instrument)
+        reasons += _lost(point, repetitions)
     return PointAssessment(point, profile, tuple(repetitions), verdict, tuple(reasons))
 
 
@@ -318,6 +330,13 @@ def _of_repetition(
         yield from _of_instrument(point, item, instrument, about)
 
 
+def _lost(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
+    """Yield each loss of a recording once: what was dropped may hold a force, or a whole contact."""
+    for recording, losses in {item.recording: item.losses for item in repetitions}.items():
+        for loss in losses:
+            yield _reason(ReasonKind.DATA_LOST, point, recording=recording, message=loss)
+
+
 def _is_saturated(cause: object) -> bool:
     return getattr(cause, "kind", "") == "saturated"
 
@@ -371,3 +390,11 @@ def _of_instruments(plan: TestPlan, profiles: Sequence[ForceProfile]) -> Iterato
 
 def _median_step(curve: ForceTimeCurve) -> float:
     return CellClock(curve.time).period
+
+
+def _repeats(curve: ForceTimeCurve) -> int:
+    """Return how many samples of the log in a row have one reading of the load cell, at least 1."""
+    changes = np.flatnonzero(np.diff(curve.force))
+    if len(changes) < _ENOUGH_CHANGES:
+        return 1
+    return int(np.quantile(np.diff(changes), _SOONEST, method="lower"))

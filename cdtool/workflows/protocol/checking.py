@@ -67,6 +67,6 @@ def check_protocol(path: str | Path) -> CheckedProtocol:
         points = [check_point(point, file.profile_of(point), 0) for point in file.plan.points]
     else:
         points = [check_point(item.point, profiles_of(item, file, setup), len(item.logs)) for item in assignment.points]
-    verdict = judge(file.plan, points, file.path.name, more)
+    verdict = judge(file.plan, points, file.path.name, [*more, *assignment.absent])
     recordings = {item.point.name: len(item.logs) for item in assignment.points}
     return CheckedProtocol(file, verdict, recordings, setup is None or bool(setup.detectors))

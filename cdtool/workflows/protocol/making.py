@@ -95,7 +95,7 @@ def _made(file: ProtocolFile, setup: BenchmarkFile, results: Results | None, com
     points = tuple(measured_point(item, file, setup, late) for item in assignment.points)
     base = setup.path.parent
     excluded = tuple(ExcludedRecording(shown_path(log, base), reason) for log, reason in assignment.excluded.items())
-    verdict = judge(file.plan, points, file.path.name)
+    verdict = judge(file.plan, points, file.path.name, assignment.absent)
     files = (*_files(file, setup), *_recordings(assignment, points, base, results))
     detectors = results.detectors if results else ()
     return Protocol(file.plan, points, verdict, files, excluded, detectors, __version__, command)

@@ -6,7 +6,7 @@ benchmark file. A contact is a repetition; a recording with several contacts hol
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.evaluation.protocol.plan import MeasuringPoint
+from cdtool.evaluation.protocol.reasons import Reason, ReasonKind
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.recording import Contact, Recording
@@ -41,10 +42,14 @@ class PointLogs:
 
 @dataclass(frozen=True)
 class Assignment:
-    """Which recordings belong to which point, and which are excluded with their reasons."""
+    """Which recordings belong to which point, and which are excluded with their reasons.
+
+    `absent`: patterns without a file, of an exclusion or of a point that has other recordings.
+    """
 
     points: tuple[PointLogs, ...]
     excluded: Mapping[Path, str]
+    absent: tuple[Reason, ...] = ()
 
 
 def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
@@ -60,7 +65,7 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
     Returns
     -------
     Assignment
-        The recordings of each point in order. A pattern without a file, as before the test, is left out.
+        The recordings of each point in order. A point without any, as before the test, has none.
 
     Raises
     ------
@@ -79,8 +84,11 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
     scored = [(name, log) for name, group in setup.impacts.items() if not group.is_impact_free for log in group.logs]
     groups = dict(zip(resolve_all(log for _, log in scored), scored, strict=True))
     excluded: dict[Path, str] = {}
+    absent: list[Reason] = []
     for number, item in enumerate(file.plan.exclusions, 1):
-        for log in _found(item.logs, file, f"exclusion[{number}]"):
+        found, missing = _found(item.logs, file, f"exclusion[{number}]")
+        absent += missing
+        for log in found:
             excluded[_scored_log(log, groups, file, f"exclusion[{number}]")[1]] = item.reason
     owner: dict[Path, int] = {}
     points = []
@@ -89,8 +97,10 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
         if point.group:
             logs = _of_group(point, setup, f"{file.path}: protocol.{key}.group")
         else:
+            found, missing = _found(point.logs, file, key)
+            absent += missing if found else []
             # Two patterns may name one file: it is one recording.
-            logs = list(dict.fromkeys(_scored_log(log, groups, file, key) for log in _found(point.logs, file, key)))
+            logs = list(dict.fromkeys(_scored_log(log, groups, file, key) for log in found))
         for _, log in logs:
             if owner.setdefault(log, number) != number:
                 raise ConfigurationError(
@@ -98,7 +108,7 @@ def assign(file: ProtocolFile, setup: BenchmarkFile) -> Assignment:
                     "a recording belongs to one point",
                 )
         points.append(PointLogs(point, tuple((group, log) for group, log in logs if log not in excluded)))
-    return Assignment(tuple(points), excluded)
+    return Assignment(tuple(points), excluded, tuple(absent))
 
 
 def profiles_of(item: PointLogs, file: ProtocolFile, setup: BenchmarkFile) -> ForceProfile | None:
@@ -107,13 +117,17 @@ def profiles_of(item: PointLogs, file: ProtocolFile, setup: BenchmarkFile) -> Fo
     return file.profile_of(item.point, setup.impacts[names[0]].force if names else None)
 
 
-def _found(patterns: Sequence[str], file: ProtocolFile, key: str) -> Iterator[Path]:
-    """Yield the files that patterns name; before the test there may be none."""
+def _found(patterns: Sequence[str], file: ProtocolFile, key: str) -> tuple[list[Path], list[Reason]]:
+    """Return the files that patterns name, and the patterns without one; before the test there may be none."""
+    found: list[Path] = []
+    missing: list[Reason] = []
     for pattern in patterns:
         try:
-            yield from find_logs([pattern], file.path.parent, f"{file.path}: protocol.{key}.logs", runs=True)
+            found += find_logs([pattern], file.path.parent, f"{file.path}: protocol.{key}.logs", runs=True)
         except ConfigurationError:
-            continue
+            values = {"entry": f"protocol.{key}.logs", "pattern": pattern}
+            missing.append(Reason(ReasonKind.NO_FILE, values, due="test_day"))
+    return found, missing
 
 
 def _scored_log(log: Path, groups: Mapping[Path, tuple[str, Path]], file: ProtocolFile, key: str) -> tuple[str, Path]:
@@ -162,12 +176,15 @@ def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[lis
     """Return the contacts of a recording, and those that do not count."""
     recording: Recording = read.recording
     curves, problems = force_curves(recording, read.contacts, mass)
+    # A loss of the machine's own channels does not concern the force.
+    others = {name for name in recording.channels if name != "force"}
+    losses = tuple(str(item) for item in recording.findings if item.severity == "loss" and item.channel not in others)
     repetitions = []
     for number, curve in curves.items():
         contact = read.contacts[number - 1]
         of_file = (recording.name, recording.digest)
         measured = Repetition.of(of_file, number, curve, profile, (contact.rest, contact.drift))
-        repetitions.append(replace(measured, rest_error=_rest_error(recording, contact)))
+        repetitions.append(replace(measured, rest_error=_rest_error(recording, contact), losses=losses))
     unmeasured = [Unmeasured(recording.name, "in_progress") for contact in read.contacts if contact.in_progress]
     unmeasured += [Unmeasured(recording.name, "no_force", str(problem)) for problem in problems]
     if "force" not in recording:

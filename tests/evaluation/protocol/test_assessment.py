@@ -254,3 +254,19 @@ def test_a_plan_names_each_point_once():
         replace(PLAN, points=(POINT, POINT))
     with pytest.raises(UsageError, match="group and logs"):
         replace(POINT, logs=("a.csv",))
+
+
+@pytest.mark.parametrize(("held", "found"), [(1, []), (4, []), (20, ["rate_too_low"])])
+def test_a_log_that_repeats_each_reading_has_the_sample_rate_of_the_cell(held, found):
+    noise = np.random.default_rng(held).normal(0.0, 0.5, len(TIME))
+    slow = np.repeat((sine() + noise)[::held], held)[: len(TIME)]
+    items = [repetition(curve(slow), number) for number in (1, 2, 3)]
+    assert items[0].sample_rate == pytest.approx(1000.0 / held, rel=1e-3)
+    meter = replace(METER, sample_rate_hz=1000.0 / held)
+    reasons = assess_point(POINT, PROFILE, items, instrument=meter).reasons
+    assert [reason.kind.value for reason in reasons] == found * 3
+
+
+def test_a_coarse_cell_under_a_steady_force_is_no_slow_cell():
+    coarse = 2.0 * np.round((sine() + np.where(TIME < 3.0, 20.0, 0.0)) / 2.0)
+    assert repetition(curve(coarse)).sample_rate == pytest.approx(1000.0)

@@ -22,6 +22,7 @@ from cdtool.evaluation.protocol.plan import (
     TestParticulars,
 )
 from cdtool.evaluation.protocol.protocol import Protocol
+from cdtool.report.protocol.words import words_of
 from cdtool.workflows.protocol.checking import check_protocol
 from cdtool.workflows.protocol.drafting import draft_protocol
 from cdtool.workflows.protocol.making import make_protocol
@@ -125,6 +126,30 @@ def test_a_slow_contact_that_begins_with_the_record_does_not_pass_by_a_wrong_res
     protocol = cdtool.protocol(write_protocol(tmp_path))
     assert protocol.points[0].repetitions[0].verdict.steps[1].peak < 150.0 < reading
     assert kinds(protocol) == ["rest_decides"] * 3
+
+
+def test_rows_that_the_reader_drops_are_never_a_pass(tmp_path):
+    write_rig(tmp_path, (*FORCES, half_sine(900.0)))
+    header, rest = (tmp_path / "edge" / "04.csv").read_text(encoding="utf-8").split("\n", 1)
+    (tmp_path / "edge" / "04.csv").unlink()
+    # The rig appended the next test: its clock begins again.
+    with (tmp_path / "edge" / "03.csv").open("a", encoding="utf-8") as opened:
+        opened.write(rest)
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert header and (protocol.verdict.outcome, kinds(protocol)) == ("incomplete", ["data_lost"])
+    assert "run backward" in str(protocol.verdict.reasons[0].values["message"])
+
+
+def test_a_pattern_without_a_file_is_named_where_other_recordings_are_there(tmp_path):
+    write_rig(tmp_path, FORCES)
+    path = write_protocol(tmp_path, logs='logs = ["edge/*.csv", "edge/o4.csv"]')
+    text = path.read_text(encoding="utf-8")
+    path.write_text(f'{text}\n[[protocol.exclusion]]\nlogs = ["edge/9.csv"]\nreason = "slipped"\n', encoding="utf-8")
+    wanted = [("protocol.exclusion[1].logs", "edge/9.csv"), ("protocol.point[1].logs", "edge/o4.csv")]
+    for verdict in (cdtool.protocol(path).verdict, check_protocol(path).verdict):
+        assert [(reason.values["entry"], reason.values["pattern"]) for reason in verdict.reasons] == wanted
+        sentence = "protocol.exclusion[1].logs: no file matches edge/9.csv"
+        assert words_of("en").reasons(verdict, "incomplete")[0] == sentence
 
 
 def test_a_touch_between_the_tests_does_not_lower_the_mean_of_a_pass(tmp_path):
