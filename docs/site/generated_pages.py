@@ -178,7 +178,7 @@ def _returned(function: Any, exported: Mapping[str, Any]) -> list[Any]:
 
 
 def _parts(result: Any) -> list[Any]:
-    """Return the classes of a result's own module that its properties return, as the figures of a benchmark."""
+    """Return the classes of a result's own module that its properties return, as the plots of a benchmark."""
     known = vars(import_module(result.__module__))
     getters = (item.fget for item in vars(result).values() if isinstance(item, property))
     found = [known.get(str(getter.__annotations__.get("return"))) for getter in getters]
