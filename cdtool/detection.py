@@ -24,13 +24,13 @@ WHOLE_MACHINE = ("whole machine",)
 class Status(IntEnum):
     """Whether a sample of a collision detection signal is assessable, or why not."""
 
-    VALID = 0
-    START_UP = 1
-    NOT_APPLICABLE = 2
-    GAP = 3
-    NO_LIMIT = 4
-    OTHER_SPEED = 5
-    OTHER_RATE = 6
+    VALID = 0  #: Assessable.
+    START_UP = 1  #: The detector or its threshold is still starting up.
+    NOT_APPLICABLE = 2  #: The detector does not apply to this motion.
+    GAP = 3  #: Samples of an input are missing.
+    NO_LIMIT = 4  #: No limit is known here.
+    OTHER_SPEED = 5  #: The speed is not one that the limit was learned at.
+    OTHER_RATE = 6  #: The sample rate is not the one that the limit was learned at.
 
 
 REASONS: Mapping[int, str] = {

@@ -88,14 +88,14 @@ def add_navigation(target: Path, navigation: Mapping[str, Any]) -> None:
 
 
 def _gathered(target: Path, patterns: Iterable[str], given: Sequence[str]) -> list[str]:
-    """Return the pages that match the patterns, without those that are given."""
+    """Return the pages that match the patterns, in the order of these, without those that are given."""
     docs = target / "docs"
-    found = {
+    found = [
         os.path.relpath(file, docs).removesuffix(".md").replace(os.sep, "/")
         for pattern in patterns
-        for file in docs.glob(f"{pattern}.md")
-    }
-    return sorted(found - set(given))
+        for file in sorted(docs.glob(f"{pattern}.md"))
+    ]
+    return [name for name in dict.fromkeys(found) if name not in given]
 
 
 def _toctree(names: Sequence[str], caption: str) -> str:

@@ -231,7 +231,7 @@ class RunReading:
 
 
 def several_logs(logs: Sequence[str | Path]) -> list[str | Path]:
-    """Return the logs as a list; raises UsageError for a single path, and if there is none.
+    """Return the logs as a list; raises UsageError for a single path, and for no log at all.
 
     A text is a sequence of letters, and a pattern with a typing error matches nothing: neither is a list of logs.
     """

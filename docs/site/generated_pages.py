@@ -137,7 +137,7 @@ def _python_pages() -> dict[str, str]:
     for name, function in functions.items():
         rows.append([f"[`cdtool.{name}`](functions.md#cdtool{name})", _summary(function)])
         for result in _returned(function, exported):
-            returned.setdefault(_place(result), result)
+            returned |= {_place(item): item for item in (result, *_parts(result))}
     text = "# Functions of cdtool\n\n"
     text += "".join(f"## cdtool.{name}\n\n" + _directive("autofunction", f"cdtool.{name}") for name in functions)
     pages["reference/python/functions"] = text
@@ -177,6 +177,14 @@ def _returned(function: Any, exported: Mapping[str, Any]) -> list[Any]:
     return [item for item in found if inspect.isclass(item) and item.__module__.startswith("cdtool.")]
 
 
+def _parts(result: Any) -> list[Any]:
+    """Return the classes of a result's own module that its properties return, as the plots of a benchmark."""
+    known = vars(import_module(result.__module__))
+    getters = (item.fget for item in vars(result).values() if isinstance(item, property))
+    found = [known.get(str(getter.__annotations__.get("return"))) for getter in getters]
+    return [item for item in found if inspect.isclass(item) and item.__module__ == result.__module__]
+
+
 def _exported(place: str) -> Any:
     module, _, attribute = place.partition(":")
     return getattr(import_module(module), attribute)
@@ -187,16 +195,16 @@ def _place(item: Any) -> str:
 
 
 def _class_text(place: str) -> str:
-    return f"## {place.rpartition('.')[2]}\n\n" + _directive("autoclass", place, members=True)
+    return f"## {place.rpartition('.')[2]}\n\n" + _directive("autoclass", place, "members")
 
 
 def _summary(item: Any) -> str:
     return _cell((inspect.getdoc(item) or "").split("\n\n")[0])
 
 
-def _directive(kind: str, place: str, *, members: bool = False) -> str:
-    options = "\n   :members:" if members else ""
-    return f"```{{eval-rst}}\n.. {kind}:: {place}{options}\n```\n\n"
+def _directive(kind: str, place: str, *options: str) -> str:
+    lines = [f".. {kind}:: {place}", *(f"   :{option}:" for option in options)]
+    return "```{eval-rst}\n" + "\n".join(lines) + "\n```\n\n"
 
 
 # --- fields of the results
