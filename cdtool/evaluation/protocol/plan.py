@@ -16,6 +16,8 @@ from cdtool.errors import UsageError
 Due = Literal["before_test", "test_day", "never"]
 Language = Literal["en", "de"]
 FORCE = "force"
+# The mark of a value that a draft leaves open; moved into the value, it is none.
+FILL_IN = "FILL IN"
 
 
 def entry(meaning: str, due: Due = "before_test", default: Any = "") -> Any:
@@ -200,5 +202,5 @@ def _empty_of(values: Any) -> Iterator[tuple[str, Due]]:
         value = getattr(values, item.name)
         # 0 is a temperature; as a speed, area, range or number of repetitions it means that nothing is stated.
         is_zero = value == 0 and item.name != "temperature_c"
-        if value is None or is_zero or (isinstance(value, str) and not value.strip()):
+        if value is None or is_zero or (isinstance(value, str) and value.strip().upper() in ("", FILL_IN)):
             yield item.name, due

@@ -15,7 +15,7 @@ import numpy as np
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.force.limits import ForceProfile, read_force_limits
-from cdtool.evaluation.protocol.plan import Instrument, MachineParticulars, MeasuringPoint, TestParticulars
+from cdtool.evaluation.protocol.plan import FILL_IN, Instrument, MachineParticulars, MeasuringPoint, TestParticulars
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.files import write_text
@@ -26,7 +26,6 @@ from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
 
 # Time before the contact over which its speed is averaged [s].
 _BEFORE = 0.1
-_FILL_IN = "FILL IN"
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
     lines += ["", "# [[protocol.exclusion]]", '# logs = ["point_1/03.csv"]', '# reason = ""']
     text = "\n".join(lines) + "\n"
     write_text(output, text)
-    return DraftedProtocol(output, text, sum(f"# {_FILL_IN}" in line for line in lines[1:]))
+    return DraftedProtocol(output, text, sum(f"# {FILL_IN}" in line for line in lines[1:]))
 
 
 def _points(setup: BenchmarkFile, folder: Path) -> list[_Point]:
@@ -162,7 +161,7 @@ def _point(point: _Point, read: Sequence[LogToScore]) -> dict[str, tuple[str, st
         "repetitions": (str(max(contacts, least)), f"CHECK: {counted(contacts, 'contact')} recorded"),
         point.key: (point.value, "the recordings"),
     }
-    known["profile"] = ('""', f"{_FILL_IN}: name of the force profile, see docs/force-limits.md")
+    known["profile"] = ('""', f"{FILL_IN}: name of the force profile, see docs/force-limits.md")
     if point.profile:
         known["profile"] = (_text(point.profile.name), "as in the benchmark file")
         if stiffness := point.profile.obstacle_stiffness_n_per_mm:
@@ -204,7 +203,7 @@ def _table(heading: str, kind: type[Any], known: Mapping[str, tuple[str, str]]) 
         elif item.metadata["due"] == "never":
             lines.append(f"# {item.name} =  # {meaning}")
         else:
-            lines.append(f'{item.name} = ""  # {_FILL_IN}: {meaning}')
+            lines.append(f'{item.name} = ""  # {FILL_IN}: {meaning}')
     return lines
 
 

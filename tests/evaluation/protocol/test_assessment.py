@@ -234,6 +234,12 @@ def test_a_missing_value_is_named_with_its_key_and_file(name):
     ]
 
 
+@pytest.mark.parametrize("value", ["", "  ", "FILL IN", "fill in"])
+def test_the_mark_of_a_draft_is_no_value(value):
+    plan = replace(PLAN, machine=replace(PLAN.machine, maker=value))
+    assert [item.key for item in empty_entries(plan)] == ["protocol.machine.maker"]
+
+
 def test_zero_degrees_are_a_temperature_and_zero_is_no_speed():
     assert empty_entries(PLAN) == []
     plan = replace(PLAN, points=(replace(POINT, speed_m_per_s=0.0),))
