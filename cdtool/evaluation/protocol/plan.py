@@ -16,7 +16,7 @@ from cdtool.errors import UsageError
 Due = Literal["before_test", "test_day", "never"]
 Language = Literal["en", "de"]
 FORCE = "force"
-# The mark of a value that a draft leaves open; moved into the value, it is none.
+# The mark of a value that a draft leaves open; a value that begins with it counts as missing.
 FILL_IN = "FILL IN"
 
 
