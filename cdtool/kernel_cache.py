@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import OutputError
+from cdtool.errors import OutputError, UsageError
 from cdtool.file_locks import holding
 
 # A function as numba compiles it: `cdtool.kernels.named`.
@@ -29,7 +29,10 @@ _reported = False
 
 @cache
 def imported_numba() -> Any:
-    """Return numba, imported without the package coverage: numba reports to it only while coverage runs."""
+    """Return numba, imported without the package coverage: numba reports to it only while coverage runs.
+
+    Raises UsageError if NUMBA_DISABLE_JIT is set: the kernels use instructions that Python does not have.
+    """
     hidden = "coverage" not in sys.modules
     if hidden:
         sys.modules["coverage"] = None  # type: ignore[assignment]  # the import system's mark of an absent module
@@ -38,7 +41,10 @@ def imported_numba() -> Any:
     finally:
         if hidden:
             del sys.modules["coverage"]
-    return numba
+    imported: Any = numba
+    if imported.config.DISABLE_JIT:
+        raise UsageError("NUMBA_DISABLE_JIT is set, but cdtool's kernels must be compiled", "unset it")
+    return imported
 
 
 def compile_cached(function: Function, signature: Any, options: dict[str, Any]) -> Function:
@@ -47,8 +53,6 @@ def compile_cached(function: Function, signature: Any, options: dict[str, Any]) 
     Raises RuntimeError or OSError if no folder for the cache is writable.
     """
     compiled: Function = imported_numba().njit(cache=True, **options)(function)
-    if compiled is function:  # NUMBA_DISABLE_JIT
-        return function
     dispatcher: Any = compiled
     with ExitStack() as held:
         own = getattr(dispatcher, "_cache", None)
@@ -124,8 +128,6 @@ def not_cached(functions: Iterable[Function]) -> list[Function]:
     An index older than the function's file or than numba is outdated. A wrong answer costs only time.
     """
     numba = imported_numba()
-    if numba.config.DISABLE_JIT:
-        return []
     folders: dict[str, dict[str, float]] = {}
     missing = []
     for function in functions:

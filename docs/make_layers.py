@@ -53,7 +53,7 @@ def read_layers() -> Layers:
     imports: dict[str, set[str]] = {room: set() for layer in layers for room in layer}
     for file in sorted(PACKAGE.rglob("*.py")):
         name = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        if name == "__init__":
+        if name in ("__init__", "__main__"):
             continue
         if name not in room_of:
             raise ValueError(f"cdtool/{name} is in no layer of pyproject.toml")

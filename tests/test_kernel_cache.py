@@ -36,6 +36,16 @@ def _output(process: subprocess.Popen) -> str:
     return told
 
 
+def test_a_compiler_that_is_switched_off_is_one_line():
+    command = [sys.executable, "-m", "cdtool", "info", "sample_logs/gate/stiff/03.csv"]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(command, cwd=_PROJECT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("error: NUMBA_DISABLE_JIT is set")
+    assert "unset it" in line
+
+
 _ALL = """
 import importlib, pkgutil, sys
 import cdtool

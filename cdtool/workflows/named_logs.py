@@ -56,6 +56,8 @@ class LogsOf:
             for path in find_logs(texts, self.base, table.key("logs"), runs=self.runs):
                 if found.setdefault(path, section) != section:
                     raise table.fault("logs", f"names {path} with two different parts", "name each log once")
+        if not found:
+            raise table.fault("logs", "is empty", "name at least one log")
         table.finish()
         return {path: found[path] for path in self._without_files_beside(list(found))}
 

@@ -46,7 +46,7 @@ class Runs:
 
 
 def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = False) -> list[Path]:
-    """Return the logs that the patterns name below `base`, each once, in order; ConfigurationError for no match.
+    """Return the logs that the patterns name below `base`, each once, in order; ConfigurationError for none.
 
     A log is a file, or a folder that rosbag2 wrote.
 
@@ -60,6 +60,8 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
             hint = 'to name runs of a file, set operations = "column:NAME"' if of_runs else "check the path"
             raise ConfigurationError(f"{key}: no file matches '{pattern}' in {base}", hint)
         found.update(dict.fromkeys(matches or of_runs))
+    if not found:
+        raise ConfigurationError(f"{key}: is empty", "name at least one log")
     return list(found)
 
 

@@ -14,3 +14,8 @@ def test_a_pattern_that_is_a_folder_or_the_root_matches_nothing(pattern, tmp_pat
     for base in (tmp_path, tmp_path.relative_to(tmp_path)):
         with pytest.raises(ConfigurationError, match="no file matches"):
             find_logs([pattern], base, "learn.logs", runs=True)
+
+
+def test_an_empty_list_of_logs_is_an_error_that_names_its_key(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"learn\.logs: is empty"):
+        find_logs([], tmp_path, "learn.logs")
