@@ -28,7 +28,7 @@ from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import Runs
 from cdtool.workflows.signature.fitting import Pair, signals_of
-from cdtool.workflows.signature.upkeep import SeasonOptions, signatures_in
+from cdtool.workflows.signature.upkeep import SeasonOptions, no_signature_for, signatures_in
 
 _DAY = 86400.0
 # Expected temperatures by date are taken together by the week.
@@ -164,7 +164,7 @@ def forecast_by(path: str | Path, options: ForecastOptions) -> Forecasted:
         raise refused[0] if refused else SignatureError("no run to forecast from", _NOTHING_NEW)
     served = [current for current, _ in signatures]
     skipped += [
-        Skipped(item.name, f"no signature for its class: runs {item.motion.described}")
+        Skipped(item.name, no_signature_for(item.motion, served))
         for item, _ in season
         if not any(current.motion.matches(item.motion, SPEED_TOLERANCE) for current in served)
     ]

@@ -17,6 +17,7 @@ from cdtool.evaluation.upkeep.audit import DriftAudit
 from cdtool.evaluation.upkeep.coverage import Coverage, check_coverage
 from cdtool.evaluation.upkeep.drift import audit_drift
 from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.motion.motion_class import MotionClass
 from cdtool.motion.speed_course import TOLERANCE
 from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
@@ -99,6 +100,19 @@ def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSig
             )
         pairs.append((current, first))
     return tuple(pairs)
+
+
+def no_signature_for(motion: MotionClass, signatures: Sequence[FittedSignature]) -> str:
+    """Return in words why none of the signatures is compared with a run of this class of motion.
+
+    Between speeds learned with `speed_range` a run is assessed, but there is no level of its own to have drifted from.
+    """
+    ours = (motion.direction, motion.joint)
+    of_range = [item.motion for item in signatures if item.speed_range]
+    speeds = [item.nominal_speed for item in of_range if (item.direction, item.joint) == ours]
+    if speeds and min(speeds) < motion.nominal_speed < max(speeds):
+        return f"runs {motion.described}, between learned speeds: only runs at a learned speed are compared"
+    return f"no signature for its class: runs {motion.described}"
 
 
 @dataclass(frozen=True)
@@ -247,7 +261,7 @@ def check_by(path: str | Path, options: CheckOptions) -> Checked:
             )
         )
     skipped += [
-        Skipped(item.name, f"no signature for its class: runs {item.motion.described}")
+        Skipped(item.name, no_signature_for(item.motion, [current for current, _ in signatures]))
         for i, (item, _) in enumerate(pairs)
         if i not in served
     ]

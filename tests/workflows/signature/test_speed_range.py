@@ -93,3 +93,17 @@ def test_a_run_between_the_classes_teaches_none_of_them(door, learned):
     )
     assert all("no signature for its class" in item.reason for item in done.refused if "near" in item.recording)
     assert len(done.added) == 3 and all("slow" in name for name in done.added)
+
+
+def test_a_check_says_that_a_run_lies_between_the_learned_speeds(door, learned):
+    write_log(door / "between.csv", 2, {}, 20, 0.25)
+    write_signature(door / "checked.json", learned.signature)
+    logs = [door / "slow.csv", door / "between.csv"]
+    skipped = cdtool.check_signature(door / "checked.json", logs, door / "machine.toml").skipped
+    between = [item.reason for item in skipped if "between" in item.recording]
+    assert between and all("between learned speeds: only runs at a learned speed" in reason for reason in between)
+    write_log(door / "beyond.csv", 2, {}, 20, 0.4)
+    logs = [door / "slow.csv", door / "beyond.csv"]
+    skipped = cdtool.check_signature(door / "checked.json", logs, door / "machine.toml").skipped
+    beyond = [item.reason for item in skipped if "beyond" in item.recording]
+    assert beyond and all("no signature for its class" in reason for reason in beyond)
