@@ -70,7 +70,8 @@ def add_navigation(target: Path, navigation: Mapping[str, Any]) -> None:
         text = [f"# {section['title']}\n", f"{section['text']}\n"]
         for part in section["part"]:
             names = part["pages"]
-            rows = "".join(f"| [{_title(target, name)}]({name}.md) | {known.get(name, '')} |\n" for name in names)
+            shown = [*names, *part.get("also", ())]  # pages of another part are in the table, not below this one
+            rows = "".join(f"| [{_title(target, name)}]({name}.md) | {known.get(name, '')} |\n" for name in shown)
             text += [f"## {part['title']}\n", f"| page | contents |\n|---|---|\n{rows}", _toctree(names, part["title"])]
         if section["name"] == "gallery":
             text.append(_pictures(target))
