@@ -46,7 +46,8 @@ def stage(target: Path, source_url: str) -> None:
         shutil.copy(page, copy)
     (target / "_static").mkdir()
     shutil.copy(SITE / "style.css", target / "_static")
-    shutil.copy(SITE / "conf.py", target)
+    for name in ("conf.py", "search_order.js"):
+        shutil.copy(SITE / name, target)
     (target / "_static" / "fonts").mkdir()
     fonts = Path(str(files("ziamath"))) / "fonts"
     shutil.copy(fonts / "STIXTwoMath-Regular.ttf", target / "_static" / "fonts")
