@@ -46,7 +46,8 @@ def stage(target: Path, source_url: str) -> None:
         shutil.copy(page, copy)
     (target / "_static").mkdir()
     shutil.copy(SITE / "style.css", target / "_static")
-    shutil.copy(SITE / "conf.py", target)
+    for name in ("conf.py", "search_order.js"):
+        shutil.copy(SITE / name, target)
     (target / "_static" / "fonts").mkdir()
     fonts = Path(str(files("ziamath"))) / "fonts"
     shutil.copy(fonts / "STIXTwoMath-Regular.ttf", target / "_static" / "fonts")
@@ -70,7 +71,8 @@ def add_navigation(target: Path, navigation: Mapping[str, Any]) -> None:
         text = [f"# {section['title']}\n", f"{section['text']}\n"]
         for part in section["part"]:
             names = part["pages"]
-            rows = "".join(f"| [{_title(target, name)}]({name}.md) | {known.get(name, '')} |\n" for name in names)
+            shown = [*names, *part.get("also", ())]  # pages of another part are in the table, not below this one
+            rows = "".join(f"| [{_title(target, name)}]({name}.md) | {known.get(name, '')} |\n" for name in shown)
             text += [f"## {part['title']}\n", f"| page | contents |\n|---|---|\n{rows}", _toctree(names, part["title"])]
         if section["name"] == "gallery":
             text.append(_pictures(target))

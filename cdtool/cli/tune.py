@@ -81,7 +81,7 @@ def tune(
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of candidates to measure in parallel.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Tune gains, threshold and debounce at a false-alarm budget, with results of recordings that chose nothing.
+    """Tune gains, threshold and debounce at a false-alarm budget, with results on recordings not used for the choice.
 
     Example: cdtool tune benchmark.toml --false-alarm-budget 1/100op --detectors feekf,igm --jobs 2 -o tuned
     """
@@ -186,4 +186,4 @@ def _meaning(done: Tuning) -> str:
 
     if done.is_nested:
         return "nested: each result is of recordings that neither chose the settings nor set the limit. "
-    return f"apparent: of the recordings that chose the settings. {' '.join(apparent_words(done))} "
+    return f"apparent: on the recordings used to choose the settings. {' '.join(apparent_words(done))} "

@@ -61,7 +61,7 @@ class RecordingResult:
     operations: int = meant("operations that it was cut into")
     contacts: int = meant("true contacts in it")
     campaign: str | None = meant("test campaign: recordings of one campaign are resampled together", default=None)
-    point: str | None = meant("test point: its force figures are averaged", default=None)
+    point: str | None = meant("test point: its forces are averaged", default=None)
     began_s: float | None = meant(
         "first sample, in seconds since 1970-01-01 UTC; null: the log's clock does not count from there", default=None
     )
@@ -104,12 +104,12 @@ class ContactResult:
     rest_n: float | None = meant("what the load cell read at rest just before the onset", default=None)
     drift_n_per_s: float | None = meant("drift of that reading before the onset; 0: none beyond doubt", default=None)
     onset_hole_ms: float | None = meant(
-        "load-cell samples are missing for so long where the contact may have begun: the latency may be longer by "
+        "how long load-cell samples are missing where the contact may have begun: the latency may be longer by "
         "onset_uncertainty_s; null: none are missing",
         default=None,
     )
     force_hole_ms: float | None = meant(
-        "load-cell samples are missing for so long at the onset or while the contact presses: the peak may be larger; "
+        "how long load-cell samples are missing at the onset or while the contact presses: the peak may be larger; "
         "null: none are missing",
         default=None,
     )
@@ -136,14 +136,14 @@ class FalseAlarmResult:
 
 @frozen
 class ExposureResult:
-    """How long and how often a detector watched in a group: the denominator of its false alarms."""
+    """How long and how often a detector monitored a group: the denominator of its false alarms."""
 
     group: str = meant("the benchmark's group")
     detector: str = meant("full name of the detector")
     recordings: int = meant("logs")
     operations: int = meant("operations")
     hours: float = meant("time in which the signal was assessable")
-    not_assessable: int = meant("operations that were nowhere assessable", default=0)
+    not_assessable: int = meant("operations without an assessable sample", default=0)
     not_judged: Mapping[str, float] = meant("share of all samples by reason", default_factory=dict)  # language: data
 
     __repr__ = short_repr
@@ -166,7 +166,7 @@ class ForceStepResult:
     name: str = meant("the step's name in the limits file")
     from_s: float = meant("from this long after the onset")
     at_most_n: float = meant("largest force allowed")
-    peak_n: float | None = meant("largest force in the step; of a point: what its tests come to")
+    peak_n: float | None = meant("largest force in the step; of a point: the mean of its tests, or the largest of them")
     time_budget_ms: float | None = meant("how long after the onset the limit was first exceeded; null if never")
     verdict: str = meant("pass, fail or not_assessable")
     reason: str | None = meant("why it does not pass", default=None)
@@ -213,7 +213,7 @@ class SweepResult:
     safety_factor: float = meant("limits' distance from the mean, in the threshold's unit of spread")
     false_alarms: int = meant("in the impact-free group")
     operations: int = meant("of the impact-free group")
-    hours: float = meant("watched in the impact-free group")
+    hours: float = meant("monitored in the impact-free group")
     detected: int = meant("contacts")
     missed: int = meant("contacts")
     not_assessable: int = meant("contacts")
@@ -230,7 +230,7 @@ class CalibrationResult:
     budget: str = meant("false alarms allowed")
     safety_factor: float = meant("the factor set")
     operations: int = meant("impact-free operations, each judged with a threshold that was not learned from it")
-    hours: float = meant("watched in them")
+    hours: float = meant("monitored in them")
     alarms: int = meant("operations that alarm with that factor; of a budget by hour: alarms")
 
 
@@ -241,8 +241,8 @@ class LimitResult:
     limit: str = meant("key in [limits]")
     detector: str = meant("full name of the detector")
     group: str = meant("the benchmark's group; of one kind of contacts GROUP/KIND")
-    figure: str = meant("name of the figure")
-    value: float | None = meant("the figure; null where it is not known or not finite")
+    figure: str = meant("name of the metric")
+    value: float | None = meant("value of the metric; null where it is not known or not finite")
     least: float | None = meant("smallest value allowed")
     largest: float | None = meant("largest value allowed")
     outcome: str = meant("met, violated or not_assessable")
@@ -258,7 +258,7 @@ class ConclusionResult:
     )
     headline: str = meant("the conclusion in one line, as every report shows it", default="no limits are set")
     reasons: tuple[str, ...] = meant("what is not good beside the limits, line by line, worst first", default=())
-    missed_without_limit: int = meant("missed detections that no limit is about", default=0)
+    missed_without_limit: int = meant("missed detections that no limit covers", default=0)
     facts: tuple[str, ...] = meant("what decides the exit status", default=())
     exit_status: int = meant("exit status of the benchmark with these results", default=0)
 
@@ -296,15 +296,15 @@ class RecordingFinding:
 class Results:
     """All of it, in the order of the benchmark file; rows of which there may be many are tuples, or `Rows`."""
 
-    provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the figures")
+    provenance: Mapping[str, Any] = meant("tool, hashes, rules and gains that led to the results")
     detectors: tuple[str, ...] = meant("full names")
     groups: tuple[str, ...] = meant("groups of the unchanged machine: of impacts, then the impact-free hold-out")
     contacts: Sequence[ContactResult] = meant("one row per contact and detector")
-    false_alarms: Sequence[FalseAlarmResult] = meant("one row an alarm without a contact")
+    false_alarms: Sequence[FalseAlarmResult] = meant("one row per alarm without a contact")
     exposure: tuple[ExposureResult, ...] = meant("one row per group and detector")
-    recordings: Sequence[RecordingResult] = meant("one row a log that was scored", default=())
+    recordings: Sequence[RecordingResult] = meant("one row per log that was scored", default=())
     forces: Sequence[ForceResult] = meant("one row per contact with a force profile", default=())
-    points: tuple[PointResult, ...] = meant("one row a test point with a force profile", default=())
+    points: tuple[PointResult, ...] = meant("one row per test point with a force profile", default=())
     sweep: tuple[SweepResult, ...] = meant("latency against false alarms with all limits moved", default=())
     calibration: tuple[CalibrationResult, ...] = meant("safety factors set for a budget", default=())
     limits: tuple[LimitResult, ...] = meant("outcome of [limits]", default=())
@@ -312,7 +312,7 @@ class Results:
     skipped: Sequence[Skipped] = meant("what was left out", default=())
     findings: Sequence[RecordingFinding] = meant("findings about recordings that were used", default=())
     conclusion: ConclusionResult = field(
-        default_factory=ConclusionResult, metadata={"meaning": "what follows from all of it"}
+        default_factory=ConclusionResult, metadata={"meaning": "the conclusion from all of it"}
     )
     schema_version: int = meant("version of this layout", default=SCHEMA_VERSION)
 

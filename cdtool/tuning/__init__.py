@@ -1,1 +1,1 @@
-"""Search a detector's gains, threshold and activation at a false-alarm budget, with results that chose nothing."""
+"""Search gains, threshold and activation at a false-alarm budget, and assess the choice on other recordings."""

@@ -45,7 +45,7 @@ class TuningRecordings:
     """Impact-free operations and logs with contacts, in `folds` folds.
 
     A subset of them is numbered: 0 is everything, k + 1 is what is not in fold k. `subsets` is 1 if the runs outside a
-    fold are too few for the budget, so that no figure can be checked on recordings that chose nothing.
+    fold are too few for the budget, so that no figure can be checked on recordings not used for the choice.
     """
 
     free: tuple[FreeRun, ...]
@@ -59,7 +59,7 @@ class TuningRecordings:
         return 1 + self.folds if self.is_nested else 1
 
     def why_not_nested(self, budget: Budget) -> str:
-        """Return why there can be no results of recordings that chose nothing; empty if there can be.
+        """Return why there can be no results on recordings not used for the choice; empty if there can be.
 
         Two folds are left out at a time, and a choice without a fold needs contacts of every group.
         """

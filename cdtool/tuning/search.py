@@ -1,7 +1,7 @@
 """The search for one detector: a grid of rules, then gains, for all recordings and again without each of their folds.
 
-What is chosen without a fold is assessed on it: these nested results are of recordings that chose nothing. All of these
-searches share what is measured; a search chooses among the candidates that it asked for itself.
+What is chosen without a fold is assessed on it: these nested results are from recordings not used for the choice.
+All of these searches share what is measured; a search chooses among the candidates that it asked for itself.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Rejection:
-    """A kind of rule that was best but is not chosen: on recordings that chose nothing, a group is much worse.
+    """A kind of rule that was best but is not chosen: on recordings not used for the choice, a group is much worse.
 
     `ratio` is the cost of the group over that of the default.
     """
@@ -145,10 +145,11 @@ class ParetoPoint:
 class TunedDetector:
     """A detector with the choice, its debounce and the safety factor that meets the budget.
 
-    `correction`: what the factor was multiplied by, because it was set on the runs that chose; 1 if nothing shows that.
+    `correction`: what the factor was multiplied by, because it was set on the runs used for the choice; 1 if nothing
+    shows that.
 
-    `apparent` results are those of the recordings that chose, each assessed without its fold; `nested` those of
-    recordings that chose nothing, None if there are too few runs; `default` and `default_nested` those of what the
+    `apparent` results are from the recordings used for the choice, each assessed without its fold; `nested` those of
+    recordings not used for the choice, None if there are too few runs; `default` and `default_nested` those of what the
     benchmark file has, at the same budget, None if it cannot be used: `default_reason`. `chosen_in_folds` are the
     choices without each fold, in words. `debounce` [samples] is None for the default of 9 ms. `tried_costs` are the
     apparent costs (ms, or N) by group of everything that was tried. `why_not_nested`: why there is no nested result.
@@ -224,7 +225,7 @@ def held_out_results(objective: Objective, made: Pooled | None, seed: int) -> Ch
 
 
 def apparent_results(objective: Objective, searched: Searched, item: Scored, seed: int) -> ChoiceResults | None:
-    """Return the results of a candidate on the recordings that chose it; None if it cannot be used."""
+    """Return the results of a candidate on the recordings used to choose it; None if it cannot be used."""
     measured = searched.measured[item.candidate.key]
     if measured.reason:
         return None

@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 project = "cdtool"
 author = "The cdtool authors"
-copyright = "the cdtool authors, Apache-2.0"
 version = release = os.environ.get("CDTOOL_DOCS_VERSION", "main")
+copyright = f"the cdtool authors, Apache-2.0. Documentation of version {version}"
 root_doc = "index"
 language = "en"
 
@@ -46,6 +46,7 @@ html_title = "cdtool"
 html_static_path = ["_static"]
 html_css_files = ["style.css"]
 html_context = {"default_mode": "auto"}
+html_search_scorer = str(Path(__file__).parent / "search_order.js")
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options: dict[str, Any] = {
@@ -107,11 +108,36 @@ def _as_rst(line: str) -> str:
     return bullet + "".join(parts)
 
 
+def picture_links(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: nodes.document) -> None:
+    """Let a picture lead to itself, so that a phone can enlarge it."""
+    del app, page, template, tree
+    if body := context.get("body"):
+        picture = re.compile(r'<img [^>]*src="([^"]*_images/[^"]*)"[^>]*>')
+        context["body"] = picture.sub(r'<a class="picture" href="\g<1>">\g<0></a>', body)
+
+
+def whole_options(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: nodes.document) -> None:
+    """Keep the options of a command whole where its line wraps: browsers break a line after any hyphen."""
+    del app, page, template, tree
+    if body := context.get("body"):
+        commands = re.compile(r'<span id="command[\d-]+">.*', re.MULTILINE)
+        option = re.compile(r"(?<=</span>)-{1,2}[a-z][\w-]*")
+        context["body"] = commands.sub(lambda line: option.sub(r'<span class="option">\g<0></span>', line[0]), body)
+
+
 def front_page_title(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: nodes.document) -> None:
     """Let the browser show "cdtool" for the front page, not "cdtool — cdtool"."""
     del app, template, tree
     if page == root_doc:
         context["docstitle"] = ""
+
+
+def separate_commands(app: Sphinx, tree: nodes.document, page: str) -> None:
+    """Let each line of a block of commands be an element, so that a long one wraps with an indent."""
+    del app, page
+    blocks = (block for block in tree.findall(nodes.literal_block) if block.get("language") in ("sh", "bash"))
+    for number, block in enumerate(blocks, 1):
+        block["highlight_args"] = {**block.get("highlight_args", {}), "linespans": f"command{number}"}
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -122,5 +148,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
         (lambda self, node: mathml(self, node, block=True), None),
     )
     app.connect("autodoc-process-docstring", plain_rst, priority=100)
+    app.connect("doctree-resolved", separate_commands)
     app.connect("html-page-context", front_page_title)
+    app.connect("html-page-context", picture_links)
+    app.connect("html-page-context", whole_options)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -96,8 +96,13 @@ def _linked(help_text: str) -> str:
 
 
 def _with_links(text: str) -> str:
-    """Turn the names of pages in a help text into links."""
-    return re.sub(r"\bdocs/([\w/-]+\.md)", r"[\1](../../\1)", text)
+    """Turn the names of pages in a help text into links with the titles of the pages."""
+
+    def link(match: re.Match[str]) -> str:
+        heading = (Path(__file__).parents[1] / match[1]).read_text(encoding="utf-8").partition("\n")[0]
+        return f"[{heading.removeprefix('# ')}](../../{match[1]})"
+
+    return re.sub(r"\bdocs/([\w/-]+\.md)", link, text)
 
 
 def _option(item: Any) -> list[str]:

@@ -61,6 +61,9 @@ COMMANDS = {
     "docs/init.md": 2,
     "docs/first-log.md": 6,
     "docs/ur10e-tutorial.md": 6,
+    "docs/gate-with-force-meter.md": 7,
+    "docs/ur-rtde.md": 4,
+    "docs/identification.md": 4,
 }
 EXAMPLES = {
     "docs/python.md": 13,
@@ -106,10 +109,11 @@ def steps_of(page: Path) -> Iterator[Step]:
 
 
 def run_command(line: str) -> Outcome:
-    """Run a line like a shell: variables and wildcards expanded, in the current folder."""
+    """Run a line like a shell: variables and wildcards expanded, in the current folder; quoted words as they are."""
     words: list[str] = []
-    for word in shlex.split(line.replace("$CDTOOL_DATA", str(DATA))):
-        matches = sorted(map(str, Path().glob(word))) if "*" in word else [word]
+    line = line.replace("$CDTOOL_DATA", str(DATA))
+    for word, written in zip(shlex.split(line), shlex.split(line, posix=False), strict=True):
+        matches = sorted(map(str, Path().glob(word))) if "*" in word and not written.startswith("'") else [word]
         assert matches, f"nothing matches {word} in: {line}"
         words += matches
     if words[0] == "cdtool":
@@ -233,6 +237,24 @@ def the_alarms_of_the_tutorial_are_as_stated() -> None:
     assert [(time, joint, f"{late:.2f}") for time, joint, late in rows] == stated
 
 
+def the_alarms_of_the_rtde_logs_are_as_stated() -> None:
+    (line,) = [step.text for step in steps_of(DOCS / "ur-rtde.md") if step.text.startswith("cdtool detect ")]
+    printed = run_command(line).out
+    stated = re.findall(r"^rtde/\S+ +(?:no )?alarm .*$", (DOCS / "ur-rtde.md").read_text("utf-8"), re.MULTILINE)
+    assert len(stated) == 5
+    assert [" ".join(row.split()) for row in stated] == [
+        " ".join(row.split()) for row in printed.splitlines() if row.startswith("rtde/")
+    ]
+
+
+def the_latencies_of_the_gate_with_a_force_meter_are_as_stated() -> None:
+    printed = cdtool("benchmark", "yard/benchmark.toml").out
+    stated = re.findall(r"^stiff .*$", (DOCS / "gate-with-force-meter.md").read_text("utf-8"), re.MULTILINE)
+    assert len(stated) == 3
+    for row in stated:  # group, detector, median, range, n, missed
+        assert any(" ".join(line.split()).startswith(" ".join(row.split())) for line in printed.splitlines()), row
+
+
 def the_alarms_in_the_real_recordings_are_as_stated() -> None:
     assert DATA is not None
     text = (DOCS / "real-recordings.md").read_text(encoding="utf-8")
@@ -284,6 +306,8 @@ CLAIMS: dict[str, Callable[[], None]] = {
     "docs/choosing.md": choosing_says_what_the_runs_gave,
     "docs/signature.md": the_thesis_rule_alarms_in_every_impact_free_run,
     "docs/ur10e-tutorial.md": the_alarms_of_the_tutorial_are_as_stated,
+    "docs/ur-rtde.md": the_alarms_of_the_rtde_logs_are_as_stated,
+    "docs/gate-with-force-meter.md": the_latencies_of_the_gate_with_a_force_meter_are_as_stated,
     "docs/real-recordings.md": the_alarms_in_the_real_recordings_are_as_stated,
 }
 

@@ -59,6 +59,36 @@ def test_the_front_page_begins_as_the_readme():
         assert (ROOT / f"{page}.md").is_file(), page
 
 
+@pytest.mark.parametrize(
+    "page",
+    [
+        "gate-with-force-meter.md",  # a gate, CSV in German number format, a force meter
+        "ur-rtde.md",  # a UR robot
+        "ci.md",  # fail a build when the latency grows
+        "protocol.md",  # a document for a notified body
+        "evaluation.md#not-assessable",
+        "choosing.md",  # which detector
+        "ci.md#status-3-what-now",
+        "citing.md",
+    ],
+)
+def test_the_front_page_leads_to_what_people_come_for(page):
+    assert f"](docs/{page})" in (SITE / "front_page.txt").read_text(encoding="utf-8")
+    name, _, anchor = page.partition("#")
+    headings = re.findall(r"^#+ (.*)$", (DOCS / name).read_text(encoding="utf-8"), re.MULTILINE)
+    slugs = [re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-") for text in headings]
+    assert not anchor or anchor in slugs
+
+
+def test_every_page_that_the_search_puts_later_exists(pages):
+    patterns = re.findall(r"\[/(\S+)/, \d+\]", (SITE / "search_order.js").read_text(encoding="utf-8"))
+    assert len(patterns) == 9
+    names = {page.relative_to(ROOT).with_suffix("").as_posix() for page in [*PAGES, ROOT / "CHANGELOG.md"]}
+    names |= {f"docs/{name}" for name in pages} | {"index", "CONTRIBUTING"}
+    for pattern in patterns:
+        assert any(re.search(pattern, name) for name in names), pattern
+
+
 def test_every_command_and_option_is_on_its_page(pages):
     from typer.main import get_command
 

@@ -25,11 +25,12 @@ _GOALS = {
 }
 NESTED_NOTE = (
     "Nested results: the search is repeated five times without a fifth of the recordings, and each choice is assessed "
-    "on the fifth that neither chose it nor set its limit. Apparent results are those of the recordings that chose."
+    "on the fifth that neither chose it nor set its limit. Apparent results are from the recordings used for the "
+    "choice."
 )
 APPARENT_NOTE = (
-    "Apparent results are those of the recordings that chose. Expect latencies 2 to 8 % longer, and more false alarms, "
-    "on others."
+    "Apparent results are from the recordings used for the choice. Expect latencies 2 to 8 % longer, and more false "
+    "alarms, on others."
 )
 
 
@@ -139,7 +140,7 @@ def rejection_words(tuned: TunedDetector) -> list[str]:
     """Return why kinds of rules that were best are not chosen, a sentence each, without its full stop."""
     return [
         f"Not chosen: {item.rule} as tuned: {visible(item.group)} is {100.0 * (item.ratio - 1.0):.0f} % worse with it "
-        "than by default on recordings that chose nothing"
+        "than by default on recordings not used for the choice"
         for item in tuned.rejected
     ]
 

@@ -190,9 +190,9 @@ def _why(tuning: Tuning, tuned: TunedDetector) -> list[str]:
             means = ", ".join(f"{name} {item.mean_ms:.1f} ms" for name, item in figures.groups.items())
             lines.append(f"# {words}: mean latency {means}; {figures.alarming} of {figures.free} free runs alarm.")
     lines.append(
-        "# These results are of recordings that chose nothing."
+        "# These results are from recordings not used for the choice."
         if tuned.nested
-        else "# These results are apparent: of the recordings that chose. Check them on others."
+        else "# These results are apparent: on the recordings used for the choice. Check them on others."
     )
     saved = ", ".join(f"{item.name} {100.0 * item.saved:.0f} %" for item in tuned.steps)
     return [*lines, *([f"# What each choice saved: {saved}."] if saved else [])]

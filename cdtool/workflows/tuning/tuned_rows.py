@@ -13,8 +13,9 @@ from cdtool.tuning.tuned import ChoiceResults, TunedDetector
 class TunedRow:
     """The results of a tuned detector on the contacts of one group: a row of `Tuning.summary()`.
 
-    `nested`: they are of recordings that chose nothing. `mean_ms`, `missed` and `alarming` (impact-free operations that
-    alarm, of `operations`) are those of the choice, `default_mean_ms` those of the benchmark file at the same budget.
+    `nested`: they are from recordings not used for the choice. `mean_ms`, `missed` and
+    `alarming` (impact-free operations that alarm, of `operations`) are those of the choice, `default_mean_ms` those of
+    the benchmark file at the same budget.
     """
 
     detector: str

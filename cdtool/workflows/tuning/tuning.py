@@ -154,8 +154,8 @@ class TuningOptions:
 class Tuning:
     """The tuned detectors, the best first; what was left out; and the inputs.
 
-    `unusable` maps detectors that cannot be tuned to the reason. `is_nested`: there are results of recordings that
-    chose nothing. `groups` has the number of contacts by group.
+    `unusable` maps detectors that cannot be tuned to the reason. `is_nested`: there are results on recordings not used
+    for the choice. `groups` has the number of contacts by group.
     """
 
     setup: BenchmarkFile
@@ -182,7 +182,8 @@ class Tuning:
         for row in tuned_rows(self.detectors):
             counts = (f"{row.missed} of {row.contacts}", f"{row.alarming} of {row.operations}")
             rows.append((row.detector, row.group, row.threshold, row.mean_ms, row.default_mean_ms, *counts))
-        what = "of recordings that chose nothing" if self.is_nested else "apparent: of the recordings that chose"
+        apparent = "apparent: on the recordings used for the choice"
+        what = "on recordings not used for the choice" if self.is_nested else apparent
         return html_table(f"Tuned at {self.options.budget}, results {what}", headings, rows)
 
 
@@ -374,7 +375,7 @@ class _TuningOf:
         return fewest / 3600.0 >= _SPARE * budget.needed
 
     def _why_not_nested(self, recordings: TuningRecordings, chosen: Sequence[HeldOut]) -> str:
-        """Return why there are no results of recordings that chose nothing."""
+        """Return why there are no results on recordings not used for the choice."""
         budget = self.options.budget
         unit = "impact-free runs" if budget.per == "operation" else "monitored hours"
         needed = f"{to_check(budget):.3g} {unit} are needed to check the limit"
@@ -493,8 +494,8 @@ def _checked_choice(
 ) -> tuple[Scored, list[Scored], Pooled | None, list[Rejection]]:
     """Return the choice, those without each fold, what these give on it, and the kinds of rules that were rejected.
 
-    A kind that makes a group much worse than by default on recordings that chose nothing is left out of the search:
-    either what was chosen without each fold, or the choice itself with limits that were set without the fold.
+    A kind that makes a group much worse than by default on recordings not used for the choice is left out of the
+    search: either what was chosen without each fold, or the choice itself with limits that were set without the fold.
     """
     rejected: list[Rejection] = []
     while True:

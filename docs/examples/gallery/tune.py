@@ -1,7 +1,7 @@
 """Tune a detector at a false-alarm budget.
 
 Which threshold is the fastest, if one operation in ten may raise a false alarm? The search is repeated without each
-fifth of the recordings, so that the results are those of recordings that chose nothing.
+fifth of the recordings, so that the results are from recordings not used for the choice.
 """
 
 # %%

@@ -89,7 +89,7 @@ def test_the_summary_for_a_notebook_has_these_results(done):
     assert summary.mean_ms.tolist() == [tuned.nested.groups[group].mean_ms for group in summary.index]
     assert summary.default_mean_ms["soft"] == tuned.default_nested.groups["soft"].mean_ms
     assert summary.alarming.tolist() == [tuned.nested.alarming] * 2
-    assert "of recordings that chose nothing" in done._repr_html_() and len(repr(done)) < 200
+    assert "on recordings not used for the choice" in done._repr_html_() and len(repr(done)) < 200
 
 
 def test_too_few_contacts_have_a_range_and_no_interval(done):
@@ -168,7 +168,7 @@ def test_files_state_what_was_chosen_and_why(written):
     folder, outcome = written
     text = (folder / "benchmark.toml").read_text(encoding="utf-8")
     assert text.startswith("# Tuned by cdtool tune from benchmark.toml for momentum at 1/20op.")
-    assert "# These results are of recordings that chose nothing." in text
+    assert "# These results are from recordings not used for the choice." in text
     assert parse_toml(text)["threshold"] == {"name": "glr", "order": 12, "safety_factor": ANY}
     machine = (folder / "machine.toml").read_text(encoding="utf-8")
     assert "tuned at 1/20op; was 10.0" in machine and "mounted backward" in machine
