@@ -111,7 +111,8 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
     profiles = {point.profile.name: point.profile for point in protocol.points if point.profile}
     for profile in profiles.values():
         if not profile.checked:
-            yield words("notice.unchecked", profile=profile.name, source=profile.source)
+            sources = "; ".join(filter(None, (profile.source, profile.pressure_source)))
+            yield words("notice.unchecked", profile=profile.name, source=sources)
     for point in protocol.points:
         if point.verdict and point.profile and point.profile.average_of > 1:
             for step in point.verdict.steps:
@@ -222,7 +223,7 @@ def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
     rows.append((*_row(words, words("row.limit"), profile.name, *limits), ""))
     count = len(point.repetitions)
     numeric = tuple(range(2, len(columns) - 1))
-    widths = (4, 13, *(6 for _ in numeric), 8)
+    widths = (6, 12, *(6 for _ in numeric), 9)
     yield _grid(columns, rows, widths=widths, numeric=numeric, strong=(count, count + 1))
 
 
@@ -296,7 +297,7 @@ def _checks(protocol: Protocol, words: Words) -> Iterator[Block]:
         yield _grid(
             [words(f"column.{name}") for name in names],
             rows,
-            widths=(5, 2, 5, 5, 3, 3, 5, 3, 2),
+            widths=(4, 2, 4, 4, 4, 5, 5, 5, 5),
             numeric=(1, 2, 3, 6, 7, 8),
         )
 

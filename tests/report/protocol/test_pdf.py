@@ -17,7 +17,7 @@ from cdtool.report.protocol.pdf import to_pdf
 from tests.report.hostile import HOSTILE
 from tests.report.protocol.conftest import LONG
 
-CASES = ["pass", "fail", "incomplete"]
+CASES = ["pass", "fail", "incomplete", "pressure_en", "pressure_de"]
 
 
 @pytest.fixture(scope="module")
