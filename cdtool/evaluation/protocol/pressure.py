@@ -28,6 +28,8 @@ _PA = UNITS["N/cm2"].factor
 _NEAR, _AT_REST = 1.0, 0.1
 # A record that begins within this time before a contact [s] may show no rest at all; its first readings last _FIRST.
 _EARLY, _FIRST = 0.6, 0.01
+# A sensor that ends earlier than its log by this time [s] during a contact has not recorded the rest of the contact.
+_TAIL = 0.1
 # An entered peak that differs from the recorded one by more than this share of the larger is shown as a deviation.
 SAME_PEAK = 0.1
 
@@ -118,6 +120,9 @@ def pressure_record(
         curve = force_time_curve(own, replace(contact, rest=rest, hole=0.0), until=until)
     except RecordingError:
         return None
+    if contact.end >= time[-1] and recording.end - time[-1] > _TAIL:
+        # The sensor ends in the contact: the rest of it is a hole.
+        curve = replace(curve, end=min(recording.end, until) - contact.start)
     noise = float(np.max(np.abs(pressure[near] - rest), initial=0.0))
     begin = time[before][0]
     first = float(np.mean(pressure[before & (time <= begin + _FIRST)]))
