@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import cdtool
+from cdtool.errors import RecordingError
 from cdtool.ingest.reading import read_as_logged
 from cdtool.machine_file import read_machine_file
 from cdtool.units import UNITS, find_unit

@@ -131,7 +131,27 @@ def pressure_record(
 
 
 def as_profile(profile: ForceProfile, limit: PressureLimit) -> ForceProfile:
-    """Return the limits of a pressure as those of a force, in N/cm2, with the names of the profile's steps."""
+    """Return the limits of a pressure as those of a force, so that it is compared by the same rules.
+
+    Parameters
+    ----------
+    profile : ForceProfile
+        The profile, whose first two steps give the times and the names.
+    limit : PressureLimit
+        The limits [N/cm2].
+
+    Returns
+    -------
+    ForceProfile
+        The same profile with the pressures in its steps [N/cm2]; it does not average.
+
+    Examples
+    --------
+    >>> from cdtool.evaluation.force.limits import read_force_limits
+    >>> chest = read_force_limits()["iso_ts_15066_chest"]
+    >>> [(step.from_s, step.at_most_n) for step in as_profile(chest, chest.pressure_limit()).steps]
+    [(0.0, 240.0), (0.5, 120.0)]
+    """
     first, *others = profile.steps
     steps = [ForceStep(0.0, limit.first, first.name)]
     steps += [ForceStep(step.from_s, limit.quasi_static, step.name) for step in others[:1]]
@@ -208,7 +228,23 @@ class PressureAssessment:
 
 
 def highest(found: Sequence[PressureAssessment]) -> Mapping[str, float | None]:
-    """Return the largest `peak` and `late_peak` of several repetitions [N/cm2]; None where none is known."""
+    """Return the largest pressures of several repetitions.
+
+    Parameters
+    ----------
+    found : sequence of PressureAssessment
+        The pressure of each repetition.
+
+    Returns
+    -------
+    mapping of str to float or None
+        The largest `peak` and the largest `late_peak` [N/cm2]; None where none is known.
+
+    Examples
+    --------
+    >>> highest([PressureAssessment(None, 0.5, entered=peak) for peak in (90.0, 110.0)])
+    {'peak': 110.0, 'late_peak': None}
+    """
     peaks = [item.peak for item in found if item.peak is not None]
     late = [item.late_peak for item in found if item.late_peak is not None and math.isfinite(item.late_peak)]
     return {"peak": max(peaks, default=None), "late_peak": max(late, default=None)}

@@ -28,12 +28,12 @@ def pressure_columns(point: PointAssessment) -> PressureColumns:
     if not any(item.is_known for item in found):
         return PressureColumns(rows=((),) * len(point.repetitions))
     most, limit = highest(found), found[0].limit
+    first, quasi_static = (limit.first, limit.quasi_static) if limit else (None, None)
     if any(item.record for item in found):
         rows = tuple((item.peak, item.late_peak) for item in found)
-        limits = (limit.first, limit.quasi_static) if limit else (None, None)
-        return PressureColumns(("pressure", "late_pressure"), rows, (most["peak"], most["late_peak"]), limits)
-    limits = (limit.first,) if limit else (None,)
-    return PressureColumns(("pressure",), tuple((item.peak,) for item in found), (most["peak"],), limits)
+        most_of_both = (most["peak"], most["late_peak"])
+        return PressureColumns(("pressure", "late_pressure"), rows, most_of_both, (first, quasi_static))
+    return PressureColumns(("pressure",), tuple((item.peak,) for item in found), (most["peak"],), (first,))
 
 
 def pressure_notices(points: tuple[PointAssessment, ...], words: Words) -> Iterator[str]:

@@ -35,8 +35,6 @@ def test_a_contact_pressure_is_drafted_with_its_unit_and_a_question(tmp_path, na
 @pytest.mark.parametrize(
     "name", ["hydraulic pressure [bar]", "Druck [bar]", "oil [kPa]", "contact pressure", "level [N]"]
 )
-    "name", ["hydraulic pressure [bar]", "Druck [bar]", "oil [kPa]", "contact pressure", "level [N]"]
-)
 def test_another_pressure_or_one_without_a_unit_is_not(tmp_path, name):
     draft = draft_of(tmp_path, name, 0.5)
     assert "contact_pressure" not in draft.channels
