@@ -39,7 +39,7 @@ def test_a_benchmark_is_the_same_with_and_without_it(rig):
     assert whole.contacts == bare.contacts and whole.recordings == bare.recordings
 
 
-def test_alone_it_is_no_ground_truth_of_a_contact(rig):
+def test_alone_it_does_not_show_a_contact(rig):
     machine = rig / "machine.toml"
     lines = [line for line in machine.read_text(encoding="utf-8").splitlines() if not line.startswith("force =")]
     machine.write_text("\n".join(lines), encoding="utf-8")
