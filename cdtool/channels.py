@@ -11,7 +11,7 @@ from typing import Literal, TypeVar
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.log_names import log_stem
-from cdtool.recording import CHANNELS, GROUND_TRUTH, TRIGGER, UNITLESS
+from cdtool.recording import CHANNELS, GROUND_TRUTH, RIG_UNITS, TRIGGER, UNITLESS
 from cdtool.short_repr import short_repr
 from cdtool.tables import Table
 from cdtool.units import RAW_UNITS, unit
@@ -45,7 +45,7 @@ Alignment = Literal["offset", "epoch", "trigger"]
 
 @dataclass(frozen=True)
 class OwnFile:
-    """The file of a load cell that is not in the log, and how its clock is aligned with the log's.
+    """The file of a load cell or pressure sensor that is not in the log, and how its clock is aligned with the log's.
 
     `pattern` is relative to the log's folder, with {stem}, {name} and {folder} of the log. "offset": the times differ
     by the channel's `time_offset`. "epoch": both count from 1970. "trigger": `log_trigger` and `file_trigger` are
@@ -262,7 +262,7 @@ def _source(
     columns: tuple[str | int, ...] = ()
     topic = field = ""
     axes: tuple[tuple[str, str], ...] = ()
-    own_file = _own_file(table, topics) if channel == "force" and "file" in table else None
+    own_file = _own_file(table, topics) if channel in RIG_UNITS and "file" in table else None
     topics = topics and own_file is None
     if topics and channel == "force" and ("fields" in table or "topics" in table):
         axes = _field_axes(table)
@@ -322,7 +322,7 @@ def _kinds(table: Table) -> tuple[tuple[float, str], ...]:
 
 
 def _own_file(table: Table, topics: bool) -> OwnFile:
-    """Return the file of a load cell beside the log; raises ConfigurationError if its clock is not aligned."""
+    """Return the file beside the log of a load cell or pressure sensor; raises ConfigurationError for a wrong clock."""
     pattern = table.text("file")
     placeholders = _PLACEHOLDER.findall(pattern)
     if not placeholders or "\0" in pattern:

@@ -25,8 +25,13 @@ BoolArray = npt.NDArray[np.bool_]
 
 MEASURED = ("torque", "speed", "position", "acceleration")
 REFERENCES = ("reference_position", "reference_speed", "reference_torque")
-GROUND_TRUTH = ("force", "label", "event")
+# What shows where a contact is; and all that is known from outside: a pressure only shows how hard it was.
+SHOWS_CONTACTS = ("force", "label", "event")
+CONTACT_PRESSURE = "contact_pressure"
+GROUND_TRUTH = (*SHOWS_CONTACTS, CONTACT_PRESSURE)
 TRIGGER = ("trigger",)
+# What a test rig measures, in the same unit on every machine.
+RIG_UNITS = {"force": "N", CONTACT_PRESSURE: "Pa"}
 # High or low, or one sample per event: without a unit.
 UNITLESS = ("label", "event", "trigger")
 CHANNELS = (*MEASURED, *REFERENCES, *GROUND_TRUTH, *TRIGGER)
@@ -211,7 +216,7 @@ class Recording(StoresDerived):
         return replace(self, channels={name: series.between(start, end) for name, series in self.channels.items()})
 
     def without_ground_truth(self) -> Recording:
-        """Return the data available to a detector or threshold: no load cell, no label; each time the same object."""
+        """Return what a detector or threshold may use: no load cell, pressure or label; each time the same object."""
         if not any(name in GROUND_TRUTH for name in self.channels):
             return self
         return self.derived("without ground truth", self._without_ground_truth)

@@ -21,6 +21,7 @@ RAW_UNITS = ("A", "V", "1", "count")
 
 _STANDARD_GRAVITY = 9.80665
 _TURN = 2.0 * math.pi
+_INCH, _POUND_FORCE = 0.0254, 0.45359237 * _STANDARD_GRAVITY
 
 UNITS: dict[str, Unit] = {
     # time
@@ -61,6 +62,15 @@ UNITS: dict[str, Unit] = {
     "N m": Unit("N m", 1.0),
     "mN m": Unit("N m", 1e-3),
     "kN m": Unit("N m", 1e3),
+    # pressure
+    "Pa": Unit("Pa", 1.0),
+    "kPa": Unit("Pa", 1e3),
+    "MPa": Unit("Pa", 1e6),
+    "mbar": Unit("Pa", 1e2),
+    "bar": Unit("Pa", 1e5),
+    "N/cm2": Unit("Pa", 1e4),
+    "N/mm2": Unit("Pa", 1e6),
+    "psi": Unit("Pa", _POUND_FORCE / _INCH**2),
     # a channel of a robot with linear and rotary joints: rad or m, N m or N ... for each joint
     "SI": Unit("SI", 1.0),
     # raw drive values: RAW_UNITS
@@ -115,6 +125,10 @@ _SPELLINGS = {
     "°/s²": "deg/s2",
     "mm/s²": "mm/s2",
     "N.m": "N m",
+    "N/cm^2": "N/cm2",
+    "N/cm²": "N/cm2",
+    "N/mm^2": "N/mm2",
+    "N/mm²": "N/mm2",
     "N-m": "N m",
     "Arms": "A",
     "Amps": "A",

@@ -21,7 +21,7 @@ from cdtool.findings.channels import AbsentFile, AbsentTruth
 from cdtool.findings.clocks import ClocksApart, FileAligned, TriggersDiffer, TriggersDrift
 from cdtool.formats.source import Source
 from cdtool.ingest.channel_assembly import assemble_recording
-from cdtool.recording import FloatArray, Recording, Series
+from cdtool.recording import SHOWS_CONTACTS, FloatArray, Recording, Series
 from cdtool.remote.remote_path import location
 
 # A trigger rises where it comes to the upper share of its range after the lower one. It has two levels: at most this
@@ -113,7 +113,8 @@ def _with_file(
         channels={**recording.channels, name: inside},
         findings=(*recording.findings, *findings, *shift.findings, Finding(aligned, name, severity)),
         beside=(*recording.beside, (path.name, beside.digest)),
-        truth_clock=max(recording.truth_clock, shift.within),
+        # A pressure shows no onset: its clock does not concern a latency.
+        truth_clock=max(recording.truth_clock, shift.within if name in SHOWS_CONTACTS else 0.0),
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from cdtool.clock import differentiate, integrate, previous_value
 from cdtool.findings import Finding
 from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference
-from cdtool.recording import UNITLESS, FloatArray, Recording, Series
+from cdtool.recording import RIG_UNITS, UNITLESS, FloatArray, Recording, Series
 from cdtool.tables import Table
 
 LINEAR_UNITS = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
@@ -104,8 +104,8 @@ class JointMachine:
     def accepted_units(self, channel: str) -> tuple[str, ...]:
         """Return the SI units in which a log may contain a channel; the first is that of a scaled raw value."""
         quantity = channel.removeprefix("reference_")
-        if channel == "force":
-            return ("N",)
+        if channel in RIG_UNITS:
+            return (RIG_UNITS[channel],)
         if channel in UNITLESS:
             return ("1",)
         load = self.load_units[quantity]

@@ -24,7 +24,7 @@ from cdtool.operations import RunCut, operations_of
 from cdtool.pipeline import Detection, detect_operations
 from cdtool.plain_text import digits
 from cdtool.plausible import PlausibleRanges
-from cdtool.recording import GROUND_TRUTH, Contact, Recording
+from cdtool.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.remote.remote_path import location
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.base import FittedThreshold
@@ -362,7 +362,7 @@ def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
 
 def why_no_contact(found: Detected, alarm: Alarm) -> str:
     """Explain why an alarm without a contact has no latency: no ground truth, ground truth ended, or a false alarm."""
-    channel = next((name for name in GROUND_TRUTH if name in found.recording), None)
+    channel = next((name for name in SHOWS_CONTACTS if name in found.recording), None)
     if channel is None:
         absent = absent_truth(found.recording)
         return f"{absent[0].channel} is not in this log" if absent else "no ground truth is mapped"

@@ -20,7 +20,7 @@ from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, RunCut, operations_of
 from cdtool.plausible import LearnedRanges, PlausibleRanges
-from cdtool.recording import Contact, Recording
+from cdtool.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.remote.remote_path import is_remote, joined, location
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
@@ -397,8 +397,12 @@ def lost(recording: Recording) -> list[RecordingFinding]:
 
 
 def absent_truth(recording: Recording) -> list[Finding]:
-    """Return the notes about ground truth that the machine file maps but the log does not contain."""
-    return [item for item in recording.findings if isinstance(item.fact, AbsentTruth) and item.channel not in recording]
+    """Return the notes about ground truth of contacts that the machine file maps but the log does not contain."""
+    return [
+        item
+        for item in recording.findings
+        if isinstance(item.fact, AbsentTruth) and item.channel in SHOWS_CONTACTS and item.channel not in recording
+    ]
 
 
 def _glob(path: Path) -> Iterator[Path]:

@@ -129,8 +129,12 @@ def test_it_is_causal_with_channels_at_rates_of_their_own(name, subject):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_never_reads_the_load_cell(name, gate, simulated):
+def test_it_never_reads_the_load_cell_nor_the_pressure_of_the_contact(name, gate, simulated):
     recording = simulated("stiff", 1)
+    force = recording["force"]
+    pressure = Series(force.time, 1e3 * force.values, "Pa")
+    recording = replace(recording, channels={**recording.channels, "contact_pressure": pressure})
+    assert not set(GROUND_TRUTH) & set(recording.without_ground_truth().channels)
     detector = DETECTORS.load(name)()
     with_cell = detector.signal(recording, gate)
     without = detector.signal(recording.without_ground_truth(), gate)

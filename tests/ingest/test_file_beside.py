@@ -89,6 +89,21 @@ def test_a_trigger_in_both_aligns_the_clocks_to_within_a_sample(tmp_path, shift)
     assert name == "cell_03.csv" and len(digest) == 64
 
 
+def test_a_pressure_sensor_has_a_file_too_whose_clock_does_not_concern_a_latency(tmp_path):
+    write_log(tmp_path)
+    write_cell(tmp_path, 12.3)
+    cell = CELL.replace('unit = "N"', 'unit = "bar"')
+    path = tmp_path / "machine.toml"
+    path.write_text(f"{AXIS}{LOG}contact_pressure = {{ {cell}, {TRIGGER} }}\n", encoding="utf-8")
+    recording = read_as_logged(tmp_path / "03.csv", read_machine_file(path)).recording
+    pressure = recording["contact_pressure"]
+    assert pressure.unit == "Pa" and np.abs(1e-7 * pressure.values[:, 0] - pressure.time).max() < 0.0075
+    assert recording.truth_clock == 0.0 and facts(recording, FileAligned)[0].within > 0.0
+    (tmp_path / "cell_03.csv").unlink()
+    without = read_as_logged(tmp_path / "03.csv", read_machine_file(path)).recording
+    assert "contact_pressure" not in without and len(facts(without, AbsentFile)) == 1
+
+
 def test_several_triggers_are_aligned_in_their_middle(tmp_path):
     write_log(tmp_path, (0.5, 1.5, 3.5))
     write_cell(tmp_path, 2.0, (0.5, 1.5, 3.5))

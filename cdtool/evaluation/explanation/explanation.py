@@ -19,7 +19,7 @@ from cdtool.evaluation.explanation.movement import Movement, which_moved_first
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.truth.matching import Match, Matching
 from cdtool.pipeline import Detection
-from cdtool.recording import GROUND_TRUTH, Contact
+from cdtool.recording import SHOWS_CONTACTS, Contact
 from cdtool.short_repr import short_repr
 
 Role = Literal["detection", "further alarm", "in progress", "false alarm", "alarm"]
@@ -362,7 +362,7 @@ def _belonging(alarm: Alarm, detection: Detection, matching: Matching) -> tuple[
     # Alarms of several joints at much the same time count as one false alarm.
     if alarm in matching.false_alarms or not earlier:
         recording = detection.operation.recording
-        known = bool(matching.matches) or any(channel in recording for channel in GROUND_TRUTH)
+        known = bool(matching.matches) or any(channel in recording for channel in SHOWS_CONTACTS)
         return None, "false alarm" if known else "alarm"
     return max(earlier, key=lambda contact: contact.start), "further alarm"
 

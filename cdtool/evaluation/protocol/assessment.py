@@ -19,7 +19,10 @@ from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.quantities import dynamic_time, time_above
 from cdtool.evaluation.force.verdict import ForceVerdict, PointVerdict, assess_force, averaged
 from cdtool.evaluation.protocol.plan import Instrument, MeasuringPoint, TestPlan, empty_entries
+from cdtool.evaluation.protocol.pressure import PressureAssessment, PressureRecord
+from cdtool.evaluation.protocol.pressure_reasons import pressure_reasons
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Value, Verdict
+from cdtool.evaluation.protocol.speed_reasons import speed_reasons
 from cdtool.evaluation.truth.missing_samples import CellClock
 
 # Sample rates are alike within this share: a clock is not exact, and stamps jitter.
@@ -40,7 +43,8 @@ class Repetition:
     `rest` [N]: the load cell's reading before the contact, which is subtracted; `drift` [N/s]: its drift, 0 unless
     beyond doubt; `rest_error` [N]: how far the rest may be wrong because the record begins shortly before the contact.
     `losses`: what the reader of the recording could not keep, in words. `latencies_ms`: of each detector, None for a
-    contact that it missed or could not assess.
+    contact that it missed or could not assess. `pressure`: the recorded one, if any; `speed` [m/s]: just before the
+    contact, NaN if the samples there are missing, None if no speed was logged.
     """
 
     recording: str
@@ -55,6 +59,8 @@ class Repetition:
     latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
     rest_error: float = 0.0
     losses: tuple[str, ...] = ()
+    pressure: PressureRecord | None = None
+    speed: float | None = None
 
     @classmethod
     def of(
@@ -98,13 +104,14 @@ class Unmeasured:
 
 @dataclass(frozen=True)
 class PointAssessment:
-    """A measuring point with its repetitions; `verdict` is None without a profile."""
+    """A measuring point with its repetitions; `verdict` is None without a profile. `pressures`: one per repetition."""
 
     point: MeasuringPoint
     profile: ForceProfile | None
     repetitions: tuple[Repetition, ...]
     verdict: PointVerdict | None
     reasons: tuple[Reason, ...]
+    pressures: tuple[PressureAssessment, ...] = ()
 
     @property
     def needed(self) -> int:
@@ -123,6 +130,7 @@ def assess_point(
     repetitions: Sequence[Repetition],
     unmeasured: Sequence[Unmeasured] = (),
     instrument: Instrument | None = None,
+    pressure_instrument: Instrument | None = None,
 ) -> PointAssessment:
     """Assess the repetitions at a measuring point.
 
@@ -138,6 +146,8 @@ def assess_point(
         Recordings of the point that do not count.
     instrument : Instrument or None
         The instrument that measured the force.
+    pressure_instrument : Instrument or None
+        The instrument that measured the pressure.
 
     Returns
     -------
@@ -169,10 +179,28 @@ def assess_point(
         for number, item in enumerate(repetitions, 1):
             reasons += _of_repetition(point, number, item, profile, instrument)
         reasons += _lost(point, repetitions)
-    return PointAssessment(point, profile, tuple(repetitions), verdict, tuple(reasons))
+        reasons += speed_reasons(point, [(item.recording, item.speed) for item in repetitions])
+    pressures = _pressures(point, profile, repetitions) if profile else ()
+    if profile and pressures:
+        names = [item.recording for item in repetitions]
+        reasons += pressure_reasons(point, profile, names, pressures, pressure_instrument)
+    return PointAssessment(point, profile, tuple(repetitions), verdict, tuple(reasons), pressures)
 
 
-def check_point(point: MeasuringPoint, profile: ForceProfile | None, recordings: int) -> PointAssessment:
+def _pressures(
+    point: MeasuringPoint, profile: ForceProfile, repetitions: Sequence[Repetition]
+) -> tuple[PressureAssessment, ...]:
+    entered: list[float | None] = [*point.peak_pressures_n_per_cm2]
+    entered += [None] * (len(repetitions) - len(entered))
+    return tuple(
+        PressureAssessment.of(profile, point.body_area, item.pressure, value)
+        for item, value in zip(repetitions, entered, strict=False)
+    )
+
+
+def check_point(
+    point: MeasuringPoint, profile: ForceProfile | None, recordings: int, *, logs_pressure: bool = True
+) -> PointAssessment:
     """Check the plan of a point against its profile, before its recordings are read.
 
     Parameters
@@ -183,6 +211,8 @@ def check_point(point: MeasuringPoint, profile: ForceProfile | None, recordings:
         Its force limits, if it has any.
     recordings : int
         The number of its recordings.
+    logs_pressure : bool, optional
+        The recordings may contain a pressure: the machine file maps one, or is not known.
 
     Returns
     -------
@@ -201,6 +231,11 @@ def check_point(point: MeasuringPoint, profile: ForceProfile | None, recordings:
         *_of_count(point, needed, recordings, has_others=False),
         *_beyond_plan(point, profile, recordings),
     ]
+    if profile and profile.pressures and not (logs_pressure or point.no_pressure_reason):
+        missing = needed - sum(value > 0.0 for value in point.peak_pressures_n_per_cm2)
+        if missing > 0:
+            kind = ReasonKind.PRESSURE_NOT_MEASURED
+            reasons.append(_reason(kind, point, missing=missing, count=needed, profile=profile.name))
     return PointAssessment(point, profile, (), None, tuple(reasons))
 
 
@@ -233,6 +268,7 @@ def judge(plan: TestPlan, points: Sequence[PointAssessment], file: str, more: Se
         *_at_two_points(points),
         *more,
         *_of_instruments(plan, [point.profile for point in points if point.profile]),
+        *_of_pressure_instrument(plan, points),
         *([] if plan.points else [Reason(ReasonKind.NO_POINT, {"file": file})]),
         *(Reason(ReasonKind.NO_VALUE, {"key": item.key, "file": file}, due=item.due) for item in empty_entries(plan)),
     ]
@@ -386,6 +422,13 @@ def _of_instruments(plan: TestPlan, profiles: Sequence[ForceProfile]) -> Iterato
     least = max((profile.sample_rate_at_least_hz for profile in profiles), default=0.0)
     if force and force.sample_rate_hz and force.sample_rate_hz < least:
         yield Reason(ReasonKind.STATED_RATE_TOO_LOW, {"rate": force.sample_rate_hz, "needed": least})
+
+
+def _of_pressure_instrument(plan: TestPlan, points: Sequence[PointAssessment]) -> Iterator[Reason]:
+    """Yield that no instrument is named for the pressures that are compared with a limit."""
+    is_needed = any(p.profile and p.profile.pressures and not p.point.no_pressure_reason for p in points)
+    if plan.pressure_instrument is None and (is_needed or any(item.is_judged for p in points for item in p.pressures)):
+        yield Reason(ReasonKind.NO_PRESSURE_INSTRUMENT)
 
 
 def _median_step(curve: ForceTimeCurve) -> float:

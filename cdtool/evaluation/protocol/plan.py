@@ -15,9 +15,11 @@ from cdtool.errors import UsageError
 
 Due = Literal["before_test", "test_day", "never"]
 Language = Literal["en", "de"]
-FORCE = "force"
+FORCE, PRESSURE = "force", "pressure"
 # The mark of a value that a draft leaves open; a value that begins with it counts as missing.
 FILL_IN = "FILL IN"
+# A measured speed may differ from the planned one by this share if the plan states no other, and at most by so much.
+SPEED_TOLERANCE, MOST_SPEED_TOLERANCE = 0.1, 0.25
 
 
 def entry(meaning: str, due: Due = "before_test", default: Any = "") -> Any:
@@ -61,6 +63,7 @@ class Instrument:
     calibrated_on: dt.date | None = entry("day of the calibration, as 2026-01-31", default=None)
     calibration_valid_until: dt.date | None = entry("last day on which the calibration is valid", default=None)
     range_n: float | None = entry("largest force that it measures [N]; only of a force", default=None)
+    range_n_per_cm2: float | None = entry("largest pressure that it measures [N/cm2]; only of a pressure", default=None)
     range: str = entry("measuring range of another quantity, with its unit", due="never")
     accuracy_class: str = entry("accuracy class or uncertainty, as on the calibration certificate")
     sample_rate_hz: float | None = entry("sample rate [Hz]; only of a force", default=None)
@@ -70,6 +73,12 @@ class Instrument:
     def measures_force(self) -> bool:
         """Whether it measures a force."""
         return self.quantity == FORCE
+
+    @property
+    def not_its_own(self) -> tuple[str, ...]:
+        """Return the entries that are of another quantity only."""
+        of_force = () if self.measures_force else ("range_n", "sample_rate_hz", "filter")
+        return of_force if self.quantity == PRESSURE else (*of_force, "range_n_per_cm2")
 
 
 @dataclass(frozen=True)
@@ -93,6 +102,13 @@ class MeasuringPoint:
     peak_pressures_n_per_cm2: tuple[float, ...] = entry(
         "peak pressure of each repetition [N/cm2], from a film or sensor of its own", due="never", default=()
     )
+    body_area: str = entry(
+        "area of the body whose pressure limit applies; empty: the lowest of the region", due="never"
+    )
+    pressure_not_applicable: str = entry("why no pressure is measured here; shown as a deviation", due="never")
+    speed_tolerance_percent: float | None = entry(
+        "how far the measured speed may be from the planned one [%], at most 25; empty: 10", due="never", default=None
+    )
 
     def __post_init__(self) -> None:
         if self.group and self.logs:
@@ -100,6 +116,23 @@ class MeasuringPoint:
         for name in ("obstacle_stiffness_n_per_mm", "contact_area_mm2", "speed_m_per_s", "repetitions"):
             if (getattr(self, name) or 0) < 0:
                 raise UsageError(f"{name} of the measuring point '{self.name}' is negative", "give a positive number")
+        if not 0.0 <= self.speed_tolerance <= MOST_SPEED_TOLERANCE:
+            raise UsageError(
+                f"speed_tolerance_percent of the measuring point '{self.name}' is {self.speed_tolerance_percent:g}",
+                f"give at most {100.0 * MOST_SPEED_TOLERANCE:g}: a test at another speed is another test",
+            )
+
+    @property
+    def speed_tolerance(self) -> float:
+        """Return how far the measured speed may be from the planned one, as a share of it."""
+        percent = self.speed_tolerance_percent
+        return SPEED_TOLERANCE if percent is None else 0.01 * percent
+
+    @property
+    def no_pressure_reason(self) -> str:
+        """Return why no pressure is measured; empty if it must be, or if only the mark of a draft is there."""
+        text = self.pressure_not_applicable.strip()
+        return "" if text.upper().startswith(FILL_IN) else text
 
 
 @dataclass(frozen=True)
@@ -151,6 +184,11 @@ class TestPlan:
         """Return the instrument that measured the contact forces; None if the plan does not name it."""
         return next((item for item in self.instruments if item.measures_force), None)
 
+    @property
+    def pressure_instrument(self) -> Instrument | None:
+        """Return the instrument that measured the contact pressures; None if the plan does not name it."""
+        return next((item for item in self.instruments if item.quantity == PRESSURE), None)
+
 
 @dataclass(frozen=True)
 class EmptyEntry:
@@ -196,8 +234,7 @@ def empty_entries(plan: TestPlan) -> list[EmptyEntry]:
 def _empty_of(values: Any) -> Iterator[tuple[str, Due]]:
     for item in fields(values):
         due: Due = item.metadata["due"]
-        only_of_force = isinstance(values, Instrument) and item.name in ("range_n", "sample_rate_hz", "filter")
-        if due == "never" or (only_of_force and not values.measures_force):
+        if due == "never" or (isinstance(values, Instrument) and item.name in values.not_its_own):
             continue
         value = getattr(values, item.name)
         # 0 is a temperature; as a speed, area, range or number of repetitions it means that nothing is stated.

@@ -46,12 +46,22 @@ class ReasonKind(Enum):
     REST_DECIDES = "rest_decides"
     WRONG_STIFFNESS = "wrong_stiffness"
     PRESSURES_MISSING = "pressures_missing"
+    PRESSURE_EXCEEDS = "pressure_exceeds"
+    PRESSURE_NOT_MEASURED = "pressure_not_measured"
+    PRESSURE_NOT_ASSESSABLE = "pressure_not_assessable"
+    PRESSURE_DOES_NOT_RISE = "pressure_does_not_rise"
+    PRESSURE_TIME_UNKNOWN = "pressure_time_unknown"
+    PRESSURE_REST_DECIDES = "pressure_rest_decides"
+    PRESSURE_BEYOND_RANGE = "pressure_beyond_range"
+    NO_PRESSURE_INSTRUMENT = "no_pressure_instrument"
+    SPEED_DIFFERS = "speed_differs"
+    SPEED_MISSING = "speed_missing"
     BENCHMARK_UNREADABLE = "benchmark_unreadable"
 
     @property
     def outcome(self) -> Outcome:
-        """Return what it leads to: only a measured force above its limit fails, everything else is incomplete."""
-        return "fail" if self is ReasonKind.POINT_EXCEEDS else "incomplete"
+        """Return what it leads to: a force or pressure above its limit fails, everything else is incomplete."""
+        return "fail" if self in (ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS) else "incomplete"
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ NOT_RECORDED = "0.88"
 _PARTS, _SHORTEST, _LONGEST = 4.0, 0.2, 1.0
 
 
-def curve_drawings(point: PointAssessment, words: Words) -> Iterator[tuple[str, int]]:
+def curve_drawings(point: PointAssessment, words: Words, quantity: str = "curve.force") -> Iterator[tuple[str, int]]:
     """Yield the repetitions of a point as SVG, at most four in one drawing, with their number."""
     profile = point.profile
     assert profile is not None, "curves are drawn with their limits"
@@ -45,7 +45,7 @@ def curve_drawings(point: PointAssessment, words: Words) -> Iterator[tuple[str, 
                 for axes, end in ((left, first), (right, longest)):
                     _draw(axes, item, profile, end, words)
                 left.set_title(words("curve.repetition", number=number), loc="left")
-                left.set_ylabel(words("curve.force"))
+                left.set_ylabel(words(quantity))
             for axes in rows[-1]:
                 axes.set_xlabel(words("curve.time"))
         yield svg_text(figure), len(some)

@@ -24,6 +24,15 @@ from cdtool.report.protocol.blocks import (
     VerdictBox,
 )
 from cdtool.report.protocol.curve_drawing import curve_drawings
+from cdtool.report.protocol.pressure_parts import (
+    pressure_checks,
+    pressure_columns,
+    pressure_curves,
+    pressure_deviations,
+    pressure_limit_rows,
+    pressure_notices,
+    worst_outcome,
+)
 from cdtool.report.protocol.words import Words, words_of
 
 _CHECKED_STEPS = 3
@@ -102,7 +111,8 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
     profiles = {point.profile.name: point.profile for point in protocol.points if point.profile}
     for profile in profiles.values():
         if not profile.checked:
-            yield words("notice.unchecked", profile=profile.name, source=profile.source)
+            sources = "; ".join(filter(None, (profile.source, profile.pressure_source)))
+            yield words("notice.unchecked", profile=profile.name, source=sources)
     for point in protocol.points:
         if point.verdict and point.profile and point.profile.average_of > 1:
             for step in point.verdict.steps:
@@ -113,8 +123,9 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
                         "step": words.name("step", step.step.name),
                     }
                     yield words("notice.single_above", point=point.point.name, **values)
-    if any(point.point.peak_pressures_n_per_cm2 for point in protocol.points):
-        yield words("notice.pressure")
+    yield from pressure_notices(protocol.points, words)
+    if slow := [point.point.name for point in protocol.points if any(one.speed is None for one in point.repetitions)]:
+        yield words("notice.no_speed", points=", ".join(slow))
     yield words("notice.certificate")
 
 
@@ -140,6 +151,7 @@ def _instruments(protocol: Protocol, words: Words) -> Iterator[Block]:
     rows = []
     for item in protocol.plan.instruments:
         reach = f"{words.number(item.range_n)} N" if item.range_n else item.range
+        reach = f"{words.number(item.range_n_per_cm2)} N/cm²" if item.range_n_per_cm2 else reach
         values = (
             words.name("quantity", item.quantity),
             item.model,
@@ -180,30 +192,38 @@ def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
     if profile is None or verdict is None or not point.repetitions:
         yield Paragraph(words("text.nothing_measured"))
         return
-    pressures = point.point.peak_pressures_n_per_cm2
-    names = ("repetition", "recording", "dynamic_force", "dynamic_time", "static_force", "residual_force")
-    columns = [words(f"column.{name}") for name in (*names, *(["pressure"] if pressures else []), "result")]
+    pressures = pressure_columns(point)
+    names = (
+        "repetition",
+        "recording",
+        "measured_speed",
+        "dynamic_force",
+        "dynamic_time",
+        "static_force",
+        "residual_force",
+    )
+    columns = [words(f"column.{name}") for name in (*names, *pressures.headings, "result")]
     rows = []
     for number, item in enumerate(point.repetitions, 1):
         peaks = _padded([step.peak for step in item.verdict.steps])
-        pressure = [pressures[number - 1] if number <= len(pressures) else None] if pressures else []
+        pressure = point.pressures[number - 1] if point.pressures else None
         time = _time(item.dynamic_time, words)
-        cells = _row(words, number, item.recording, peaks[0], time, *peaks[1:], *pressure)
-        rows.append((*cells, words(f"outcome.{item.verdict.outcome}")))
+        cells = _row(words, number, item.recording, item.speed, peaks[0], time, *peaks[1:], *pressures.rows[number - 1])
+        rows.append((*cells, words(f"outcome.{worst_outcome(item.verdict.outcome, pressure)}")))
     first, *others = _padded([step.force for step in verdict.steps])
     kind = "mean" if profile.average_of > 1 else "highest"
     times = [item.dynamic_time for item in point.repetitions]
     time = _time(sum(times) / len(times) if kind == "mean" else max(times), words)
-    blank = [""] if pressures else []
-    rows.append(
-        (*_row(words, words(f"row.{kind}"), "", first, time, *others, *blank), words(f"outcome.{point.outcome}"))
-    )
+    values = _row(words, words(f"row.{kind}"), "", "", first, time, *others, *pressures.highest)
+    rows.append((*values, words(f"outcome.{point.outcome}")))
     at_most = _padded([step.at_most_n for step in profile.steps])
     limit_time = words.number(1e3 * profile.steps[1].from_s) if len(profile.steps) > 1 else ""
-    rows.append((*_row(words, words("row.limit"), profile.name, at_most[0], limit_time, *at_most[1:], *blank), ""))
+    planned = words("column.planned", speed=point.point.speed_m_per_s)
+    limits = (planned, at_most[0], limit_time, *at_most[1:], *pressures.limits)
+    rows.append((*_row(words, words("row.limit"), profile.name, *limits), ""))
     count = len(point.repetitions)
     numeric = tuple(range(2, len(columns) - 1))
-    widths = (4, 13, *(6 for _ in numeric), 8)
+    widths = (6, 12, *(6 for _ in numeric), 9)
     yield _grid(columns, rows, widths=widths, numeric=numeric, strong=(count, count + 1))
 
 
@@ -228,6 +248,10 @@ def _curves(protocol: Protocol, words: Words) -> Iterator[Block]:
         names = {"point": plain(point.point.name), "profile": point.profile.name}
         for svg, count in curve_drawings(point, words):
             yield Curves(svg, words("text.curve_caption", **names), words("text.curve_alt", count=count, **names))
+        if pressures := pressure_curves(point):
+            for svg, count in curve_drawings(pressures, words, "curve.pressure"):
+                alt = words("text.pressure_curve_alt", count=count, **names)
+                yield Curves(svg, words("text.pressure_curve_caption", **names), alt)
 
 
 def _latencies(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -266,6 +290,16 @@ def _checks(protocol: Protocol, words: Words) -> Iterator[Block]:
     ]
     if rows:
         yield _grid(columns, rows, widths=(5, 2, 5, 5, 3, 3, 5, 3, 2), numeric=(1, 2, 3, 6, 7, 8))
+    if pressures := pressure_checks(protocol.points, protocol.plan.pressure_instrument, words):
+        yield Heading(words("section.pressure_checks"), level=2)
+        names = (*names[:6], "largest_pressure", "pressure_rest", "pressure_drift")
+        rows = [_row(words, *row) for row in pressures]
+        yield _grid(
+            [words(f"column.{name}") for name in names],
+            rows,
+            widths=(4, 2, 4, 4, 4, 5, 5, 5, 5),
+            numeric=(1, 2, 3, 6, 7, 8),
+        )
 
 
 def _validity(protocol: Protocol, item: Instrument, words: Words) -> str:
@@ -308,6 +342,7 @@ def _deviations(protocol: Protocol, words: Words) -> Iterator[Block]:
     ]
     excluded = words("role.excluded")
     rows += [_row(words, f"{item.recording} ({excluded})", item.reason) for item in protocol.excluded]
+    rows += [_row(words, *row) for row in pressure_deviations(protocol.points, words)]
     if rows:
         yield _grid([words("column.what"), words("column.reason")], rows, widths=(1, 1))
     else:
@@ -332,6 +367,11 @@ def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
         columns = [words(f"column.{name}") for name in ("step", "from", "at_most")]
         rows = [_row(words, words.name("step", step.name), step.from_s, step.at_most_n) for step in profile.steps]
         yield _grid(columns, rows, widths=(4, 2, 2), numeric=(1, 2))
+        if profile.pressures:
+            yield Facts(((words("column.pressure_source"), plain(profile.pressure_source)),))
+            columns = [words(f"column.{name}") for name in ("body_area", "transient", "quasi_static", "applies_to")]
+            rows = [_row(words, *row) for row in pressure_limit_rows(profile, protocol.points, words)]
+            yield _grid(columns, rows, widths=(5, 3, 3, 4), numeric=(1, 2))
         if profile.measuring_source:
             numbers = {
                 "rate": profile.sample_rate_at_least_hz,

@@ -58,13 +58,17 @@ class Words:
         """Return a reason as a sentence."""
         values: dict[str, object] = dict(reason.values)
         if reason.cause is not None:
-            values["cause"] = self(f"cause.{reason.cause.kind}", **reason.cause.numbers)
+            table = "pressure_cause" if reason.kind is ReasonKind.PRESSURE_NOT_ASSESSABLE else "cause"
+            values["cause"] = self(f"{table}.{reason.cause.kind}", **reason.cause.numbers)
         if "step" in values:
             values["step"] = self.name("step", str(values["step"]))
         if "averaged" in values:
             values["averaged"] = self(f"averaged.{values['averaged']}")
         if reason.kind is ReasonKind.POINT_EXCEEDS:
             values["force"] = self._above(float(reason.values["force"]), float(reason.values["limit"]))  # type: ignore[arg-type]  # numbers
+        if reason.kind is ReasonKind.PRESSURE_EXCEEDS:
+            values["pressure"] = self._above(float(reason.values["pressure"]), float(reason.values["limit"]))  # type: ignore[arg-type]  # numbers
+            values["area"] = self.name("area", str(values["area"]))
         if reason.kind is ReasonKind.NO_VALUE:
             values["keys"] = values.pop("key")
         return self(f"reason.{reason.kind.value}", **values)

@@ -10,7 +10,7 @@ from pathlib import Path
 from cdtool.errors import RecordingError
 from cdtool.log_section import LogSection
 from cdtool.plain_text import digits
-from cdtool.recording import GROUND_TRUTH, Contact, Recording
+from cdtool.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts, missing_truth
@@ -66,7 +66,7 @@ class PartToLearnFrom:
 
     def _refuse_without_truth(self, path: str, recording: Recording) -> None:
         """Raise RecordingError if a contact would not be seen: without ground truth, or where it is lost."""
-        if not any(channel in recording for channel in GROUND_TRUTH):
+        if not any(channel in recording for channel in SHOWS_CONTACTS):
             raise RecordingError(
                 f"{path}: no ground truth: until = 'onset' needs a load cell, a label or an event",
                 "map one in [channels], name the log in the label file, or give the part by from and to",

@@ -9,7 +9,7 @@ import numpy as np
 from cdtool.errors import RecordingError
 from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.evaluation.truth.onset import find_contacts
-from cdtool.recording import GROUND_TRUTH, Contact, Recording
+from cdtool.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.runs import absent_truth, lost
@@ -55,7 +55,7 @@ def true_contacts(recording: Recording, rules: ScoringRules, path: Path) -> list
             )
         return found
     for item in absent_truth(recording):
-        if not any(channel in recording for channel in GROUND_TRUTH):
+        if not any(channel in recording for channel in SHOWS_CONTACTS):
             raise RecordingError(f"{path}: no ground truth: {item}", "an impact log requires it, or a label file")
     contacts = find_contacts(recording, rules.onset)
     if not contacts and (missing := missing_truth(recording)):

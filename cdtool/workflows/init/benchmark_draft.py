@@ -20,7 +20,7 @@ from cdtool.machine_file import MachineFile
 from cdtool.operations import operations_of
 from cdtool.pipeline import run_detector
 from cdtool.plain_text import counted, digits
-from cdtool.recording import GROUND_TRUTH, Recording
+from cdtool.recording import SHOWS_CONTACTS, Recording
 from cdtool.remote.remote_path import relative_name
 from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -121,7 +121,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
 
 
 def _contacts(recording: Recording) -> int | None:
-    if not any(channel in recording for channel in GROUND_TRUTH):
+    if not any(channel in recording for channel in SHOWS_CONTACTS):
         return None
     return len(any_contacts(recording, ScoringRules()))
 

@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from cdtool.recording import MEASURED
+from cdtool.recording import CONTACT_PRESSURE, MEASURED
+from cdtool.units import find_unit
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.certainty import add_doubts
 from cdtool.workflows.init.column_blocks import find_blocks
 from cdtool.workflows.init.quantity_words import (
+    contact_pressure_word,
     is_actual,
     is_current,
     is_load_cell,
@@ -26,7 +28,7 @@ from cdtool.workflows.init.quantity_words import (
     words,
 )
 from cdtool.workflows.init.streams import Channels, Found, Stream
-from cdtool.workflows.init.units_in_names import label, may_be, quantity_of_unit
+from cdtool.workflows.init.units_in_names import label, may_be, pressure_unit, quantity_of_unit
 
 # Above this correlation one column is treated as another's derivative; above the second one without any name.
 _FITS, _FITS_UNNAMED = 0.9, 0.98
@@ -364,6 +366,7 @@ def _references(channels: Channels) -> None:
 
 def _ground_truth(channels: Channels) -> None:
     """Guess the load cell, labels and triggers; the name of a load cell counts more than that of any other force."""
+    _contact_pressure(channels)
     singles = [stream for stream in channels.free if stream.width == 1 and stream.moves and may_be("force", stream)]
     named = [(*force_strength(stream), stream) for stream in singles]
     named = [item for item in named if item[0] and ".torque." not in item[2].field and not is_reference(item[2].name)]
@@ -391,6 +394,17 @@ def _ground_truth(channels: Channels) -> None:
             if stream.width == 1 and word_for(quantity, stream.name)[0] and np.array_equal(seen, (0.0, 1.0)):
                 channels.take(quantity, stream, f"name ({word_for(quantity, stream.name)[1]}), 0 and 1 only", what)
                 break
+
+
+def _contact_pressure(channels: Channels) -> None:
+    """Guess the pressure of the contact: by a name that says so, or by N/cm2, which no oil or air is measured in."""
+    for stream in channels.free:
+        if stream.width != 1 or not stream.moves or not may_be(CONTACT_PRESSURE, stream):
+            continue
+        unit, word = pressure_unit(stream), contact_pressure_word(stream.name)
+        if unit and (word or find_unit(unit) == find_unit("N/cm2")):
+            channels.take(CONTACT_PRESSURE, stream, f"name ({word})" if word else _TOLD_UNIT)
+            return
 
 
 def force_strength(stream: Stream) -> tuple[float, str]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.recording import UNITLESS
+from cdtool.recording import CONTACT_PRESSURE, UNITLESS
 from cdtool.workflows.init.derived_speed import LowPass
 from cdtool.workflows.init.machine_side import Side
 from cdtool.workflows.init.streams import Channels, Stream
@@ -136,6 +136,8 @@ def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list
         why += "; opposite in sign to the speed's derivative: inverted"
     if name == "force":
         checks.append("ground truth only: is it the load cell of the test?")
+    if name == CONTACT_PRESSURE:
+        checks.append("ground truth only: is it the pressure of the contact, not of oil or air?")
     line = f"{name} = {_channel(draft, name, logged, sign)}"
     return _commented(line, _marked(why, "; ".join(check for check in checks if check)))
 

@@ -115,6 +115,12 @@ LOAD_CELL = _listed(
     "接触力",
     "荷重 ロードセル",
 )
+CONTACT_PRESSURES = _listed(
+    "contactpressure peakpressure pressurefilm impactpressure",
+    "kontaktdruck spitzendruck druckspitze flachenpressung flachendruck druckfolie",
+    "pressioncontact pressiondecontact pressionedicontatto pressionecontatto presiondecontacto presioncontacto",
+    "接触压力 接触圧",
+)
 DRIVES = _listed("drive motor actuator", "antrieb", "moteur", "motore", "电机 電機", "モータ")
 FORCES = _listed("force kraft forza fuerza effort")
 CURRENTS = _listed("strom courant corrente corriente 电流 電流")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdtool.recording import RIG_UNITS
 from cdtool.units import find_unit
 from cdtool.workflows.init.quantity_words import words
 from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, seems_to_turn, stated, whole_numbers
@@ -44,8 +45,8 @@ class Side:
     def accepted(self, channel: str) -> tuple[str, ...]:
         """Return the SI units that this kind of machine accepts for a channel, as in cdtool.machines."""
         quantity = channel.removeprefix("reference_")
-        if quantity == "force":
-            return ("N",)
+        if quantity in RIG_UNITS:
+            return (RIG_UNITS[quantity],)
         linear = {"torque": "N", "speed": "m/s", "position": "m", "acceleration": "m/s2"}
         rotary = {"torque": "N m", "speed": "rad/s", "position": "rad", "acceleration": "rad/s2"}
         load = (linear if self.type == "linear_axis" else rotary)[quantity]

@@ -84,6 +84,12 @@ def what_else(name: str) -> str:
     return next((reason for reason, pattern in lexicon.OTHERS if pattern.search(joined)), "")
 
 
+def contact_pressure_word(name: str) -> str:
+    """Return the word of a name for the pressure of a contact; empty for any other pressure, as of oil."""
+    whole = "".join(words(name))
+    return next((word for word in lexicon.CONTACT_PRESSURES if word in whole), "")
+
+
 def is_of_body(name: str) -> bool:
     """Whether the name is that of an inertial sensor: it turns and accelerates with a body, not with one joint."""
     return any(part in lexicon.INERTIAL for part in words(name))

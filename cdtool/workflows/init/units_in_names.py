@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from cdtool.formats.column_names import split_unit
-from cdtool.recording import MEASURED
+from cdtool.recording import CONTACT_PRESSURE, MEASURED
 from cdtool.units import find_unit
 from cdtool.workflows.init import lexicon
 from cdtool.workflows.init.quantity_words import is_clock, motion_of, word_for, words
@@ -24,6 +24,7 @@ _MEASURES: Mapping[str, tuple[str, ...]] = {
     "acceleration": ("m/s2", "rad/s2", "count", "1", "V"),
     "torque": ("N m", "N", "A", "count", "1", "V"),
     "force": ("N", "count", "1", "V"),
+    CONTACT_PRESSURE: ("Pa",),
 }
 # Endings of names in lower case; a single letter counts only in the first form, `F_N`, where the case matters.
 _CAPITALS = {"N": "N", "A": "A", "V": "V"}
@@ -43,7 +44,8 @@ _TAILS = {
     "rad_per_sec": "rad/s", "degrees": "deg", "degrees_per_sec": "deg/s", "degrees_per_second": "deg/s",
     "deg_per_sec": "deg/s", "rotations": "rev", "rotations_per_sec": "rev/s", "amps": "A", "amperes": "A", "volts": "V",
     "newtons": "N", "newton_meters": "N m", "seconds": "s", "milliseconds": "ms", "microseconds": "us",
-    "nanoseconds": "ns",
+    "nanoseconds": "ns", "n_cm2": "N/cm2", "n_mm2": "N/mm2", "ncm2": "N/cm2", "nmm2": "N/mm2",
+    "kpa": "kPa", "mpa": "MPa",
 }  # fmt: skip
 # A unit that begins with a capital letter, without a separator, is written out: it has at least this many letters.
 _CAMEL, _WRITTEN_OUT = re.compile(r"(?<=[a-z])(?=[A-Z])"), 4
@@ -118,6 +120,14 @@ def may_be(quantity: str, stream: Stream) -> bool:
 def is_foreign(unit: str) -> bool:
     """Whether a unit measures nothing that a channel may be: a temperature, a power, a frequency, a pressure."""
     return unit.strip().lower() in _FOREIGN
+
+
+def pressure_unit(stream: Stream) -> str:
+    """Return the unit of pressure of a stream, from its header or its name; empty if it has none."""
+    if stream.unit:
+        return stream.unit if _measures(CONTACT_PRESSURE, stream.unit) else ""
+    unit = _split(own_name(stream))[2]
+    return unit if unit and _measures(CONTACT_PRESSURE, unit) else ""
 
 
 def quantity_of_unit(stream: Stream) -> str:

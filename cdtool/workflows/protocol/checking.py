@@ -8,6 +8,7 @@ from pathlib import Path
 from cdtool.errors import CdtoolError
 from cdtool.evaluation.protocol.assessment import check_point, judge
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Verdict
+from cdtool.recording import CONTACT_PRESSURE
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
 from cdtool.workflows.protocol.measuring import Assignment, assign, profiles_of
 from cdtool.workflows.protocol.protocol_file import ProtocolFile, read_protocol_file
@@ -66,7 +67,12 @@ def check_protocol(path: str | Path) -> CheckedProtocol:
     if setup is None:
         points = [check_point(point, file.profile_of(point), 0) for point in file.plan.points]
     else:
-        points = [check_point(item.point, profiles_of(item, file, setup), len(item.logs)) for item in assignment.points]
+        maps = setup.machine_file.columns, setup.machine_file.topics
+        logs_pressure = any(item.channel == CONTACT_PRESSURE for each in maps for item in (*each.sources, *each.beside))
+        points = [
+            check_point(item.point, profiles_of(item, file, setup), len(item.logs), logs_pressure=logs_pressure)
+            for item in assignment.points
+        ]
     verdict = judge(file.plan, points, file.path.name, [*more, *assignment.absent])
     recordings = {item.point.name: len(item.logs) for item in assignment.points}
     return CheckedProtocol(file, verdict, recordings, setup is None or bool(setup.detectors))

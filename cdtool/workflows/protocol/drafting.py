@@ -15,7 +15,14 @@ import numpy as np
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.force.limits import ForceProfile, read_force_limits
-from cdtool.evaluation.protocol.plan import FILL_IN, Instrument, MachineParticulars, MeasuringPoint, TestParticulars
+from cdtool.evaluation.protocol.plan import (
+    FILL_IN,
+    FORCE,
+    Instrument,
+    MachineParticulars,
+    MeasuringPoint,
+    TestParticulars,
+)
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.files import write_text
@@ -96,7 +103,7 @@ def draft_protocol(benchmark: str | Path | None, output: Path, *, force: bool = 
         *([] if any(point.profile for point in points) else _profiles_known()),
         *_table("[protocol.machine]", MachineParticulars, {}),
         *_table("[protocol.test]", TestParticulars, {}),
-        *_table("[[protocol.instrument]]", Instrument, _instrument(read)),
+        *_table("[[protocol.instrument]]", Instrument, _instrument(read), Instrument(FORCE).not_its_own),
     ]
     for point in points:
         lines += _table("[[protocol.point]]", MeasuringPoint, _point(point, read[point.name]))
@@ -192,7 +199,9 @@ def _profiles_known() -> list[str]:
     ]
 
 
-def _table(heading: str, kind: type[Any], known: Mapping[str, tuple[str, str]]) -> list[str]:
+def _table(
+    heading: str, kind: type[Any], known: Mapping[str, tuple[str, str]], without: Sequence[str] = ()
+) -> list[str]:
     """Return a table of the draft: known values, then what is to be filled in; the rest as comments."""
     lines = ["", heading]
     for item in fields(kind):
@@ -200,6 +209,8 @@ def _table(heading: str, kind: type[Any], known: Mapping[str, tuple[str, str]]) 
         if item.name in known:
             value, comment = known[item.name]
             lines.append(f"{item.name} = {value}" + (f"  # {comment}" if comment else ""))
+        elif item.name in without:
+            continue
         elif item.metadata["due"] == "never":
             lines.append(f"# {item.name} =  # {meaning}")
         else:

@@ -16,10 +16,12 @@ from cdtool.errors import ConfigurationError, nearest
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.evaluation.protocol.plan import MeasuringPoint
+from cdtool.evaluation.protocol.pressure import pressure_record
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind
+from cdtool.evaluation.protocol.speed import speed_before
 from cdtool.evaluation.results import Skipped
 from cdtool.evaluation.truth.missing_samples import cell_samples
-from cdtool.recording import Contact, Recording
+from cdtool.recording import RIG_UNITS, Contact, Recording
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
 from cdtool.workflows.contacts.matched_log import force_curves
@@ -169,27 +171,43 @@ def measured_point(
                     replace(one, latencies_ms=late.get((group, one.recording, one.contact), {})) for one in of_log
                 ]
                 unmeasured += others
-    return assess_point(item.point, profile, repetitions, unmeasured, file.plan.force_instrument)
+    plan = file.plan
+    return assess_point(item.point, profile, repetitions, unmeasured, plan.force_instrument, plan.pressure_instrument)
 
 
 def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[list[Repetition], list[Unmeasured]]:
     """Return the contacts of a recording, and those that do not count."""
     recording: Recording = read.recording
     curves, problems = force_curves(recording, read.contacts, mass)
-    # A loss of the machine's own channels does not concern the force.
-    others = {name for name in recording.channels if name != "force"}
+    # A loss of the machine's own channels concerns neither force nor pressure.
+    others = set(recording.channels) - set(RIG_UNITS)
     losses = tuple(str(item) for item in recording.findings if item.severity == "loss" and item.channel not in others)
     repetitions = []
     for number, curve in curves.items():
         contact = read.contacts[number - 1]
         of_file = (recording.name, recording.digest)
         measured = Repetition.of(of_file, number, curve, profile, (contact.rest, contact.drift))
-        repetitions.append(replace(measured, rest_error=_rest_error(recording, contact), losses=losses))
+        since, until = _neighbours(read.contacts, number)
+        repetitions.append(
+            replace(
+                measured,
+                rest_error=_rest_error(recording, contact),
+                losses=losses,
+                pressure=pressure_record(recording, contact, until, since),
+                speed=speed_before(recording, contact),
+            )
+        )
     unmeasured = [Unmeasured(recording.name, "in_progress") for contact in read.contacts if contact.in_progress]
     unmeasured += [Unmeasured(recording.name, "no_force", str(problem)) for problem in problems]
     if "force" not in recording:
         unmeasured.append(Unmeasured(recording.name, "no_force", "no load cell"))
     return repetitions, unmeasured
+
+
+def _neighbours(contacts: Sequence[Contact], number: int) -> tuple[float, float]:
+    """Return the end of the contact before the one of a number, and the start of the next one [s]."""
+    since = contacts[number - 2].end if number > 1 else -np.inf
+    return since, contacts[number].start if number < len(contacts) else np.inf
 
 
 def _rest_error(recording: Recording, contact: Contact) -> float:

@@ -43,8 +43,18 @@ class ProtocolFile:
     limits: Path | None = None
 
     def profile_of(self, point: MeasuringPoint, of_group: ForceProfile | None = None) -> ForceProfile | None:
-        """Return the force profile of a point: its own, else that of its recordings' group; None without both."""
-        return self.profiles[point.profile] if point.profile else of_group
+        """Return the force profile of a point: its own, else that of its recordings' group; None without both.
+
+        Raises ConfigurationError if the profile has no pressure for the point's area of the body.
+        """
+        profile = self.profiles[point.profile] if point.profile else of_group
+        if profile is not None and point.body_area:
+            try:
+                profile.pressure_limit(point.body_area)
+            except UsageError as fault:
+                where = f"{self.path}: protocol.point '{point.name}': body_area"
+                raise ConfigurationError(f"{where}: {fault.message}", fault.hint) from fault
+        return profile
 
 
 def has_protocol(path: Path) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cdtool.errors import ConfigurationError, UsageError
-from cdtool.evaluation.force.limits import ForceStep, profile_of, read_force_limits
+from cdtool.evaluation.force.limits import ForceStep, PressureLimit, profile_of, read_force_limits
 
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "force-limits.md"
@@ -74,6 +74,86 @@ def test_every_shipped_profile_names_its_standard_and_says_that_it_is_unchecked(
         assert not profile.checked
         assert "to be checked" in profile.warning
         assert replace(profile, checked=True).warning == ""
+
+
+PRESSURES = {
+    "skull_and_forehead": (130, 110),
+    "face": (110,),
+    "neck": (140, 210),
+    "back_and_shoulders": (160, 210),
+    "chest": (120, 170),
+    "abdomen": (140,),
+    "pelvis": (210,),
+    "upper_arms_and_elbows": (190, 220),
+    "lower_arms_and_wrists": (190, 180, 180),
+    "hands_and_fingers": (300, 270, 280, 220, 200, 260, 260, 200, 190),
+    "thighs_and_knees": (250, 220),
+    "lower_legs": (220, 210),
+}
+
+
+def test_robot_profiles_limit_the_pressure_of_29_areas_and_gate_profiles_none():
+    shipped = read_force_limits()
+    for region, pressures in PRESSURES.items():
+        profile = shipped[f"iso_ts_15066_{region}"]
+        assert tuple(item.quasi_static for item in profile.pressures) == pressures
+        factors = {item.first / item.quasi_static for item in profile.pressures}
+        assert factors == ({1.0} if region in HEAD else {2.0})
+        lowest = profile.pressure_limit()
+        assert lowest is not None and lowest.quasi_static == min(pressures)
+        assert "Table A.2" in profile.pressure_source and "pressure" in profile.pressure_source
+        assert "pressures" not in profile.described
+    areas = [item.area for profile in shipped.values() for item in profile.pressures]
+    assert len(areas) == len(set(areas)) == 29
+    assert shipped["en_12453_wide_gap"].pressure_limit() is None
+
+
+def test_the_page_lists_every_pressure():
+    page = PAGE.read_text(encoding="utf-8")
+    for name, profile in read_force_limits().items():
+        for item in profile.pressures:
+            transient = "–" if item.transient is None else f"{item.transient:g}"
+            assert f"| {item.area} | `{name}` | {transient} | {item.quasi_static:g} |" in page
+
+
+LIMITED = (
+    GOOD
+    + """pressure_source = "our own rule 8"
+pressures = [
+    { area = "palm", transient_n_per_cm2 = 500, quasi_static_n_per_cm2 = 250 },
+    { area = "thumb", quasi_static_n_per_cm2 = 300 },
+]
+"""
+)
+
+
+def test_a_file_of_the_user_may_limit_pressures_and_the_lowest_of_each_counts(tmp_path):
+    door = read_force_limits(written(tmp_path, LIMITED))["door"]
+    assert door.pressures == (PressureLimit("palm", 250.0, 500.0), PressureLimit("thumb", 300.0))
+    assert door.pressure_limit() == PressureLimit("palm", 250.0, 300.0)
+    assert door.pressure_limit("palm") == door.pressures[0]
+    with pytest.raises(UsageError, match="no pressure for the body area 'thum'") as fault:
+        door.pressure_limit("thum")
+    assert "thumb" in fault.value.hint
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ('pressure_source = "our own rule 8"', "", "door.pressure_source: is missing"),
+        ("transient_n_per_cm2 = 500", "transient_n_per_cm2 = 200", r"door.pressures\[0\].transient_n_per_cm2: is 200"),
+        ("transient_n_per_cm2 = 500", "transient = 500", r"door.pressures\[0\].transient: unknown key"),
+        ("quasi_static_n_per_cm2 = 300", "quasi_static_n_per_cm2 = 0", r"door.pressures\[1\].quasi_static_n_per_cm2"),
+        ('"thumb"', '"palm"', r"door.pressures\[1\].area: 'palm' names two areas"),
+        ('    { from_s = 0.5, at_most_n = 80, name = "clamped" },\n', "", "door.steps: has one step"),
+        ("pressures = [\n", 'pressures = ["palm",\n', "door.pressures: is"),
+    ],
+)
+def test_a_fault_in_the_pressures_names_file_and_key(tmp_path, old, new, key):
+    assert old in LIMITED
+    with pytest.raises(ConfigurationError, match=key) as fault:
+        read_force_limits(written(tmp_path, LIMITED.replace(old, new)))
+    assert "limits.toml" in fault.value.message
 
 
 def test_the_file_is_part_of_the_package():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def scored(recording: Recording, contacts: list[Contact]) -> Results:
         for i, item in enumerate(contacts, 1)
     ]
     rows = tuple(force_rows(log, verdicts, curves))
-    provenance = {"force_profiles": {"stiff": asdict(PROFILE)}}
+    provenance = {"force_profiles": {"stiff": PROFILE.described}}
     return Results(provenance, ("direct",), ("stiff",), tuple(late), (), (), forces=rows)
 
 

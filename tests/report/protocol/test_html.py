@@ -26,7 +26,7 @@ def text_of(page: str) -> str:
     return re.sub(r"cdtool \d[\w.+]*", "cdtool VERSION", re.sub(r"\b[0-9a-f]{64}\b", "HASH", text))
 
 
-@pytest.mark.parametrize("name", ["pass", "fail", "incomplete"])
+@pytest.mark.parametrize("name", ["pass", "fail", "incomplete", "pressure_en", "pressure_de"])
 def test_the_text_of_a_protocol_is_as_approved(name, documents):
     """To approve a new text, read it and write it to the file that the message names."""
     path = GOLDEN / f"{name}.txt"

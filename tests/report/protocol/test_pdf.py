@@ -17,7 +17,7 @@ from cdtool.report.protocol.pdf import to_pdf
 from tests.report.hostile import HOSTILE
 from tests.report.protocol.conftest import LONG
 
-CASES = ["pass", "fail", "incomplete"]
+CASES = ["pass", "fail", "incomplete", "pressure_en", "pressure_de"]
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def test_names_and_numbers_can_be_searched_and_copied_unless_a_name_is_longer_th
         pages = pypdf.PdfReader(io.BytesIO(to_pdf(documents[name]))).pages
         texts.append(" ".join(" ".join(page.extract_text() for page in pages).split()))
     assert "\u200b" not in texts[0]
-    assert "profile en_12453_reducing_gap were not" in texts[0] and "3 edge/03.csv 451 235.1" in texts[0]
+    assert "profile en_12453_reducing_gap were not" in texts[0] and "3 edge/03.csv 0.2 451 235.1" in texts[0]
     assert LONG in squeezed(texts[1]) and LONG not in texts[1]
 
 

@@ -41,6 +41,10 @@ def test_every_reason_and_every_cause_has_a_sentence(language):
     assert {f"cause.{kind}" for kind in typing.get_args(CauseKind)} == {
         key for key in known if key.startswith("cause.")
     }
+    causes, of_pressure = (words_of(language).texts[table] for table in ("cause", "pressure_cause"))
+    assert {key: placeholders(text) for key, text in causes.items()} == {
+        key: placeholders(text) for key, text in of_pressure.items()
+    }
 
 
 def test_the_causes_have_the_placeholders_of_their_numbers():
@@ -70,6 +74,8 @@ def test_every_supplied_step_has_a_name_and_another_stays_as_it_is(language):
     names = {step.name for profile in read_force_limits().values() for step in profile.steps}
     assert names == set(words_of(language).texts["step"])
     assert words_of(language).name("step", "my step") == "my step"
+    areas = {item.area for profile in read_force_limits().values() for item in profile.pressures}
+    assert areas == set(words_of(language).texts["area"])
 
 
 def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():

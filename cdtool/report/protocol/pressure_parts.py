@@ -1,0 +1,108 @@
+"""What a protocol shows of the contact pressures: columns of the results, checks, curves, limits and deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.protocol.assessment import PointAssessment
+from cdtool.evaluation.protocol.plan import Instrument
+from cdtool.evaluation.protocol.pressure import PressureAssessment, as_profile, highest
+from cdtool.report.protocol.words import Words
+
+
+@dataclass(frozen=True)
+class PressureColumns:
+    """The columns of the pressures of a point: headings, a row per repetition, the highest values, the limits."""
+
+    headings: tuple[str, ...] = ()
+    rows: tuple[tuple[float | None, ...], ...] = ()
+    highest: tuple[float | None, ...] = ()
+    limits: tuple[float | None, ...] = ()
+
+
+def pressure_columns(point: PointAssessment) -> PressureColumns:
+    """Return the columns of a point; without any if no pressure is known."""
+    found = point.pressures
+    if not any(item.is_known for item in found):
+        return PressureColumns(rows=((),) * len(point.repetitions))
+    most, limit = highest(found), found[0].limit
+    first, quasi_static = (limit.first, limit.quasi_static) if limit else (None, None)
+    if any(item.record for item in found):
+        rows = tuple((item.peak, item.late_peak) for item in found)
+        most_of_both = (most["peak"], most["late_peak"])
+        return PressureColumns(("pressure", "late_pressure"), rows, most_of_both, (first, quasi_static))
+    return PressureColumns(("pressure",), tuple((item.peak,) for item in found), (most["peak"],), (first,))
+
+
+def pressure_notices(points: tuple[PointAssessment, ...], words: Words) -> Iterator[str]:
+    """Yield what the reader must know of pressures that have no limit."""
+    for point in points:
+        if point.profile and not point.profile.pressures and any(item.is_known for item in point.pressures):
+            yield words("notice.pressure", point=point.point.name, profile=point.profile.name)
+
+
+def pressure_deviations(points: tuple[PointAssessment, ...], words: Words) -> Iterator[tuple[str, str]]:
+    """Yield what deviates, and why: pressures that are not measured, and two peaks of one contact that differ."""
+    for point in points:
+        if point.profile and point.profile.pressures and point.point.no_pressure_reason:
+            yield words("deviation.no_pressure", point=point.point.name), point.point.no_pressure_reason
+        for number, item in enumerate(point.pressures, 1):
+            if item.peaks_differ and item.record is not None:
+                values = {"entered": item.entered, "recorded": item.record.peak}
+                what = words("deviation.peaks_differ", point=point.point.name, repetition=number, **values)
+                yield what, words("deviation.both_compared")
+
+
+def pressure_checks(
+    points: tuple[PointAssessment, ...], instrument: Instrument | None, words: Words
+) -> list[tuple[object, ...]]:
+    """Return a row for each recorded pressure: what its data are like."""
+    rows: list[tuple[object, ...]] = []
+    for point in points:
+        for number, item in enumerate(point.pressures, 1):
+            if record := item.record:
+                reading: object = record.largest_reading
+                if instrument and instrument.range_n_per_cm2:
+                    most = words.number(instrument.range_n_per_cm2)
+                    reading = f"{words.number(record.largest_reading)} / {most}"
+                missing, saturated = (
+                    words("document.yes" if is_so else "document.no")
+                    for is_so in (record.curve.has_missing_samples, record.curve.saturated)
+                )
+                state = (record.sample_rate, record.curve.end, missing, saturated, reading, record.rest, record.drift)
+                rows.append((point.point.name, number, *state))
+    return rows
+
+
+def pressure_curves(point: PointAssessment) -> PointAssessment | None:
+    """Return a point whose curves are the recorded pressures, with their limits; None without a record or a limit."""
+    limit = point.pressures[0].limit if point.pressures else None
+    pairs = [(one, item.record) for one, item in zip(point.repetitions, point.pressures, strict=True) if item.record]
+    if point.profile is None or limit is None or not pairs:
+        return None
+    repetitions = tuple(replace(one, curve=record.curve) for one, record in pairs)
+    return replace(point, profile=as_profile(point.profile, limit), repetitions=repetitions)
+
+
+def pressure_limit_rows(
+    profile: ForceProfile, points: tuple[PointAssessment, ...], words: Words
+) -> list[tuple[object, ...]]:
+    """Return a row for each area of the body: its limits, and the points to which they apply."""
+    rows: list[tuple[object, ...]] = []
+    for item in profile.pressures:
+        names = [point.point.name for point in points if _applies(point, profile, item.area)]
+        rows.append((words.name("area", item.area), item.transient, item.quasi_static, ", ".join(names)))
+    return rows
+
+
+def _applies(point: PointAssessment, profile: ForceProfile, area: str) -> bool:
+    limit = profile.pressure_limit(point.point.body_area) if point.profile == profile else None
+    return limit is not None and limit.area == area
+
+
+def worst_outcome(force: str, pressure: PressureAssessment | None) -> str:
+    """Return the outcome of a repetition: the worse one of its force and its pressure."""
+    order = ("fail", "not_assessable", "pass")
+    return min(force, pressure.outcome if pressure else "pass", key=order.index)
