@@ -21,6 +21,8 @@ from cdtool.short_repr import short_repr
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
+# Readings that differ by less than this share of the largest are equal: files have six digits or more.
+_ROUNDING = 1e-6
 # An axis takes part in a contact from this share of the magnitude's peak on.
 _TAKES_PART = 0.3
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
@@ -61,6 +63,17 @@ class ForceTimeCurve:
     def peak(self) -> float:
         """Return the largest force [N]."""
         return float(self.force.max())
+
+    @cached_property
+    def resolution(self) -> float:
+        """Return the smallest difference of two readings [N], apart from rounding of the computer; 0 if none is known.
+
+        Of a cell with a coarse resolution that is its resolution. Two different readings do not show one.
+        """
+        levels = np.unique(self.force)
+        steps = np.diff(levels)
+        steps = steps[steps > _ROUNDING * float(np.max(np.abs(self.force)))]
+        return float(steps.min()) if len(steps) > 1 else 0.0
 
     @property
     def longest_step(self) -> float:

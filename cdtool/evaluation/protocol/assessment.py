@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, islice
 from typing import Literal
 
 import numpy as np
@@ -20,6 +20,7 @@ from cdtool.evaluation.force.quantities import dynamic_time, time_above
 from cdtool.evaluation.force.verdict import ForceVerdict, PointVerdict, assess_force, averaged
 from cdtool.evaluation.protocol.plan import Instrument, MeasuringPoint, TestPlan, empty_entries
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Value, Verdict
+from cdtool.evaluation.protocol.same_measurement import hold_same_measurement
 from cdtool.evaluation.truth.missing_samples import CellClock
 
 # Sample rates are alike within this share: a clock is not exact, and stamps jitter.
@@ -273,22 +274,30 @@ def _beyond_plan(point: MeasuringPoint, profile: ForceProfile | None, present: i
 
 
 def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
-    """Yield each contact that is counted twice under two names: it is one measurement."""
-    first: dict[tuple[str, int], str] = {}
-    for item in repetitions:
-        known = first.setdefault((item.sha256, item.contact), item.recording)
-        if known != item.recording:
-            yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=known)
+    """Yield each contact that is counted twice: it is one measurement."""
+    for number, item in enumerate(repetitions):
+        yield from islice(_copies(point, item, repetitions[:number]), 1)
 
 
 def _at_two_points(points: Sequence[PointAssessment]) -> Iterator[Reason]:
-    """Yield each contact that is counted at a second point, under another name: it was measured at one."""
-    first: dict[tuple[str, int], tuple[int, str]] = {}
+    """Yield each contact that is counted at a second point, too: it was measured at one."""
     for number, item in enumerate(points):
+        earlier = [one for other in points[:number] for one in other.repetitions]
         for one in item.repetitions:
-            owner, known = first.setdefault((one.sha256, one.contact), (number, one.recording))
-            if owner != number:
-                yield _reason(ReasonKind.SAME_RECORDING, item.point, recording=one.recording, other=known)
+            yield from islice(_copies(item.point, one, earlier), 1)
+
+
+def _copies(point: MeasuringPoint, item: Repetition, earlier: Sequence[Repetition]) -> Iterator[Reason]:
+    """Yield which earlier repetitions hold the same measurement: identical files first, then equal curves."""
+    for other in earlier:
+        if (other.sha256, other.contact) == (item.sha256, item.contact) and other.recording != item.recording:
+            yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=other.recording)
+    for other in earlier:
+        if hold_same_measurement(other.curve, item.curve):
+            contacts = {"contact": item.contact, "other_contact": other.contact}
+            yield _reason(
+                ReasonKind.SAME_MEASUREMENT, point, recording=item.recording, other=other.recording, **contacts
+            )
 
 
 def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:

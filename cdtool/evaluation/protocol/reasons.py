@@ -33,6 +33,7 @@ class ReasonKind(Enum):
     NO_FORCE = "no_force"
     IN_PROGRESS = "in_progress"
     SAME_RECORDING = "same_recording"
+    SAME_MEASUREMENT = "same_measurement"
     CALIBRATION_EXPIRED = "calibration_expired"
     CALIBRATED_LATER = "calibrated_later"
     STATED_RATE_TOO_LOW = "stated_rate_too_low"

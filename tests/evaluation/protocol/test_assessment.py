@@ -64,6 +64,12 @@ def sine(peak: float = 300.0) -> np.ndarray:
 
 
 def repetition(force: ForceTimeCurve, number: int = 1, rest: tuple[float, float] = (0.0, 0.0)) -> Repetition:
+    """Return a contact with noise of its own: no two measurements are equal."""
+    noise = np.random.default_rng(number).normal(0.0, 0.01, len(force.time))
+    return without_noise(replace(force, force=force.force + noise), number, rest)
+
+
+def without_noise(force: ForceTimeCurve, number: int = 1, rest: tuple[float, float] = (0.0, 0.0)) -> Repetition:
     return Repetition.of((f"{number}.csv", f"sha{number}"), 1, force, PROFILE, rest)
 
 
@@ -159,6 +165,22 @@ def test_the_same_recording_under_two_names_is_not_two_measurements():
     assert outcome([items[0], replace(items[1], sha256="sha1"), items[2]])[1] == ["same_recording"]
     # Two contacts of one recording are two measurements.
     assert outcome([items[0], replace(items[1], sha256="sha1", recording="1.csv", contact=2), items[2]])[0] == "pass"
+
+
+def test_one_measurement_in_two_files_is_not_two_measurements_nor_one_at_two_points():
+    one, two, three_ = three(curve(sine()))
+    again = replace(two, curve=replace(one.curve, force=one.curve.force.round(2)))
+    found = assess_point(POINT, PROFILE, [one, again, three_], instrument=METER)
+    assert [dict(reason.values) for reason in found.reasons] == [
+        {"point": "edge", "recording": "2.csv", "other": "1.csv", "contact": 1, "other_contact": 1}
+    ]
+    assert (found.outcome, found.reasons[0].kind.value) == ("incomplete", "same_measurement")
+    # The same contact, appended to its recording.
+    appended = replace(again, sha256=one.sha256, recording=one.recording, contact=2)
+    assert outcome([one, appended, three_]) == ("incomplete", ["same_measurement"])
+    points = [assess_point(POINT, PROFILE, items, instrument=METER) for items in ([one], [again])]
+    kinds = [reason.kind.value for reason in judge(PLAN, points, "p.toml").reasons]
+    assert kinds == ["too_few_repetitions", "too_few_repetitions", "same_measurement"]
 
 
 def test_a_contact_in_progress_is_named_and_not_counted():
@@ -264,9 +286,9 @@ def test_a_plan_names_each_point_once():
 
 @pytest.mark.parametrize(("held", "found"), [(1, []), (4, []), (20, ["rate_too_low"])])
 def test_a_log_that_repeats_each_reading_has_the_sample_rate_of_the_cell(held, found):
-    noise = np.random.default_rng(held).normal(0.0, 0.5, len(TIME))
-    slow = np.repeat((sine() + noise)[::held], held)[: len(TIME)]
-    items = [repetition(curve(slow), number) for number in (1, 2, 3)]
+    noise = np.random.default_rng(held).normal(0.0, 0.5, (3, len(TIME)))
+    slow = [np.repeat((sine() + some)[::held], held)[: len(TIME)] for some in noise]
+    items = [without_noise(curve(force), number) for number, force in enumerate(slow, 1)]
     assert items[0].sample_rate == pytest.approx(1000.0 / held, rel=1e-3)
     meter = replace(METER, sample_rate_hz=1000.0 / held)
     reasons = assess_point(POINT, PROFILE, items, instrument=meter).reasons
@@ -275,4 +297,4 @@ def test_a_log_that_repeats_each_reading_has_the_sample_rate_of_the_cell(held, f
 
 def test_a_coarse_cell_under_a_steady_force_is_no_slow_cell():
     coarse = 2.0 * np.round((sine() + np.where(TIME < 3.0, 20.0, 0.0)) / 2.0)
-    assert repetition(curve(coarse)).sample_rate == pytest.approx(1000.0)
+    assert without_noise(curve(coarse)).sample_rate == pytest.approx(1000.0)

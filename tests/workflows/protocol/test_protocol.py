@@ -182,6 +182,30 @@ def test_a_copy_of_a_recording_at_another_point_is_no_measurement_of_it(tmp_path
     assert protocol.verdict.reasons[0].values == {"point": "other", "recording": "edge/06.csv", "other": "edge/01.csv"}
 
 
+def _with_decimals(rows: list[list[str]]) -> list[list[str]]:
+    return [[*row[:3], f"{float(row[3]):.1f}"] for row in rows]
+
+
+EXPORTS = {
+    "fewer decimals": _with_decimals,
+    "samples cut": lambda rows: rows[37:-5],
+    "every second sample": lambda rows: rows[::2],
+    "times that begin at 12 s": lambda rows: [[f"{float(row[0]) + 12.0:.4f}", *row[1:]] for row in rows],
+}
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_a_measurement_that_was_exported_again_is_no_repetition(name, tmp_path):
+    write_rig(tmp_path, FORCES[:2])
+    header, *rows = (tmp_path / "edge" / "02.csv").read_text(encoding="utf-8").splitlines()
+    written = [",".join(row) for row in EXPORTS[name]([row.split(",") for row in rows])]
+    (tmp_path / "edge" / "third.csv").write_text("\n".join([header, *written, ""]), encoding="utf-8")
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert protocol.verdict.outcome == "incomplete" and "same_measurement" in kinds(protocol)
+    sentence = words_of("en").reasons(protocol.verdict, "incomplete")[0]
+    assert sentence == "edge: edge/02.csv (contact 1) and edge/third.csv (contact 1) hold the same measurement"
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
