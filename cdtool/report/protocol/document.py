@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 
+from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.force.verdict import PointVerdict
 from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition
 from cdtool.evaluation.protocol.plan import Instrument
 from cdtool.evaluation.protocol.protocol import Protocol
@@ -26,7 +28,8 @@ from cdtool.report.protocol.blocks import (
 from cdtool.report.protocol.curve_drawing import curve_drawings
 from cdtool.report.protocol.words import Words, words_of
 
-_CHECKED_STEPS = 3
+# A page is as wide as so many forces beside each other; the next steps are in another table.
+_STEPS_IN_TABLE = 6
 
 
 @dataclass(frozen=True)
@@ -175,46 +178,52 @@ def _results(protocol: Protocol, words: Words) -> Iterator[Block]:
 
 
 def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
-    """Yield the repetitions of a point with the mean and the limits of its profile."""
-    profile, verdict = point.profile, point.verdict
-    if profile is None or verdict is None or not point.repetitions:
+    """Yield the repetitions of a point with the mean and the limits of its profile, all steps of it."""
+    if point.profile is None:
+        yield Paragraph(words("text.not_assessed"))
+    elif point.verdict is None or not point.repetitions:
         yield Paragraph(words("text.nothing_measured"))
-        return
-    pressures = point.point.peak_pressures_n_per_cm2
-    names = ("repetition", "recording", "dynamic_force", "dynamic_time", "static_force", "residual_force")
-    columns = [words(f"column.{name}") for name in (*names, *(["pressure"] if pressures else []), "result")]
-    rows = []
-    for number, item in enumerate(point.repetitions, 1):
-        peaks = _padded([step.peak for step in item.verdict.steps])
-        pressure = [pressures[number - 1] if number <= len(pressures) else None] if pressures else []
-        time = _time(item.dynamic_time, words)
-        cells = _row(words, number, item.recording, peaks[0], time, *peaks[1:], *pressure)
-        rows.append((*cells, words(f"outcome.{item.verdict.outcome}")))
-    first, *others = _padded([step.force for step in verdict.steps])
+    else:
+        steps = range(len(point.profile.steps))
+        for begin in steps[::_STEPS_IN_TABLE]:
+            yield _forces(point, point.profile, point.verdict, steps[begin : begin + _STEPS_IN_TABLE], words)
+
+
+def _forces(point: PointAssessment, profile: ForceProfile, verdict: PointVerdict, steps: range, words: Words) -> Grid:
+    """Return the table of some steps: a row for each repetition, then their mean and the limits."""
+    items = point.repetitions
     kind = "mean" if profile.average_of > 1 else "highest"
-    times = [item.dynamic_time for item in point.repetitions]
-    time = _time(sum(times) / len(times) if kind == "mean" else max(times), words)
-    blank = [""] if pressures else []
-    rows.append(
-        (*_row(words, words(f"row.{kind}"), "", first, time, *others, *blank), words(f"outcome.{point.outcome}"))
-    )
-    at_most = _padded([step.at_most_n for step in profile.steps])
-    limit_time = words.number(1e3 * profile.steps[1].from_s) if len(profile.steps) > 1 else ""
-    rows.append((*_row(words, words("row.limit"), profile.name, at_most[0], limit_time, *at_most[1:], *blank), ""))
-    count = len(point.repetitions)
+    numbers = [str(number) for number in range(1, len(items) + 1)]
+    columns = [
+        (words("column.repetition"), [*numbers, words(f"row.{kind}"), words("row.limit")]),
+        (words("column.recording"), [*(item.recording for item in items), "", profile.name]),
+    ]
+    for number in steps:
+        step, limit = profile.steps[number], profile.steps[number].at_most_n
+        forces = [*(item.verdict.steps[number].peak for item in items), verdict.steps[number].force]
+        columns.append(
+            (words.force_of(step.name), [*(words.beside(force, limit) for force in forces), words.limit(limit)])
+        )
+        if number == 0 and len(profile.steps) > 1:
+            times = [item.dynamic_time for item in items]
+            of_all = sum(times) / len(times) if kind == "mean" else max(times)
+            cells = [_time(time, words) for time in (*times, of_all)]
+            columns.append((words("column.dynamic_time"), [*cells, words.limit(1e3 * profile.steps[1].from_s)]))
+    if pressures := point.point.peak_pressures_n_per_cm2:
+        stated = [*pressures, *[None] * len(items)][: len(items)]
+        columns.append((words("column.pressure"), [*map(words.value, stated), "", ""]))
+    outcomes = [*(item.verdict.outcome for item in items), point.outcome]
+    columns.append((words("column.result"), [*(words(f"outcome.{outcome}") for outcome in outcomes), ""]))
+    rows = [tuple(map(plain, row)) for row in zip(*(cells for _, cells in columns), strict=True)]
     numeric = tuple(range(2, len(columns) - 1))
     widths = (4, 13, *(6 for _ in numeric), 8)
-    yield _grid(columns, rows, widths=widths, numeric=numeric, strong=(count, count + 1))
+    strong = (len(items), len(items) + 1)
+    return _grid([plain(name) for name, _ in columns], rows, widths=widths, numeric=numeric, strong=strong)
 
 
 def _time(seconds: float, words: Words) -> str:
     """Return a time above a limit in ms, or that it has not ended."""
     return words("document.never_ends") if math.isinf(seconds) else words.number(1e3 * seconds)
-
-
-def _padded(values: Sequence[float]) -> list[float | None]:
-    """Return the values of the first three steps of a profile; None for one that it does not have."""
-    return [values[number] if number < len(values) else None for number in range(_CHECKED_STEPS)]
 
 
 def _curves(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -289,7 +298,8 @@ def _check_row(
     )
     reading = words.number(item.largest_reading)
     if instrument and instrument.range_n:
-        reading = f"{reading} / {words.number(instrument.range_n)}"
+        most = instrument.range_n
+        reading = f"{words.beside(item.largest_reading, most)} / {words.limit(most)}"
     return _row(words, point.point.name, number, rate, record, missing, saturated, reading, item.rest, item.drift)
 
 
@@ -297,7 +307,7 @@ def _needed(measured: float, needed: float, words: Words) -> str:
     """Return a measured value, with the required one if there is one."""
     if not needed:
         return words.number(measured)
-    return words("column.measured_needed", measured=measured, needed=needed)
+    return words("column.measured_needed", measured=words.beside(measured, needed), needed=words.limit(needed))
 
 
 def _deviations(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -330,7 +340,10 @@ def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
             )
         )
         columns = [words(f"column.{name}") for name in ("step", "from", "at_most")]
-        rows = [_row(words, words.name("step", step.name), step.from_s, step.at_most_n) for step in profile.steps]
+        rows = [
+            _row(words, words.name("step", step.name), words.limit(step.from_s), words.limit(step.at_most_n))
+            for step in profile.steps
+        ]
         yield _grid(columns, rows, widths=(4, 2, 2), numeric=(1, 2))
         if profile.measuring_source:
             numbers = {
