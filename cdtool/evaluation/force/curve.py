@@ -23,6 +23,8 @@ from cdtool.short_repr import short_repr
 _STUCK = 5
 # Readings that differ by less than this share of the largest are equal: files have six digits or more.
 _ROUNDING = 1e-6
+# Readings up to so many steps apart are multiples of the step, within this share of it.
+_NEAR, _ON_GRID = 10.0, 0.1
 # An axis takes part in a contact from this share of the magnitude's peak on.
 _TAKES_PART = 0.3
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
@@ -66,14 +68,15 @@ class ForceTimeCurve:
 
     @cached_property
     def resolution(self) -> float:
-        """Return the smallest difference of two readings [N], apart from rounding of the computer; 0 if none is known.
-
-        Of a cell with a coarse resolution that is its resolution. Two different readings do not show one.
-        """
-        levels = np.unique(self.force)
-        steps = np.diff(levels)
+        """Return the step in which the readings are written [N]; 0 if they are on no such grid, or too few show one."""
+        steps = np.diff(np.unique(self.force))
         steps = steps[steps > _ROUNDING * float(np.max(np.abs(self.force)))]
-        return float(steps.min()) if len(steps) > 1 else 0.0
+        if not len(steps):
+            return 0.0
+        smallest = float(steps.min())
+        near = steps[steps < _NEAR * smallest] / smallest
+        is_grid = len(near) > 1 and bool(np.all(np.abs(near - np.rint(near)) < _ON_GRID))
+        return smallest if is_grid else 0.0
 
     @property
     def longest_step(self) -> float:

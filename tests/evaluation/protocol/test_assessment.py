@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from cdtool.evaluation.force.curve import ForceTimeCurve
@@ -181,6 +181,91 @@ def test_one_measurement_in_two_files_is_not_two_measurements_nor_one_at_two_poi
     points = [assess_point(POINT, PROFILE, items, instrument=METER) for items in ([one], [again])]
     kinds = [reason.kind.value for reason in judge(PLAN, points, "p.toml").reasons]
     assert kinds == ["too_few_repetitions", "too_few_repetitions", "same_measurement"]
+
+
+CHEST = read_force_limits()["iso_ts_15066_chest"]
+
+
+def of_chest(force: np.ndarray, time: np.ndarray = TIME, number: int = 1) -> tuple[str, list[str]]:
+    point = replace(POINT, repetitions=1, obstacle_stiffness_n_per_mm=25.0)
+    item = Repetition.of((f"{number}.csv", f"sha{number}"), 1, curve(force, time), CHEST)
+    found = assess_point(point, CHEST, [item])
+    return found.outcome, [reason.kind.value for reason in found.reasons]
+
+
+@pytest.mark.parametrize("seconds", [0.2, 0.49, 0.5, 0.501, 0.6, 0.99])
+def test_a_record_that_does_not_hold_half_a_second_of_the_last_step_is_no_pass(seconds):
+    count = round(1000 * seconds) + 1
+    assert of_chest(sine(200.0)[:count], TIME[:count]) == ("incomplete", ["last_step_too_short"])
+    assert of_chest(sine(200.0)[:1001], TIME[:1001]) == ("pass", [])
+
+
+def test_a_step_that_the_stated_record_does_not_reach_is_no_pass():
+    early = replace(CHEST, record_at_least_s=0.3)
+    item = Repetition.of(("1.csv", "sha"), 1, curve(sine(200.0)[:400], TIME[:400]), early)
+    found = assess_point(replace(POINT, repetitions=1, obstacle_stiffness_n_per_mm=25.0), early, [item])
+    assert {reason.kind.value for reason in found.reasons} == {"not_assessable"}
+    assert found.outcome == "incomplete" and found.reasons[-1].values["step"] == "quasi-static"
+
+
+@given(st.sampled_from([20.0, 50.0, 100.0, 200.0]), st.floats(0.0, 1.0), st.floats(0.02, 0.1))
+def test_without_a_stated_sample_rate_no_peak_above_the_limit_hides_between_samples(rate, phase, rise):
+    time = np.arange(round(3 * rate)) / rate
+    since = time + phase / rate
+    force = 284.0 * np.sin(np.pi * since / (2.0 * rise)) * (since < 2.0 * rise)
+    assume(force.max() > 0.1 * 284.0)  # below that, no contact is seen
+    assert of_chest(force, time)[0] != "pass"
+
+
+def test_without_a_stated_sample_rate_enough_samples_pass():
+    noise = np.random.default_rng(1).normal(0.0, 0.3, len(TIME))
+    assert of_chest(sine(278.0) + noise) == ("pass", [])
+    slow, time = sine(281.0)[::40], TIME[::40]
+    assert slow.max() < 280.0
+    assert of_chest(slow, time) == ("incomplete", ["peak_between_samples"])
+    assert of_chest(0.8 * slow, time) == ("pass", [])
+
+
+def test_a_reading_at_the_range_of_the_instrument_is_none():
+    at_range = sine(300.0)
+    at_range[150] = 300.0
+    for reach, wanted in ((300.0, ["beyond_range"]), (300.01, []), (5000.0, [])):
+        item = without_noise(curve(at_range), 3)
+        meter = replace(METER, range_n=reach)
+        found = assess_point(POINT, PROFILE, [*three(curve(sine()))[:2], item], instrument=meter)
+        of_third = [reason for reason in found.reasons if reason.values["recording"] == "3.csv"]
+        assert [reason.kind.value for reason in of_third] == wanted
+
+
+@pytest.mark.parametrize(("equal", "reach", "wanted"), [(2, 310.0, ["near_range"]), (1, 310.0, []), (2, 500.0, [])])
+def test_two_equal_readings_close_to_the_range_may_be_a_stop(equal, reach, wanted):
+    force = np.minimum(sine(305.0), 290.0 + 10.0 * np.sin(np.pi * TIME / 0.3))
+    force[150 : 150 + equal] = 302.0
+    items = [*three(curve(sine(200.0)))[:2], without_noise(curve(force), 3)]
+    found = assess_point(POINT, PROFILE, items, instrument=replace(METER, range_n=reach))
+    assert [reason.kind.value for reason in found.reasons] == wanted
+
+
+@pytest.mark.parametrize(
+    ("cell", "peak", "wanted"),
+    [(10.0, 396.0, ["resolution_decides"]), (10.0, 384.0, []), (1.22, 398.5, []), (0.1, 399.98, [])],
+)
+def test_a_mean_within_half_a_coarse_cell_of_its_limit_is_no_pass(cell, peak, wanted):
+    random = np.random.default_rng(3)
+    forces = [cell * np.round((sine(peak) + random.normal(0.0, 0.2 * cell, len(TIME))) / cell) for _ in range(3)]
+    forces = [np.minimum(force, cell * np.round(peak / cell)) for force in forces]
+    profile = replace(
+        PROFILE, steps=(PROFILE.steps[0], *(replace(step, at_most_n=300.0) for step in PROFILE.steps[1:]))
+    )
+    items = [Repetition.of((f"{n}.csv", f"{n}"), 1, curve(force), profile) for n, force in enumerate(forces)]
+    assert [reason.kind.value for reason in assess_point(POINT, profile, items).reasons] == wanted
+
+
+def test_an_error_of_a_repetition_above_the_limit_counts_for_the_mean_that_meets_it():
+    high = replace(repetition(curve(sine(500.0)), 3), rest_error=20.0)
+    items = [repetition(curve(sine(peak)), number) for number, peak in ((1, 340.0), (2, 350.0))]
+    assert outcome([*items, high])[1] == ["rest_decides"]
+    assert outcome([*items, replace(high, rest_error=8.0)]) == ("pass", [])
 
 
 def test_a_contact_in_progress_is_named_and_not_counted():

@@ -22,6 +22,7 @@ from cdtool.evaluation.protocol.plan import (
     TestParticulars,
 )
 from cdtool.evaluation.protocol.protocol import Protocol
+from cdtool.evaluation.protocol.reasons import Verdict
 from cdtool.report.protocol.words import words_of
 from cdtool.workflows.protocol.checking import check_protocol
 from cdtool.workflows.protocol.drafting import draft_protocol
@@ -45,8 +46,12 @@ def made(rig) -> Protocol:
     return make_protocol(read_protocol_file(rig / "protocol.toml"), cdtool.benchmark(rig / "benchmark.toml"))
 
 
+def kinds_of(verdict: Verdict) -> list[str]:
+    return [reason.kind.value for reason in verdict.reasons]
+
+
 def kinds(protocol: Protocol) -> list[str]:
-    return [reason.kind.value for reason in protocol.verdict.reasons]
+    return kinds_of(protocol.verdict)
 
 
 def test_three_good_repetitions_pass_with_their_quantities_and_latencies(made):
@@ -126,6 +131,44 @@ def test_a_slow_contact_that_begins_with_the_record_does_not_pass_by_a_wrong_res
     protocol = cdtool.protocol(write_protocol(tmp_path))
     assert protocol.points[0].repetitions[0].verdict.steps[1].peak < 150.0 < reading
     assert kinds(protocol) == ["rest_decides"] * 3
+
+
+@pytest.mark.parametrize(
+    ("slope", "level", "early"),
+    [(2.0, 18.0, 3.0), (5.0, 17.0, 3.0), (1.0, 18.0, 3.0), (20.0, 40.0, 0.5), (15.0, 30.0, 0.55)],
+)
+def test_a_record_that_begins_in_the_middle_of_a_slow_rise_does_not_pass_by_a_wrong_rest(slope, level, early, tmp_path):
+    def rise_and_impact(time):
+        rise = np.where(time < 0.3, np.maximum(level + slope * np.minimum(time, 0.0), 0.0), 0.0)
+        return rise + half_sine(405.0 - level)(time)
+
+    write_rig(tmp_path, (rise_and_impact,) * 3)
+    for path in (tmp_path / "edge").iterdir():
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([header, *rows[round(1000 * (3.0 - early)) :], ""]), encoding="utf-8")
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert protocol.points[0].repetitions[0].curve.peak < 400.0
+    assert protocol.verdict.outcome == "incomplete" and "rest_decides" in kinds(protocol)
+
+
+@pytest.mark.parametrize("early", [0.1, 0.3, 0.5])
+def test_a_trigger_shortly_before_the_contact_and_an_offset_of_the_cell_are_no_slow_rise(early, tmp_path):
+    write_rig(tmp_path, ())
+    for number in (1, 2, 3):
+        path = tmp_path / "edge" / f"{number}.csv"
+        write_log(path, half_sine(390.0), rest=50.0)
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([header, *rows[round(1000 * (3.0 - early)) :], ""]), encoding="utf-8")
+    assert kinds(cdtool.protocol(write_protocol(tmp_path))) == []
+
+
+def test_a_point_without_a_profile_has_one_reason_the_true_one(tmp_path):
+    write_rig(tmp_path, FORCES)
+    path = write_protocol(tmp_path)
+    path.write_text(path.read_text(encoding="utf-8").replace('profile = "en_', '# "'), encoding="utf-8")
+    assert kinds(cdtool.protocol(path)) == kinds_of(check_protocol(path).verdict) == ["no_profile"]
+    path.write_text(path.read_text(encoding="utf-8").replace("repetitions = 3", "repetitions = 4"), encoding="utf-8")
+    assert kinds(cdtool.protocol(path)) == ["no_profile", "too_few_repetitions"]
 
 
 def test_rows_that_the_reader_drops_are_never_a_pass(tmp_path):
