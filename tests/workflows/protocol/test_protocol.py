@@ -100,6 +100,45 @@ def test_a_recording_that_cannot_be_read_has_its_hash_too(tmp_path):
     assert files["edge/04.csv"] == (hashlib.sha256(b"no table\n").hexdigest(), "measured")
 
 
+def test_every_file_that_a_figure_depends_on_has_its_hash(tmp_path):
+    write_rig(tmp_path, FORCES)
+    (tmp_path / "yard.toml").write_bytes(Path("cdtool/evaluation/force/limits.toml").read_bytes())
+    (tmp_path / "own.toml").write_bytes(Path("cdtool/evaluation/force/limits.toml").read_bytes() + b"\n")
+    with (tmp_path / "benchmark.toml").open("a", encoding="utf-8") as opened:
+        opened.write('[force]\nlimits = "yard.toml"\nprofile = "en_12453_reducing_gap"\n')
+    path = write_protocol(tmp_path)
+    text = path.read_text(encoding="utf-8").replace('profile = "en_', '# "')
+    path.write_text(text, encoding="utf-8")
+    first = cdtool.protocol(path)
+    assert first.verdict.outcome == "pass"
+    assert [item.name for item in first.files if item.role == "limits"] == ["yard.toml"]
+    path.write_text(text.replace('number = "P-17"', 'limits = "own.toml"'), encoding="utf-8")
+    assert [item.name for item in cdtool.protocol(path).files if item.role == "limits"] == ["own.toml", "yard.toml"]
+    # The report must not overwrite it, either.
+    assert tmp_path / "yard.toml" in cdtool.benchmark(tmp_path / "benchmark.toml").inputs
+
+
+def test_a_file_of_labels_and_a_load_cell_in_its_own_file_have_their_hash(tmp_path):
+    write_rig(tmp_path, FORCES)
+    machine = (tmp_path / "machine.toml").read_text(encoding="utf-8")
+    time = 'time = { column = "t", unit = "s" }, time_offset = 0.0'
+    own = f'force = {{ file = "{{stem}}_force.csv", column = "load_cell", unit = "N", {time} }}'
+    (tmp_path / "machine.toml").write_text(
+        machine.replace('force = { column = "load_cell", unit = "N" }', own), encoding="utf-8"
+    )
+    for log in sorted((tmp_path / "edge").glob("*.csv")):
+        log.with_stem(f"{log.stem}_force").write_bytes(log.read_bytes())
+    benchmark = (tmp_path / "benchmark.toml").read_text(encoding="utf-8")
+    (tmp_path / "benchmark.toml").write_text(
+        benchmark.replace("[onset]", '[onset]\nlabels = "labels.csv"'), encoding="utf-8"
+    )
+    (tmp_path / "labels.csv").write_text("recording,start_s,end_s\n01.csv,3.0,3.3\n", encoding="utf-8")
+    files = {item.name: item.role for item in cdtool.protocol(write_protocol(tmp_path)).files}
+    names = set(files)
+    assert files["labels.csv"] == "labels"
+    assert {f"edge/0{number}{end}.csv" for number in (1, 2, 3) for end in ("", "_force")} <= names
+
+
 def test_an_excluded_recording_is_named_and_not_counted(tmp_path):
     write_rig(tmp_path, (*FORCES, half_sine(900.0)))
     more = '[[protocol.exclusion]]\nlogs = ["edge/04.csv"]\nreason = "the rig slipped"'
