@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import accumulate
 
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.verdict import PointVerdict
-from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition
+from cdtool.evaluation.protocol.assessment import LAST_STEP_S, PointAssessment, Repetition, required_record
 from cdtool.evaluation.protocol.plan import Instrument
 from cdtool.evaluation.protocol.protocol import Protocol
 from cdtool.plain_text import plain
@@ -22,12 +23,18 @@ from cdtool.report.protocol.blocks import (
     Heading,
     Items,
     Paragraph,
+    Reference,
     Signatures,
     VerdictBox,
 )
 from cdtool.report.protocol.curve_drawing import curve_drawings
 from cdtool.report.protocol.words import Words, words_of
 
+# The reasons on the first page: so many lines, with so many characters on each, and those left for a second outcome.
+_FIRST_LINES, _IN_A_LINE, _LEFT_LINES = 18, 95, 6
+# Names of measuring points on the first page: so many characters.
+_NAMED = 200
+_ALL_REASONS = "all-reasons"
 # A page is as wide as so many forces beside each other; the next steps are in another table.
 _STEPS_IN_TABLE = 6
 
@@ -89,16 +96,55 @@ def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
         ("place", plan.test.place),
         ("tester", plan.test.tester),
         ("organisation", plan.test.organisation),
-        ("points", ", ".join(point.point.name for point in points)),
+        ("points", _first_names([point.point.name for point in points], words)),
     )
     yield Facts(tuple((words(f"field.{name}"), plain(words.value(value or None))) for name, value in shown))
-    for outcome in ("fail", "incomplete"):
-        sentences = words.reasons(verdict, outcome)
-        if sentences:
-            yield Heading(words(f"verdict.why_{outcome}"))
-            yield Items(tuple(map(plain, sentences)))
+    yield from _first_reasons(protocol, words)
     yield Heading(words("verdict.notices"))
     yield Items(tuple(map(plain, _notices(protocol, words))))
+    yield from _all_reasons(protocol, words)
+
+
+def _first_names(names: Sequence[str], words: Words) -> str:
+    """Return names in a list, or the first ones that fit into a few lines and how many more there are."""
+    lengths = accumulate(len(name) + 2 for name in names)
+    count = max(1, sum(length <= _NAMED for length in lengths))
+    listed = ", ".join(names[:count])
+    return listed if count >= len(names) else words("verdict.more_names", names=listed, count=len(names) - count)
+
+
+def _reasons(protocol: Protocol, words: Words) -> list[tuple[str, list[str]]]:
+    """Return the sentences of each outcome that has any, those of a fail first."""
+    found = [(outcome, words.reasons(protocol.verdict, outcome)) for outcome in ("fail", "incomplete")]
+    return [(outcome, sentences) for outcome, sentences in found if sentences]
+
+
+def _first_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
+    """Yield the reasons that fit on the first page, at least one of each outcome; the others are referred to."""
+    space = _FIRST_LINES
+    reasons = _reasons(protocol, words)
+    for number, (outcome, sentences) in enumerate(reasons, 1):
+        # The first outcome leaves some lines for the second one.
+        ends = accumulate(1 + len(sentence) // _IN_A_LINE for sentence in sentences)
+        most = space if number == len(reasons) else space - _LEFT_LINES
+        count = max(1, sum(end <= most for end in ends))
+        space -= sum(1 + len(sentence) // _IN_A_LINE for sentence in sentences[:count])
+        yield Heading(words(f"verdict.why_{outcome}"))
+        yield Items(tuple(map(plain, sentences[:count])))
+        if count < len(sentences):
+            more = len(sentences) - count
+            on_paper = words("verdict.more_on_page", count=more, page="{page}")
+            yield Reference(words("verdict.more_below", count=more), on_paper, _ALL_REASONS)
+
+
+def _all_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
+    """Yield every reason, if the first page does not hold them."""
+    if not any(isinstance(item, Reference) for item in _first_reasons(protocol, words)):
+        return
+    yield Heading(words("section.reasons"), page_break=True, label=_ALL_REASONS)
+    for outcome, sentences in _reasons(protocol, words):
+        yield Heading(words(f"verdict.why_{outcome}"), level=2)
+        yield Items(tuple(map(plain, sentences)))
 
 
 def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
@@ -106,6 +152,7 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
     for profile in profiles.values():
         if not profile.checked:
             yield words("notice.unchecked", profile=profile.name, source=profile.source)
+    yield from _unstated(protocol, profiles.values(), words)
     for point in protocol.points:
         if point.verdict and point.profile and point.profile.average_of > 1:
             for step in point.verdict.steps:
@@ -119,6 +166,23 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
     if any(point.point.peak_pressures_n_per_cm2 for point in protocol.points):
         yield words("notice.pressure")
     yield words("notice.certificate")
+
+
+def _unstated(protocol: Protocol, profiles: Iterable[ForceProfile], words: Words) -> Iterator[str]:
+    """Yield what profiles do not state about the measurement, and what the protocol requires instead."""
+    without_rate = [profile.name for profile in profiles if not profile.sample_rate_at_least_hz]
+    if without_rate:
+        rates = [
+            item.sample_rate
+            for point in protocol.points
+            if point.profile and point.profile.name in without_rate
+            for item in point.repetitions
+        ]
+        key = "notice.no_rate" if rates else "notice.no_rate_measured"
+        yield words(key, profiles=", ".join(without_rate), rate=min(rates, default=math.nan))
+    without_record = [profile.name for profile in profiles if not profile.record_at_least_s]
+    if without_record:
+        yield words("notice.no_record", profiles=", ".join(without_record), length=LAST_STEP_S)
 
 
 def _machine(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -291,7 +355,7 @@ def _check_row(
     profile = point.profile
     assert profile is not None, "a repetition has a profile"
     rate = _needed(item.sample_rate, profile.sample_rate_at_least_hz, words)
-    record = _needed(item.curve.end, profile.record_at_least_s, words)
+    record = _needed(item.curve.end, required_record(profile), words)
     missing, saturated = (
         words("document.yes" if is_so else "document.no")
         for is_so in (item.curve.has_missing_samples, item.curve.saturated)
@@ -345,13 +409,19 @@ def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
             for step in profile.steps
         ]
         yield _grid(columns, rows, widths=(4, 2, 2), numeric=(1, 2))
-        if profile.measuring_source:
-            numbers = {
-                "rate": profile.sample_rate_at_least_hz,
-                "record": profile.record_at_least_s,
-                "stiffness": profile.obstacle_stiffness_n_per_mm,
-            }
-            yield Paragraph(words("text.measuring", source=profile.measuring_source, **numbers), "note")
+        yield Facts(tuple(_measuring(profile, words)))
+
+
+def _measuring(profile: ForceProfile, words: Words) -> Iterator[tuple[str, str]]:
+    """Yield what a profile requires of the measurement, and what is required instead where it states nothing."""
+    rate, stiffness = profile.sample_rate_at_least_hz, profile.obstacle_stiffness_n_per_mm
+    at_least = words("measuring.rate", rate=rate) if rate else words("measuring.no_rate")
+    yield words("column.sample_rate"), at_least
+    key = "record" if profile.record_at_least_s else "no_record"
+    yield words("column.record"), words(f"measuring.{key}", record=required_record(profile), length=LAST_STEP_S)
+    yield words("column.stiffness"), words.limit(stiffness) if stiffness else words("measuring.nothing")
+    if profile.measuring_source:
+        yield words("column.measuring_source"), plain(profile.measuring_source)
 
 
 def _provenance(protocol: Protocol, words: Words) -> Iterator[Block]:

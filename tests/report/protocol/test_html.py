@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cdtool.evaluation.force.limits import ForceProfile, ForceStep
+from cdtool.evaluation.force.limits import ForceProfile, ForceStep, read_force_limits
 from cdtool.evaluation.protocol.assessment import Repetition, assess_point, judge
 from cdtool.evaluation.protocol.plan import MachineParticulars
 from cdtool.evaluation.protocol.protocol import Protocol
@@ -84,6 +84,19 @@ def test_every_step_of_a_profile_has_its_column(count, tables, protocols):
     for number in range(count):
         grid = next(item for item in shown if f"step {number} [N]" in item.columns)
         assert grid.rows[-1][grid.columns.index(f"step {number} [N]")] == f"{400 - number}"
+
+
+def test_a_profile_without_sample_rate_and_record_is_said_to_have_none(protocols):
+    profile = replace(
+        read_force_limits()["iso_ts_15066_chest"],
+        steps=(ForceStep(0.0, 600.0, "transient"), ForceStep(0.5, 300.0, "b")),
+    )
+    made = with_profile(protocols["pass"], profile)
+    page = text_of(to_html(protocol_document(made)))
+    assert "No sample rate is stated by iso_ts_15066_chest; measured at 1000 Hz or more." in page
+    assert "No length of the record is stated by iso_ts_15066_chest: 0.5 s of the last step are required." in page
+    assert "the profile states none; at least 1, which includes 0.5 s of the last step" in page
+    assert "the profile states none" not in text_of(to_html(protocol_document(protocols["pass"])))
 
 
 def test_a_mean_just_above_its_limit_is_above_it_in_table_and_reason(protocols):
