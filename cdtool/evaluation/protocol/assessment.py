@@ -431,8 +431,9 @@ def _of_steps(
         if not profile.sample_rate_at_least_hz and step.outcome == "pass":
             between = _between_samples(item, step)
             if _decides(between, step, of_all, verdict.tests):
-                more = {"rate": item.sample_rate, "most": step.peak + between, "profile": profile.name}
-                yield _reason(ReasonKind.PEAK_BETWEEN_SAMPLES, point, **values, **more)
+                most, rate = step.peak + between, item.sample_rate
+                kind = ReasonKind.PEAK_BETWEEN_SAMPLES
+                yield _reason(kind, point, **values, rate=rate, most=most, profile=profile.name)
 
 
 def _decides(error: float, step: StepVerdict, of_all: PointStep, tests: int) -> bool:

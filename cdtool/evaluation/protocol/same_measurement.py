@@ -29,6 +29,8 @@ _ENOUGH = 20
 _SHIFT = 0.05
 # The shift is found in the first part of the contact: this time [s], at most so many samples.
 _FIRST, _MOST = 1.0, 1500
+# It is first sought in steps of this length [s], within the rise of a contact.
+_COARSE = 2e-3
 # An average over a longer period lowers a peak by less than this share.
 _PEAK = 0.05
 _NORMAL = 0.6745
@@ -117,14 +119,16 @@ def _by_number(finer: _Curve, coarser: _Curve) -> tuple[FloatArray, FloatArray] 
         one, other = shifted(shift)
         return float(np.var(one[:first] - other[:first])) if len(one) >= _ENOUGH else np.inf
 
-    return shifted(min(range(-most, most + 1), key=distance))
+    coarse = max(1, round(_COARSE / finer.period))
+    best = min(range(-most, most + 1, coarse), key=distance)
+    return shifted(min(range(best - coarse, best + coarse + 1), key=distance))
 
 
 def _resampled(finer: _Curve, coarser: _Curve) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Yield both forces at the times of one of them: the other one interpolated, or averaged over its period."""
-    yield _at_times(coarser, finer.time, finer.force, finer.period)
     yield _at_times(finer, coarser.time, coarser.force, finer.period)
     if coarser.period > (1.0 + _SAME) * finer.period:
+        yield _at_times(coarser, finer.time, finer.force, finer.period)
         # The mean from one time to another is the difference of the sums up to them.
         edges = np.concatenate((finer.time, [finer.time[-1] + finer.period])) - 0.5 * finer.period
         sums = np.concatenate(([0.0], np.cumsum(finer.force * np.diff(edges))))
@@ -162,10 +166,10 @@ def _at_times(curve: _Curve, time: FloatArray, force: FloatArray, step: float) -
 def _best_shift(distance: Callable[[float], float], step: float) -> float:
     """Return the shift of the least distance [s]: the best of a grid, then of finer ones about it."""
     best, reach = 0.0, _SHIFT
-    for grid in (step, step / 8.0, step / 64.0, step / 512.0):
+    for grid in (max(step, _COARSE), step, step / 8.0, step / 64.0, step / 512.0):
         count = round(reach / grid)
         best = min((best + grid * number for number in range(-count, count + 1)), key=distance)
-        reach = 1.5 * grid
+        reach = grid
     return best
 
 
