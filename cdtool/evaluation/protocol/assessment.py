@@ -428,7 +428,7 @@ def _of_steps(
             yield _reason(ReasonKind.REST_DECIDES, point, **values, error=item.rest_error)
         if _decides(moved, step, of_all, verdict.tests):
             yield _reason(ReasonKind.DRIFT_DECIDES, point, **values, drift=item.drift)
-        if not profile.sample_rate_at_least_hz and step.outcome == "pass":
+        if not profile.sample_rate_at_least_hz and step.outcome != "not_assessable":
             between = _between_samples(item, step)
             if _decides(between, step, of_all, verdict.tests):
                 most, rate = step.peak + between, item.sample_rate

@@ -36,7 +36,7 @@ _FIRST_LINES, _IN_A_LINE, _LEFT_LINES = 18, 95, 6
 _NAMED = 200
 _ALL_REASONS = "all-reasons"
 # A page is as wide as so many forces beside each other; the next steps are in another table.
-_STEPS_IN_TABLE = 6
+_STEPS_IN_TABLE = 5
 
 
 @dataclass(frozen=True)
