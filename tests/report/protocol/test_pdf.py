@@ -136,7 +136,7 @@ def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, p
     long = "Nebenschließkante {number}, 300 mm über dem Boden, bei geöffnetem Flügel, von der Straße aus gesehen"
     made = many(protocols[name], 25)
     points = tuple(
-        replace(point, point=replace(point.point, name=long.format(number=number)))
+        replace(point, point=replace(point.point, name=long.format(number=number)), repetitions=())
         for number, point in enumerate(made.points)
     )
     reasons = tuple(
