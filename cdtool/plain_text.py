@@ -61,6 +61,22 @@ def digits(value: float, least: int = 6) -> str:
     return f"{Decimal(f'{value:.{max(least, before_point)}g}'):f}"
 
 
+def digits_beside(value: float, limit: float, least: int = 4) -> int:
+    """Return how many significant digits, at least `least`, show on which side of a limit a value is.
+
+    >>> digits_beside(412.345, 400.0), digits_beside(400.04, 400.0), digits_beside(400.0, 400.0)
+    (4, 5, 4)
+    """
+
+    def side(number: float) -> int:
+        return (number > limit) - (number < limit)
+
+    rounded = {count: float(f"{value:.{count}g}") for count in range(least, 18)}
+    shown = (count for count in rounded if count <= least + 6 and side(rounded[count]) == side(value))
+    above = (count for count in rounded if (rounded[count] > limit) == (value > limit))
+    return next(shown, next(above, 17))
+
+
 def counted(count: float, thing: str, verb: str = "") -> str:
     """Return a number with its noun and, if given in the plural, its verb.
 

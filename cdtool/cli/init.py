@@ -115,7 +115,8 @@ def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
         typer.echo(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
         some = " ".join(pattern if "*" in pattern else _quoted(pattern) for pattern in patterns(logs, Path()))
         typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
-    typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
+    if study.has_detectors:
+        typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
     typer.echo("for a test protocol of the contact forces:")
     typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
 

@@ -73,23 +73,42 @@ def test_from_a_rig_s_logs_to_a_protocol_in_four_commands_each_named_by_the_one_
     assert "print and sign" in made.out and "PASS" in Path("protocol.html").read_text(encoding="utf-8")
 
 
-def test_recordings_of_a_rig_that_have_only_a_force_need_no_detector(tmp_path, monkeypatch):
+@pytest.fixture
+def force_rig(tmp_path, monkeypatch) -> list[Path]:
+    """Return recordings with only a force, as a German rig writes them, in the current folder."""
     write_rig(tmp_path, FORCES)
     monkeypatch.chdir(tmp_path)
     for path in Path("edge").iterdir():
         rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
-        text = "".join(f"{row[0]};{row[3]}\n" for row in rows[1:])
-        path.write_text(f"Time [s];Force [N]\n{text}", encoding="utf-8")
-    steps = {words[0]: words for words in commands(cdtool("init", *sorted(Path("edge").iterdir()), "-o", "study"))}
-    (check,) = commands(cdtool(*steps["protocol"]))
-    draft = tmp_path / "study" / "protocol.toml"
-    fill_in(draft)
+        text = "".join(f"{row[0]};{row[3]}\n" for row in rows[1:]).replace(".", ",")
+        path.write_text(f"Zeit [s];Kraft [N]\n{text}", encoding="utf-8")
+    return sorted(Path("edge").iterdir())
+
+
+def test_a_rig_that_has_only_a_force_needs_five_commands_each_named_by_the_one_before(force_rig, tmp_path):
+    first = cdtool("init", *force_rig, "-o", "study")
+    info, draft = commands(first)
+    assert (info[0], draft[:2]) == ("info", ["protocol", "init"])  # no benchmark: there is nothing to score
+    (check,) = commands(cdtool(*draft))
+    incomplete = cdtool(*check)
+    assert (incomplete.status, commands(incomplete)[0][:2]) == (4, ["protocol", "write"])
+    fill_in(tmp_path / "study" / "protocol.toml")
     (write,) = commands(cdtool(*check))
     assert write[:2] == ["protocol", "write"]
     made = cdtool(*write[:-1], "protocol.html")
     assert made.status == 0 and "protocol: pass" in made.out, made.out + made.err
     nothing = cdtool("protocol", "write", "study/protocol.toml")
     assert nothing.status == 2 and "-o protocol.pdf" in nothing.err
+
+
+def test_a_benchmark_without_detectors_takes_those_of_the_option_and_else_names_the_protocol(rig, tmp_path):
+    path = rig / "without.toml"
+    path.write_text((rig / "benchmark.toml").read_text(encoding="utf-8").replace('["gm"]', "[]"), encoding="utf-8")
+    refused = cdtool("benchmark", path)
+    assert refused.status == 2 and f"cdtool protocol init {path}" in refused.err.replace("\n", " ")
+    scored = cdtool("benchmark", path, "--detectors", "gm", "-o", tmp_path / "results.json")
+    assert scored.status == 0, scored.err
+    assert json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))["detectors"] == ["momentum"]
 
 
 @pytest.fixture(scope="module")

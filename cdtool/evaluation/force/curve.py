@@ -21,6 +21,10 @@ from cdtool.short_repr import short_repr
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
+# Readings that differ by less than this share of the largest are equal: files have six digits or more.
+_ROUNDING = 1e-6
+# Readings up to so many steps apart are multiples of the step, within this share of it.
+_NEAR, _ON_GRID = 10.0, 0.1
 # An axis takes part in a contact from this share of the magnitude's peak on.
 _TAKES_PART = 0.3
 # The direction of travel is that of the mean speed over this time before the onset [s]; below this share of the
@@ -61,6 +65,18 @@ class ForceTimeCurve:
     def peak(self) -> float:
         """Return the largest force [N]."""
         return float(self.force.max())
+
+    @cached_property
+    def resolution(self) -> float:
+        """Return the step in which the readings are written [N]; 0 if they are on no such grid, or too few show one."""
+        steps = np.diff(np.unique(self.force))
+        steps = steps[steps > _ROUNDING * float(np.max(np.abs(self.force)))]
+        if not len(steps):
+            return 0.0
+        smallest = float(steps.min())
+        near = steps[steps < _NEAR * smallest] / smallest
+        is_grid = len(near) > 1 and bool(np.all(np.abs(near - np.rint(near)) < _ON_GRID))
+        return smallest if is_grid else 0.0
 
     @property
     def longest_step(self) -> float:

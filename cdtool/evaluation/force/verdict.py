@@ -18,7 +18,7 @@ import numpy as np
 from cdtool.errors import UsageError
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, digits_beside
 
 Outcome = Literal["pass", "fail", "not_assessable"]
 
@@ -36,21 +36,31 @@ CauseKind = Literal[
     "saturated",
 ]
 _SENTENCES: Mapping[CauseKind, str] = {
-    "above_limit": "{peak:.4g} N where {limit:g} N are allowed, exceeded {after_ms:.1f} ms after the onset",
+    "above_limit": "{peak} N where {limit:g} N are allowed, exceeded {after_ms:.1f} ms after the onset",
     "above_limit_onset_unseen": (
-        "{peak:.4g} N where {limit:g} N are allowed, exceeded {after_ms:.1f} ms after it was first seen"
+        "{peak} N where {limit:g} N are allowed, exceeded {after_ms:.1f} ms after it was first seen"
     ),
     "no_sample": "no load-cell sample while the limit holds",
-    "ends_before": "the record ends {end:.3g} s after the onset, before {begin:g} s",
-    "ends_inside": "the record ends {end:.3g} s after the onset, the limit holds until {until:g} s",
+    "ends_before": "the record ends {end} s after the onset, before {begin:g} s",
+    "ends_inside": "the record ends {end} s after the onset, the limit holds until {until:g} s",
     "onset_missing": "load-cell samples are missing for {missing_ms:.0f} ms where the contact may have begun",
     "samples_missing": "load-cell samples are missing for {missing_ms:.0f} ms",
     "may_exceed": (
-        "load-cell samples are missing for {missing_ms:.0f} ms, in which the force may have reached {most:.4g} N"
+        "load-cell samples are missing for {missing_ms:.0f} ms, in which the force may have reached {most} N"
     ),
-    "onset_earlier": "the onset may be up to {earlier_ms:.0f} ms earlier, and {largest:.4g} N are then too high",
-    "saturated": "the load cell was at its stop, {peak:.4g} N, below the limit of {limit:g} N",
+    "onset_earlier": "the onset may be up to {earlier_ms:.0f} ms earlier, and {largest} N are then too high",
+    "saturated": "the load cell was at its stop, {peak} N, below the limit of {limit:g} N",
 }
+
+
+# Which number of a sentence is compared with which, and its least significant digits.
+_BESIDE = (
+    ("peak", "limit", 4),
+    ("most", "limit", 4),
+    ("largest", "limit", 4),
+    ("end", "begin", 3),
+    ("end", "until", 3),
+)
 
 
 @dataclass(frozen=True)
@@ -61,8 +71,13 @@ class StepCause:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
     def sentence(self) -> str:
-        """Return the cause in words."""
-        return _SENTENCES[self.kind].format(**self.numbers)
+        """Return the cause in words; no number is rounded across its limit."""
+        numbers: dict[str, object] = dict(self.numbers)
+        for value, limit, least in _BESIDE:
+            if value in self.numbers and limit in self.numbers:
+                number = self.numbers[value]
+                numbers[value] = f"{number:.{digits_beside(number, self.numbers[limit], least)}g}"
+        return _SENTENCES[self.kind].format(**numbers)
 
 
 @dataclass(frozen=True)
@@ -265,11 +280,12 @@ def _may_exceed(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepCaus
     """Return how the limit may have been exceeded between two samples, or if the contact began earlier; or None."""
     most, hole = curve.could_reach(step.from_s, ends)
     if most > step.at_most_n:
-        return StepCause("may_exceed", {"missing_ms": 1e3 * hole, "most": most})
+        return StepCause("may_exceed", {"missing_ms": 1e3 * hole, "most": most, "limit": step.at_most_n})
     earlier = (curve.time >= step.from_s - curve.uncertainty) & (curve.time < step.from_s)
     largest = float(np.max(curve.force[earlier], initial=0.0))
     if step.from_s > 0.0 and largest > step.at_most_n:
-        return StepCause("onset_earlier", {"earlier_ms": 1e3 * curve.uncertainty, "largest": largest})
+        numbers = {"earlier_ms": 1e3 * curve.uncertainty, "largest": largest, "limit": step.at_most_n}
+        return StepCause("onset_earlier", numbers)
     return None
 
 
@@ -300,7 +316,8 @@ def _judge_point(step: ForceStep, tests: Sequence[StepVerdict], average_of: int)
         return PointStep(step, "not_assessable", force, above, reason)
     if force > step.at_most_n:
         word = "mean" if average_of > 1 else "highest"
-        reason = f"{word} of {len(tests)} peaks {force:.4g} N where {step.at_most_n:g} N are allowed"
+        shown = f"{force:.{digits_beside(force, step.at_most_n)}g}"
+        reason = f"{word} of {len(tests)} peaks {shown} N where {step.at_most_n:g} N are allowed"
         return PointStep(step, "fail", force, above, reason)
     unassessable = next((test for test in tests if test.outcome == "not_assessable"), None)
     if unassessable:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, islice
 from typing import Literal
 
 import numpy as np
@@ -17,11 +17,19 @@ import numpy as np
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.quantities import dynamic_time, time_above
-from cdtool.evaluation.force.verdict import ForceVerdict, PointVerdict, assess_force, averaged
+from cdtool.evaluation.force.verdict import (
+    ForceVerdict,
+    PointStep,
+    PointVerdict,
+    StepVerdict,
+    assess_force,
+    averaged,
+)
 from cdtool.evaluation.protocol.plan import Instrument, MeasuringPoint, TestPlan, empty_entries
 from cdtool.evaluation.protocol.pressure import PressureAssessment, PressureRecord
 from cdtool.evaluation.protocol.pressure_reasons import pressure_reasons
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Value, Verdict
+from cdtool.evaluation.protocol.same_measurement import hold_same_measurement
 from cdtool.evaluation.protocol.speed_reasons import speed_reasons
 from cdtool.evaluation.truth.missing_samples import CellClock
 
@@ -34,6 +42,15 @@ _SAME_STIFFNESS = 0.02
 # before as soon as the cell can, and a curve with fewer changes shows nothing.
 _SOONEST = 0.1
 _ENOUGH_CHANGES = 20
+# So much of its last step is required [s] if a profile states no length of the record.
+LAST_STEP_S = 0.5
+# Equal readings from this share of the range on may be those of an amplifier at its stop.
+_NEAR_RANGE = 0.95
+# Below this share of a limit, the resolution of the cell is none that matters.
+_FINE = 0.005
+# Readings from this share of a peak on, before and after it, show its shape; a single one may be that of a spike.
+_SHAPE = 0.5
+_ALONE = 10.0
 
 
 @dataclass(frozen=True)
@@ -124,6 +141,29 @@ class PointAssessment:
         return Verdict(self.reasons).outcome
 
 
+def required_record(profile: ForceProfile) -> float:
+    """Return how long a record must continue after the contact [s]: as the profile states, or into its last step.
+
+    Parameters
+    ----------
+    profile : ForceProfile
+        The profile; most state no length of the record.
+
+    Returns
+    -------
+    float
+        The stated length, or else 0.5 s more than the beginning of the last step.
+
+    Examples
+    --------
+    >>> from cdtool.evaluation.force.limits import read_force_limits
+    >>> profiles = read_force_limits()
+    >>> required_record(profiles["en_12453_reducing_gap"]), required_record(profiles["iso_ts_15066_chest"])
+    (5.0, 1.0)
+    """
+    return profile.record_at_least_s or profile.steps[-1].from_s + LAST_STEP_S
+
+
 def assess_point(
     point: MeasuringPoint,
     profile: ForceProfile | None,
@@ -131,6 +171,7 @@ def assess_point(
     unmeasured: Sequence[Unmeasured] = (),
     instrument: Instrument | None = None,
     pressure_instrument: Instrument | None = None,
+    contacts: int = 0,
 ) -> PointAssessment:
     """Assess the repetitions at a measuring point.
 
@@ -148,6 +189,8 @@ def assess_point(
         The instrument that measured the force.
     pressure_instrument : Instrument or None
         The instrument that measured the pressure.
+    contacts : int
+        Without a profile, the number of contacts in the recordings of the point.
 
     Returns
     -------
@@ -167,17 +210,20 @@ def assess_point(
     """
     verdict = averaged([item.verdict for item in repetitions], profile) if profile else None
     needed = max(point.repetitions, profile.average_of if profile else 1)
+    present = len(repetitions) if profile else contacts
     reasons = [
         *(_of_plan(point, profile) if profile else [_reason(ReasonKind.NO_PROFILE, point)]),
-        *_of_count(point, needed, len(repetitions), has_others=bool(unmeasured)),
-        *_beyond_plan(point, profile, len(repetitions)),
+        *_of_count(point, needed, present, has_others=bool(unmeasured)),
+        *_beyond_plan(point, profile, present),
         *(_reason(ReasonKind(item.kind), point, recording=item.recording, message=item.message) for item in unmeasured),
         *_repeated(point, repetitions),
     ]
     if profile and verdict and repetitions:
         reasons += _exceeded(point, verdict, profile)
         for number, item in enumerate(repetitions, 1):
-            reasons += _of_repetition(point, number, item, profile, instrument)
+            reasons += _of_repetition(point, number, item, profile, verdict)
+            reasons += _of_instrument(point, number, item, instrument) if instrument else []
+        reasons += _of_resolution(point, repetitions, verdict, profile)
         reasons += _lost(point, repetitions)
         reasons += speed_reasons(point, [(item.recording, item.speed) for item in repetitions])
     pressures = _pressures(point, profile, repetitions) if profile else ()
@@ -309,50 +355,77 @@ def _beyond_plan(point: MeasuringPoint, profile: ForceProfile | None, present: i
 
 
 def _repeated(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
-    """Yield each contact that is counted twice under two names: it is one measurement."""
-    first: dict[tuple[str, int], str] = {}
-    for item in repetitions:
-        known = first.setdefault((item.sha256, item.contact), item.recording)
-        if known != item.recording:
-            yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=known)
+    """Yield each contact that is counted twice: it is one measurement."""
+    for number, item in enumerate(repetitions):
+        yield from islice(_copies(point, item, repetitions[:number]), 1)
 
 
 def _at_two_points(points: Sequence[PointAssessment]) -> Iterator[Reason]:
-    """Yield each contact that is counted at a second point, under another name: it was measured at one."""
-    first: dict[tuple[str, int], tuple[int, str]] = {}
+    """Yield each contact that is counted at a second point, too: it was measured at one."""
     for number, item in enumerate(points):
+        earlier = [one for other in points[:number] for one in other.repetitions]
         for one in item.repetitions:
-            owner, known = first.setdefault((one.sha256, one.contact), (number, one.recording))
-            if owner != number:
-                yield _reason(ReasonKind.SAME_RECORDING, item.point, recording=one.recording, other=known)
+            yield from islice(_copies(item.point, one, earlier), 1)
+
+
+def _copies(point: MeasuringPoint, item: Repetition, earlier: Sequence[Repetition]) -> Iterator[Reason]:
+    """Yield which earlier repetitions hold the same measurement: identical files first, then equal curves."""
+    for other in earlier:
+        if (other.sha256, other.contact) == (item.sha256, item.contact) and other.recording != item.recording:
+            yield _reason(ReasonKind.SAME_RECORDING, point, recording=item.recording, other=other.recording)
+    for other in earlier:
+        if hold_same_measurement(other.curve, item.curve):
+            contacts = {"contact": item.contact, "other_contact": other.contact}
+            yield _reason(
+                ReasonKind.SAME_MEASUREMENT, point, recording=item.recording, other=other.recording, **contacts
+            )
 
 
 def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:
     for step in verdict.steps:
         if step.outcome == "fail":
-            yield _reason(
-                ReasonKind.POINT_EXCEEDS,
-                point,
-                step=step.step.name,
-                force=step.force,
-                limit=step.step.at_most_n,
-                count=verdict.tests,
-                averaged="mean" if profile.average_of > 1 else "highest",
-            )
+            yield _reason(ReasonKind.POINT_EXCEEDS, point, **_compared(step, verdict, profile))
+
+
+def _of_resolution(
+    point: MeasuringPoint, repetitions: Sequence[Repetition], verdict: PointVerdict, profile: ForceProfile
+) -> Iterator[Reason]:
+    """Yield the steps that pass only if no reading of a coarse cell was rounded down."""
+    cell = max(item.curve.resolution for item in repetitions)
+    for step in verdict.steps:
+        limit = step.step.at_most_n
+        if step.outcome == "pass" and cell > _FINE * limit and step.force + 0.5 * cell > limit:
+            yield _reason(ReasonKind.RESOLUTION_DECIDES, point, **_compared(step, verdict, profile), cell=cell)
+
+
+def _compared(step: PointStep, verdict: PointVerdict, profile: ForceProfile) -> dict[str, str | float]:
+    """Return which force of a point is compared with which limit."""
+    return {
+        "step": step.step.name,
+        "force": step.force,
+        "limit": step.step.at_most_n,
+        "count": verdict.tests,
+        "averaged": "mean" if profile.average_of > 1 else "highest",
+    }
+
+
+def _about(number: int, item: Repetition) -> dict[str, str | float]:
+    return {"repetition": number, "recording": item.recording}
 
 
 def _of_repetition(
-    point: MeasuringPoint, number: int, item: Repetition, profile: ForceProfile, instrument: Instrument | None
+    point: MeasuringPoint, number: int, item: Repetition, profile: ForceProfile, verdict: PointVerdict
 ) -> Iterator[Reason]:
     """Yield what is wrong with the data of a repetition."""
-    about: dict[str, str | float] = {"repetition": number, "recording": item.recording}
+    about = _about(number, item)
     rate, least = item.sample_rate, profile.sample_rate_at_least_hz
     if rate < (1.0 - _SAME_RATE) * least:
         yield _reason(ReasonKind.RATE_TOO_LOW, point, **about, rate=rate, needed=least, profile=profile.name)
-    is_short = item.curve.end < profile.record_at_least_s
+    end, needed = item.curve.end, required_record(profile)
+    is_short = end < needed
     if is_short:
-        end, needed = item.curve.end, profile.record_at_least_s
-        yield _reason(ReasonKind.RECORD_TOO_SHORT, point, **about, end=end, needed=needed, profile=profile.name)
+        kind = ReasonKind.RECORD_TOO_SHORT if profile.record_at_least_s else ReasonKind.LAST_STEP_TOO_SHORT
+        yield _reason(kind, point, **about, end=end, needed=needed, profile=profile.name)
     for step in item.verdict.steps:
         if step.outcome == "not_assessable" and step.cause:
             if is_short and step.cause.kind in ("ends_before", "ends_inside"):
@@ -361,9 +434,7 @@ def _of_repetition(
             yield Reason(reason.kind, reason.values, step.cause, reason.due)
     if item.curve.saturated and not any(_is_saturated(step.cause) for step in item.verdict.steps):
         yield _reason(ReasonKind.SATURATED, point, **about, peak=item.curve.peak)
-    yield from _of_drift(point, item, profile, about)
-    if instrument is not None:
-        yield from _of_instrument(point, item, instrument, about)
+    yield from _of_steps(point, item, profile, verdict, about)
 
 
 def _lost(point: MeasuringPoint, repetitions: Sequence[Repetition]) -> Iterator[Reason]:
@@ -377,31 +448,74 @@ def _is_saturated(cause: object) -> bool:
     return getattr(cause, "kind", "") == "saturated"
 
 
-def _of_drift(
-    point: MeasuringPoint, item: Repetition, profile: ForceProfile, about: Mapping[str, str | float]
+def _of_steps(
+    point: MeasuringPoint,
+    item: Repetition,
+    profile: ForceProfile,
+    verdict: PointVerdict,
+    about: Mapping[str, str | float],
 ) -> Iterator[Reason]:
-    """Yield the steps that pass only if the level at rest is exact: no drift as before the contact, no early rise."""
+    """Yield the steps that pass only if nothing was between samples, and the level at rest is exact and stays."""
     for number, step in enumerate(item.verdict.steps):
-        until = min(profile.ends(number), item.curve.end)
-        moved = abs(item.drift) * until
-        if step.outcome == "pass" and step.peak + item.rest_error > step.step.at_most_n:
-            most = {"peak": step.peak, "limit": step.step.at_most_n, "error": item.rest_error}
-            yield _reason(ReasonKind.REST_DECIDES, point, **about, step=step.step.name, **most)
-        if step.outcome == "pass" and step.peak + moved > step.step.at_most_n:
-            name, limit = step.step.name, step.step.at_most_n
-            drift = item.drift
-            yield _reason(ReasonKind.DRIFT_DECIDES, point, **about, step=name, drift=drift, peak=step.peak, limit=limit)
+        moved = abs(item.drift) * min(profile.ends(number), item.curve.end)
+        values = {**about, "step": step.step.name, "peak": step.peak, "limit": step.step.at_most_n}
+        of_all = verdict.steps[number]
+        if _decides(item.rest_error, step, of_all, verdict.tests):
+            yield _reason(ReasonKind.REST_DECIDES, point, **values, error=item.rest_error)
+        if _decides(moved, step, of_all, verdict.tests):
+            yield _reason(ReasonKind.DRIFT_DECIDES, point, **values, drift=item.drift)
+        if not profile.sample_rate_at_least_hz and step.outcome != "not_assessable":
+            between = _between_samples(item, step)
+            if _decides(between, step, of_all, verdict.tests):
+                most, rate = step.peak + between, item.sample_rate
+                kind = ReasonKind.PEAK_BETWEEN_SAMPLES
+                yield _reason(kind, point, **values, rate=rate, most=most, profile=profile.name)
 
 
-def _of_instrument(
-    point: MeasuringPoint, item: Repetition, instrument: Instrument, about: Mapping[str, str | float]
-) -> Iterator[Reason]:
-    if instrument.range_n and item.largest_reading > instrument.range_n:
-        reading, most = item.largest_reading, instrument.range_n
-        yield _reason(ReasonKind.BEYOND_RANGE, point, **about, reading=reading, range=most)
+def _decides(error: float, step: StepVerdict, of_all: PointStep, tests: int) -> bool:
+    """Return whether a limit is met only without an error of the force [N]: by a repetition, or by the mean."""
+    if step.outcome == "pass":
+        return step.peak + error > step.step.at_most_n
+    return step.outcome == "fail" and of_all.outcome == "pass" and of_all.force + error / tests > step.step.at_most_n
+
+
+def _between_samples(item: Repetition, step: StepVerdict) -> float:
+    """Return by how much a force between samples may exceed the peak of a step [N].
+
+    Three readings a, m, b of half a sine are t apart with cos t = (a + b) / 2 m, and its peak is the square root of
+    m^2 + ((b - a) / 2 sin t)^2. Beside a single reading that is twice as large as one beside it, ten times as much may
+    be missed.
+    """
+    curve = item.curve
+    highest, apart = int(np.searchsorted(curve.time, step.peak_at)), _repeats(curve)
+    before = float(curve.force[highest - apart]) if highest >= apart else 0.0
+    after = float(curve.force[min(highest + apart, len(curve.force) - 1)])
+    before, after = min(before, step.peak), min(after, step.peak)
+    if not min(before, after) >= _SHAPE * step.peak > 0.0:
+        return _ALONE * abs(step.peak)
+    sine = math.sin(math.acos((before + after) / (2.0 * step.peak)))
+    return math.hypot(step.peak, 0.5 * (after - before) / sine) - step.peak if after != before else 0.0
+
+
+def _of_instrument(point: MeasuringPoint, number: int, item: Repetition, instrument: Instrument) -> Iterator[Reason]:
+    about, reading = _about(number, item), item.largest_reading
+    if instrument.range_n and reading >= instrument.range_n:
+        yield _reason(ReasonKind.BEYOND_RANGE, point, **about, reading=reading, range=instrument.range_n)
+    elif instrument.range_n and reading >= _NEAR_RANGE * instrument.range_n:
+        equal = _equal_readings_at_peak(item.curve)
+        if equal > 1 and not item.curve.saturated:
+            values = {"reading": reading, "range": instrument.range_n, "equal": equal}
+            yield _reason(ReasonKind.NEAR_RANGE, point, **about, **values)
     stated, rate = instrument.sample_rate_hz, item.sample_rate
     if stated and math.isfinite(rate) and abs(rate - stated) > _OTHER_RATE * stated:
         yield _reason(ReasonKind.RATE_DIFFERS, point, **about, rate=rate, stated=stated)
+
+
+def _equal_readings_at_peak(curve: ForceTimeCurve) -> int:
+    """Return how many readings in a row are the largest one; a log that repeats each reading counts it once."""
+    at_peak = np.concatenate(([False], curve.force == curve.peak, [False]))
+    edges = np.flatnonzero(np.diff(at_peak))
+    return int((edges[1::2] - edges[::2]).max()) // _repeats(curve)
 
 
 def _of_instruments(plan: TestPlan, profiles: Sequence[ForceProfile]) -> Iterator[Reason]:

@@ -10,7 +10,9 @@ from cdtool.evaluation.protocol.assessment import PointAssessment
 from cdtool.evaluation.protocol.plan import TestPlan
 from cdtool.evaluation.protocol.reasons import Verdict
 
-Role = Literal["protocol", "benchmark", "machine", "limits", "measured", "excluded", "scored", "learned"]
+Role = Literal[
+    "protocol", "benchmark", "machine", "robot", "limits", "labels", "measured", "excluded", "scored", "learned"
+]
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,12 @@ Level = Literal[1, 2]
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading; `page_break`: it begins a new page."""
+    """A heading; `page_break`: it begins a new page; `label`: the name by which a `Reference` refers to it."""
 
     text: str
     level: Level = 1
     page_break: bool = False
+    label: str = ""
     kind: Literal["heading"] = "heading"
 
 
@@ -43,6 +44,19 @@ class Items:
 
     items: tuple[str, ...]
     kind: Literal["items"] = "items"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A sentence that refers to the heading with the same `label`: as a link, or on paper with the number of its page.
+
+    `on_paper` has the placeholder {page}.
+    """
+
+    text: str
+    on_paper: str
+    label: str
+    kind: Literal["reference"] = "reference"
 
 
 @dataclass(frozen=True)
@@ -89,7 +103,7 @@ class Signatures:
     kind: Literal["signatures"] = "signatures"
 
 
-Block = Heading | Paragraph | VerdictBox | Items | Facts | Grid | Curves | Signatures
+Block = Heading | Paragraph | VerdictBox | Items | Reference | Facts | Grid | Curves | Signatures
 
 
 @dataclass(frozen=True)

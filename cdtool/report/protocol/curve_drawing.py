@@ -87,6 +87,6 @@ def _draw(axes: Axes, item: Repetition, profile: ForceProfile, end: float, words
     if item.curve.end < _WHOLE * end:
         axes.axvspan(item.curve.end, end, color=NOT_RECORDED, linewidth=0)
     axes.set_xlim(0.0, end)
-    axes.set_ylim(min(0.0, 1.1 * float(force.min())), 1.15 * max(float(force.max()), profile.steps[0].at_most_n))
+    axes.set_ylim(min(0.0, 1.1 * float(force.min())), 1.15 * max(float(force.max()), *forces))
     axes.yaxis.set_major_formatter(lambda value, _: words.number(value))
     axes.xaxis.set_major_formatter(lambda value, _: words.number(value))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import accumulate
 
-from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition
+from cdtool.evaluation.force.limits import ForceProfile
+from cdtool.evaluation.force.verdict import PointVerdict
+from cdtool.evaluation.protocol.assessment import LAST_STEP_S, PointAssessment, Repetition, required_record
 from cdtool.evaluation.protocol.plan import Instrument
 from cdtool.evaluation.protocol.protocol import Protocol
 from cdtool.plain_text import plain
@@ -20,6 +23,7 @@ from cdtool.report.protocol.blocks import (
     Heading,
     Items,
     Paragraph,
+    Reference,
     Signatures,
     VerdictBox,
 )
@@ -30,12 +34,18 @@ from cdtool.report.protocol.pressure_parts import (
     pressure_curves,
     pressure_deviations,
     pressure_limit_rows,
-    pressure_notices,
+    pressures_without_limit,
     worst_outcome,
 )
 from cdtool.report.protocol.words import Words, words_of
 
-_CHECKED_STEPS = 3
+# The reasons on the first page: so many lines, with so many characters on each, and those left for a second outcome.
+_FIRST_LINES, _IN_A_LINE, _LEFT_LINES = 18, 95, 6
+# Names of measuring points on the first page: so many characters.
+_NAMED = 200
+_ALL_REASONS = "all-reasons"
+# A page is as wide as so many forces beside each other; the next steps are in another table.
+_STEPS_IN_TABLE = 5
 
 
 @dataclass(frozen=True)
@@ -95,16 +105,55 @@ def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
         ("place", plan.test.place),
         ("tester", plan.test.tester),
         ("organisation", plan.test.organisation),
-        ("points", ", ".join(point.point.name for point in points)),
+        ("points", _first_names([point.point.name for point in points], words)),
     )
     yield Facts(tuple((words(f"field.{name}"), plain(words.value(value or None))) for name, value in shown))
-    for outcome in ("fail", "incomplete"):
-        sentences = words.reasons(verdict, outcome)
-        if sentences:
-            yield Heading(words(f"verdict.why_{outcome}"))
-            yield Items(tuple(map(plain, sentences)))
+    yield from _first_reasons(protocol, words)
     yield Heading(words("verdict.notices"))
     yield Items(tuple(map(plain, _notices(protocol, words))))
+    yield from _all_reasons(protocol, words)
+
+
+def _first_names(names: Sequence[str], words: Words) -> str:
+    """Return names in a list, or the first ones that fit into a few lines and how many more there are."""
+    lengths = accumulate(len(name) + 2 for name in names)
+    count = max(1, sum(length <= _NAMED for length in lengths))
+    listed = ", ".join(names[:count])
+    return listed if count >= len(names) else words("verdict.more_names", names=listed, count=len(names) - count)
+
+
+def _reasons(protocol: Protocol, words: Words) -> list[tuple[str, list[str]]]:
+    """Return the sentences of each outcome that has any, those of a fail first."""
+    found = [(outcome, words.reasons(protocol.verdict, outcome)) for outcome in ("fail", "incomplete")]
+    return [(outcome, sentences) for outcome, sentences in found if sentences]
+
+
+def _first_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
+    """Yield the reasons that fit on the first page, at least one of each outcome; the others are referred to."""
+    space = _FIRST_LINES
+    reasons = _reasons(protocol, words)
+    for number, (outcome, sentences) in enumerate(reasons, 1):
+        # The first outcome leaves some lines for the second one.
+        ends = accumulate(1 + len(sentence) // _IN_A_LINE for sentence in sentences)
+        most = space if number == len(reasons) else space - _LEFT_LINES
+        count = max(1, sum(end <= most for end in ends))
+        space -= sum(1 + len(sentence) // _IN_A_LINE for sentence in sentences[:count])
+        yield Heading(words(f"verdict.why_{outcome}"))
+        yield Items(tuple(map(plain, sentences[:count])))
+        if count < len(sentences):
+            more = len(sentences) - count
+            on_paper = words("verdict.more_on_page", count=more, page="{page}")
+            yield Reference(words("verdict.more_below", count=more), on_paper, _ALL_REASONS)
+
+
+def _all_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
+    """Yield every reason, if the first page does not hold them."""
+    if not any(isinstance(item, Reference) for item in _first_reasons(protocol, words)):
+        return
+    yield Heading(words("section.reasons"), page_break=True, label=_ALL_REASONS)
+    for outcome, sentences in _reasons(protocol, words):
+        yield Heading(words(f"verdict.why_{outcome}"), level=2)
+        yield Items(tuple(map(plain, sentences)))
 
 
 def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
@@ -113,6 +162,7 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
         if not profile.checked:
             sources = "; ".join(filter(None, (profile.source, profile.pressure_source)))
             yield words("notice.unchecked", profile=profile.name, source=sources)
+    yield from _unstated(protocol, profiles.values(), words)
     for point in protocol.points:
         if point.verdict and point.profile and point.profile.average_of > 1:
             for step in point.verdict.steps:
@@ -123,10 +173,30 @@ def _notices(protocol: Protocol, words: Words) -> Iterator[str]:
                         "step": words.name("step", step.step.name),
                     }
                     yield words("notice.single_above", point=point.point.name, **values)
-    yield from pressure_notices(protocol.points, words)
-    if slow := [point.point.name for point in protocol.points if any(one.speed is None for one in point.repetitions)]:
-        yield words("notice.no_speed", points=", ".join(slow))
+    for profile_name, names in pressures_without_limit(protocol.points).items():
+        yield words("notice.pressure", points=_first_names(names, words), profile=profile_name)
+    if unconfirmed := [
+        item.point.name for item in protocol.points if any(one.speed is None for one in item.repetitions)
+    ]:
+        yield words("notice.no_speed", points=_first_names(unconfirmed, words))
     yield words("notice.certificate")
+
+
+def _unstated(protocol: Protocol, profiles: Iterable[ForceProfile], words: Words) -> Iterator[str]:
+    """Yield what profiles do not state about the measurement, and what the protocol requires instead."""
+    without_rate = [profile.name for profile in profiles if not profile.sample_rate_at_least_hz]
+    if without_rate:
+        rates = [
+            item.sample_rate
+            for point in protocol.points
+            if point.profile and point.profile.name in without_rate
+            for item in point.repetitions
+        ]
+        key = "notice.no_rate" if rates else "notice.no_rate_measured"
+        yield words(key, profiles=", ".join(without_rate), rate=min(rates, default=math.nan))
+    without_record = [profile.name for profile in profiles if not profile.record_at_least_s]
+    if without_record:
+        yield words("notice.no_record", profiles=", ".join(without_record), length=LAST_STEP_S)
 
 
 def _machine(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -187,54 +257,54 @@ def _results(protocol: Protocol, words: Words) -> Iterator[Block]:
 
 
 def _matrix(point: PointAssessment, words: Words) -> Iterator[Block]:
-    """Yield the repetitions of a point with the mean and the limits of its profile."""
-    profile, verdict = point.profile, point.verdict
-    if profile is None or verdict is None or not point.repetitions:
+    """Yield the repetitions of a point with the mean and the limits of its profile, all steps of it."""
+    if point.profile is None:
+        yield Paragraph(words("text.not_assessed"))
+    elif point.verdict is None or not point.repetitions:
         yield Paragraph(words("text.nothing_measured"))
-        return
-    pressures = pressure_columns(point)
-    names = (
-        "repetition",
-        "recording",
-        "measured_speed",
-        "dynamic_force",
-        "dynamic_time",
-        "static_force",
-        "residual_force",
-    )
-    columns = [words(f"column.{name}") for name in (*names, *pressures.headings, "result")]
-    rows = []
-    for number, item in enumerate(point.repetitions, 1):
-        peaks = _padded([step.peak for step in item.verdict.steps])
-        pressure = point.pressures[number - 1] if point.pressures else None
-        time = _time(item.dynamic_time, words)
-        cells = _row(words, number, item.recording, item.speed, peaks[0], time, *peaks[1:], *pressures.rows[number - 1])
-        rows.append((*cells, words(f"outcome.{worst_outcome(item.verdict.outcome, pressure)}")))
-    first, *others = _padded([step.force for step in verdict.steps])
+    else:
+        steps = range(len(point.profile.steps))
+        for begin in steps[::_STEPS_IN_TABLE]:
+            yield _forces(point, point.profile, point.verdict, steps[begin : begin + _STEPS_IN_TABLE], words)
+
+
+def _forces(point: PointAssessment, profile: ForceProfile, verdict: PointVerdict, steps: range, words: Words) -> Grid:
+    """Return the table of some steps: a row for each repetition, then their mean and the limits."""
+    items = point.repetitions
     kind = "mean" if profile.average_of > 1 else "highest"
-    times = [item.dynamic_time for item in point.repetitions]
-    time = _time(sum(times) / len(times) if kind == "mean" else max(times), words)
-    values = _row(words, words(f"row.{kind}"), "", "", first, time, *others, *pressures.highest)
-    rows.append((*values, words(f"outcome.{point.outcome}")))
-    at_most = _padded([step.at_most_n for step in profile.steps])
-    limit_time = words.number(1e3 * profile.steps[1].from_s) if len(profile.steps) > 1 else ""
-    planned = words("column.planned", speed=point.point.speed_m_per_s)
-    limits = (planned, at_most[0], limit_time, *at_most[1:], *pressures.limits)
-    rows.append((*_row(words, words("row.limit"), profile.name, *limits), ""))
-    count = len(point.repetitions)
+    numbers = [str(number) for number in range(1, len(items) + 1)]
+    columns = [
+        (words("column.repetition"), [*numbers, words(f"row.{kind}"), words("row.limit")]),
+        (words("column.recording"), [*(item.recording for item in items), "", profile.name]),
+    ]
+    if not steps.start:
+        planned = words("column.planned", speed=point.point.speed_m_per_s)
+        columns.append((words("column.measured_speed"), [*(words.value(item.speed) for item in items), "", planned]))
+    for number in steps:
+        step, limit = profile.steps[number], profile.steps[number].at_most_n
+        forces = [*(item.verdict.steps[number].peak for item in items), verdict.steps[number].force]
+        columns.append(
+            (words.force_of(step.name), [*(words.beside(force, limit) for force in forces), words.limit(limit)])
+        )
+        if number == 0 and len(profile.steps) > 1:
+            times = [item.dynamic_time for item in items]
+            of_all = sum(times) / len(times) if kind == "mean" else max(times)
+            cells = [_time(time, words) for time in (*times, of_all)]
+            columns.append((words("column.dynamic_time"), [*cells, words.limit(1e3 * profile.steps[1].from_s)]))
+    if not steps.start:
+        columns += [(words(f"column.{name}"), cells) for name, cells in pressure_columns(point, words)]
+    outcomes = [*map(worst_outcome, items, point.pressures), f"outcome.{point.outcome}"]
+    columns.append((words("column.result"), [*map(words, outcomes), ""]))
+    rows = [tuple(map(plain, row)) for row in zip(*(cells for _, cells in columns), strict=True)]
     numeric = tuple(range(2, len(columns) - 1))
     widths = (6, 12, *(6 for _ in numeric), 9)
-    yield _grid(columns, rows, widths=widths, numeric=numeric, strong=(count, count + 1))
+    strong = (len(items), len(items) + 1)
+    return _grid([plain(name) for name, _ in columns], rows, widths=widths, numeric=numeric, strong=strong)
 
 
 def _time(seconds: float, words: Words) -> str:
     """Return a time above a limit in ms, or that it has not ended."""
     return words("document.never_ends") if math.isinf(seconds) else words.number(1e3 * seconds)
-
-
-def _padded(values: Sequence[float]) -> list[float | None]:
-    """Return the values of the first three steps of a profile; None for one that it does not have."""
-    return [values[number] if number < len(values) else None for number in range(_CHECKED_STEPS)]
 
 
 def _curves(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -316,14 +386,15 @@ def _check_row(
     profile = point.profile
     assert profile is not None, "a repetition has a profile"
     rate = _needed(item.sample_rate, profile.sample_rate_at_least_hz, words)
-    record = _needed(item.curve.end, profile.record_at_least_s, words)
+    record = _needed(item.curve.end, required_record(profile), words)
     missing, saturated = (
         words("document.yes" if is_so else "document.no")
         for is_so in (item.curve.has_missing_samples, item.curve.saturated)
     )
     reading = words.number(item.largest_reading)
     if instrument and instrument.range_n:
-        reading = f"{reading} / {words.number(instrument.range_n)}"
+        most = instrument.range_n
+        reading = f"{words.beside(item.largest_reading, most)} / {words.limit(most)}"
     return _row(words, point.point.name, number, rate, record, missing, saturated, reading, item.rest, item.drift)
 
 
@@ -331,7 +402,7 @@ def _needed(measured: float, needed: float, words: Words) -> str:
     """Return a measured value, with the required one if there is one."""
     if not needed:
         return words.number(measured)
-    return words("column.measured_needed", measured=measured, needed=needed)
+    return words("column.measured_needed", measured=words.beside(measured, needed), needed=words.limit(needed))
 
 
 def _deviations(protocol: Protocol, words: Words) -> Iterator[Block]:
@@ -365,20 +436,29 @@ def _limits(protocol: Protocol, words: Words) -> Iterator[Block]:
             )
         )
         columns = [words(f"column.{name}") for name in ("step", "from", "at_most")]
-        rows = [_row(words, words.name("step", step.name), step.from_s, step.at_most_n) for step in profile.steps]
+        rows = [
+            _row(words, words.name("step", step.name), words.limit(step.from_s), words.limit(step.at_most_n))
+            for step in profile.steps
+        ]
         yield _grid(columns, rows, widths=(4, 2, 2), numeric=(1, 2))
         if profile.pressures:
             yield Facts(((words("column.pressure_source"), plain(profile.pressure_source)),))
             columns = [words(f"column.{name}") for name in ("body_area", "transient", "quasi_static", "applies_to")]
             rows = [_row(words, *row) for row in pressure_limit_rows(profile, protocol.points, words)]
             yield _grid(columns, rows, widths=(5, 3, 3, 4), numeric=(1, 2))
-        if profile.measuring_source:
-            numbers = {
-                "rate": profile.sample_rate_at_least_hz,
-                "record": profile.record_at_least_s,
-                "stiffness": profile.obstacle_stiffness_n_per_mm,
-            }
-            yield Paragraph(words("text.measuring", source=profile.measuring_source, **numbers), "note")
+        yield Facts(tuple(_measuring(profile, words)))
+
+
+def _measuring(profile: ForceProfile, words: Words) -> Iterator[tuple[str, str]]:
+    """Yield what a profile requires of the measurement, and what is required instead where it states nothing."""
+    rate, stiffness = profile.sample_rate_at_least_hz, profile.obstacle_stiffness_n_per_mm
+    at_least = words("measuring.rate", rate=rate) if rate else words("measuring.no_rate")
+    yield words("column.sample_rate"), at_least
+    key = "record" if profile.record_at_least_s else "no_record"
+    yield words("column.record"), words(f"measuring.{key}", record=required_record(profile), length=LAST_STEP_S)
+    yield words("column.stiffness"), words.limit(stiffness) if stiffness else words("measuring.nothing")
+    if profile.measuring_source:
+        yield words("column.measuring_source"), plain(profile.measuring_source)
 
 
 def _provenance(protocol: Protocol, words: Words) -> Iterator[Block]:

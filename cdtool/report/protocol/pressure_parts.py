@@ -2,45 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from cdtool.evaluation.force.limits import ForceProfile
-from cdtool.evaluation.protocol.assessment import PointAssessment
+from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition
 from cdtool.evaluation.protocol.plan import Instrument
 from cdtool.evaluation.protocol.pressure import PressureAssessment, as_profile, highest
 from cdtool.report.protocol.words import Words
 
 
-@dataclass(frozen=True)
-class PressureColumns:
-    """The columns of the pressures of a point: headings, a row per repetition, the highest values, the limits."""
-
-    headings: tuple[str, ...] = ()
-    rows: tuple[tuple[float | None, ...], ...] = ()
-    highest: tuple[float | None, ...] = ()
-    limits: tuple[float | None, ...] = ()
-
-
-def pressure_columns(point: PointAssessment) -> PressureColumns:
-    """Return the columns of a point; without any if no pressure is known."""
+def pressure_columns(point: PointAssessment, words: Words) -> Iterator[tuple[str, list[str]]]:
+    """Yield name and cells of the columns: a cell per repetition, the highest value, the limit; none without values."""
     found = point.pressures
     if not any(item.is_known for item in found):
-        return PressureColumns(rows=((),) * len(point.repetitions))
+        return
     most, limit = highest(found), found[0].limit
     first, quasi_static = (limit.first, limit.quasi_static) if limit else (None, None)
+    yield "pressure", _cells([*(item.peak for item in found), most["peak"]], first, words)
     if any(item.record for item in found):
-        rows = tuple((item.peak, item.late_peak) for item in found)
-        most_of_both = (most["peak"], most["late_peak"])
-        return PressureColumns(("pressure", "late_pressure"), rows, most_of_both, (first, quasi_static))
-    return PressureColumns(("pressure",), tuple((item.peak,) for item in found), (most["peak"],), (first,))
+        yield "late_pressure", _cells([*(item.late_peak for item in found), most["late_peak"]], quasi_static, words)
 
 
-def pressure_notices(points: tuple[PointAssessment, ...], words: Words) -> Iterator[str]:
-    """Yield what the reader must know of pressures that have no limit."""
+def _cells(values: list[float | None], limit: float | None, words: Words) -> list[str]:
+    if limit is None:
+        return [*map(words.value, values), ""]
+    return [*(words.beside(value, limit) for value in values), words.limit(limit)]
+
+
+def pressures_without_limit(points: Sequence[PointAssessment]) -> dict[str, list[str]]:
+    """Return the names of the points whose pressure is known and not limited, by profile."""
+    found: dict[str, list[str]] = {}
     for point in points:
         if point.profile and not point.profile.pressures and any(item.is_known for item in point.pressures):
-            yield words("notice.pressure", point=point.point.name, profile=point.profile.name)
+            found.setdefault(point.profile.name, []).append(point.point.name)
+    return found
 
 
 def pressure_deviations(points: tuple[PointAssessment, ...], words: Words) -> Iterator[tuple[str, str]]:
@@ -102,7 +98,7 @@ def _applies(point: PointAssessment, profile: ForceProfile, area: str) -> bool:
     return limit is not None and limit.area == area
 
 
-def worst_outcome(force: str, pressure: PressureAssessment | None) -> str:
-    """Return the outcome of a repetition: the worse one of its force and its pressure."""
+def worst_outcome(item: Repetition, pressure: PressureAssessment) -> str:
+    """Return the key of the outcome of a repetition: the worse one of its force and its pressure."""
     order = ("fail", "not_assessable", "pass")
-    return min(force, pressure.outcome if pressure else "pass", key=order.index)
+    return f"outcome.{min(item.verdict.outcome, pressure.outcome, key=order.index)}"

@@ -12,11 +12,27 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Verdict
+from cdtool.plain_text import digits_beside
 
 LANGUAGES = ("en", "de")
 _FOLDER = Path(__file__).with_name("texts")
 # Significant digits of a measured value.
 _DIGITS = 4
+# Of a limit, which is shown as it was written.
+_ALL_DIGITS = 12
+# Which value of a sentence is compared with which.
+_BESIDE = (
+    ("force", "limit"),
+    ("peak", "limit"),
+    ("most", "limit"),
+    ("largest", "limit"),
+    ("rate", "needed"),
+    ("end", "needed"),
+    ("end", "begin"),
+    ("end", "until"),
+    ("reading", "range"),
+    ("pressure", "limit"),
+)
 
 
 @dataclass(frozen=True)
@@ -30,11 +46,20 @@ class Words:
         """Return the text of `TABLE.KEY` with its placeholders filled in; KeyError for an unknown key."""
         table, _, name = key.partition(".")
         text = str(self.texts[table][name])
-        return text.format(**{item: self.value(value) for item, value in values.items()})
+        shown = {item: self.value(value) for item, value in values.items()}
+        for value_name, limit_name in _BESIDE:
+            value, limit = values.get(value_name), values.get(limit_name)
+            if isinstance(value, float) and isinstance(limit, float):
+                shown[value_name], shown[limit_name] = self.beside(value, limit), self.limit(limit)
+        return text.format(**shown)
 
     def name(self, table: str, name: str) -> str:
         """Return a name of the files in this language, as that of a step; one that the table does not have as it is."""
         return str(self.texts[table].get(name, name))
+
+    def force_of(self, step: str) -> str:
+        """Return the heading of the largest forces in a step: its symbol, or else its name, with the unit."""
+        return str(self.texts["force_column"].get(step) or self("column.force_in", step=self.name("step", step)))
 
     def value(self, value: object) -> str:
         """Return a value as text: a number with the language's decimal sign, a date, a text as it is."""
@@ -54,6 +79,14 @@ class Words:
         text = f"{value:.0f}" if "e+" in text else text
         return text.replace("-", "−", 1).replace(".", str(self.texts["decimal"]))
 
+    def beside(self, value: float | None, limit: float) -> str:
+        """Return a number with the digits that show on which side of a limit it is."""
+        return self.number(value) if value is None else self.number(value, digits_beside(value, limit, _DIGITS))
+
+    def limit(self, value: float) -> str:
+        """Return a limit with all its digits."""
+        return self.number(value, _ALL_DIGITS)
+
     def reason(self, reason: Reason) -> str:
         """Return a reason as a sentence."""
         values: dict[str, object] = dict(reason.values)
@@ -64,10 +97,7 @@ class Words:
             values["step"] = self.name("step", str(values["step"]))
         if "averaged" in values:
             values["averaged"] = self(f"averaged.{values['averaged']}")
-        if reason.kind is ReasonKind.POINT_EXCEEDS:
-            values["force"] = self._above(float(reason.values["force"]), float(reason.values["limit"]))  # type: ignore[arg-type]  # numbers
         if reason.kind is ReasonKind.PRESSURE_EXCEEDS:
-            values["pressure"] = self._above(float(reason.values["pressure"]), float(reason.values["limit"]))  # type: ignore[arg-type]  # numbers
             values["area"] = self.name("area", str(values["area"]))
         if reason.kind is ReasonKind.NO_VALUE:
             values["keys"] = values.pop("key")
@@ -82,11 +112,6 @@ class Words:
             keys = ", ".join(str(reason.values["key"]) for reason in empty if reason.values["file"] == file)
             sentences.append(self("reason.no_value", file=file, keys=keys))
         return sentences
-
-    def _above(self, value: float, limit: float) -> str:
-        """Return a number above a limit with as many digits as show that it is above."""
-        digits = (count for count in range(_DIGITS, 17) if float(f"{value:.{count}g}") > limit)
-        return self.number(value, next(digits, 17))
 
     def _date(self, day: dt.date) -> str:
         return str(self.texts["date"]).format(

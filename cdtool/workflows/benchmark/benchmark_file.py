@@ -85,7 +85,7 @@ class BenchmarkFile:
     versions were read. `sections` are the parts of scored logs that are used, `learned_sections` those of the logs
     learned from, which end `guard` [s] before their first contact; None: they have no contact. `split`: which runs stay
     together where runs set a limit for others. `not_injected`: logs and
-    contacts of `inject` that were left out.
+    contacts of `inject` that were left out. `force_limits`: the file of the force profiles; None: the shipped ones.
     """
 
     path: Path
@@ -117,6 +117,7 @@ class BenchmarkFile:
     measures_synchronisation: bool = False
     inject: InjectSection | None = None
     not_injected: tuple[Skipped, ...] = ()
+    force_limits: Path | None = None
 
     def rule_of(self, detector: str) -> Threshold:
         """Return the rule that a detector's signal is judged by: `rule`, unless the detector has its own."""
@@ -215,9 +216,10 @@ class BenchmarkFile:
         """Return every file that is read for the benchmark; none of them may be overwritten."""
         logs = (*self.learn, *(path for group in self.impacts.values() for path in group.logs))
         labels = (location(self.labels.source),) if self.labels else ()
+        limits = (self.force_limits,) if self.force_limits else ()
         files = tuple(dict.fromkeys(split_run(log)[0] if self.has_runs else log for log in logs))
         beside = (path for log in files for path in self.machine_file.files_beside(log))
-        return (self.path, self.machine_file.path, *files, *labels, *beside)
+        return (self.path, self.machine_file.path, *files, *labels, *beside, *limits)
 
     @property
     def has_runs(self) -> bool:
@@ -269,11 +271,7 @@ def read_benchmark_file(
         raise ConfigurationError(text, f'reference it from a benchmark file: machine = "{file.name}"')
     base = file.parent
     machine_file = read_machine_file(joined(base, root.text("machine")))
-    # The recordings of a force rig may have only a force.
-    without_detectors = not learning and root.raw("detectors") == []
-    wanted = (
-        () if without_detectors else root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
-    )
+    wanted = _wanted_detectors(root, learning, detectors)
     names = tuple(machine_file.detector(name).name for name in wanted)
     if len(set(names)) < len(names):
         raise root.fault("detectors", "contains a detector twice", "list each detector once")
@@ -337,6 +335,7 @@ def read_benchmark_file(
         guard=guard,
         split=split,
         inject=inject,
+        force_limits=_force_limits(force, base),
     )
     root.finish()
     if benchmark.points and not any(group.force for group in impacts.values()):
@@ -382,6 +381,16 @@ def _measures_synchronisation(onset: Table) -> bool:
             "synchronisation", "is measured, but synchronisation_s is stated too", "remove one of the two"
         )
     return measured
+
+
+def _wanted_detectors(root: Table, learning: bool, detectors: Sequence[str]) -> Sequence[str]:
+    """Return the detectors of a file, or else those given; the recordings of a force rig may need none."""
+    if root.raw("detectors") != []:
+        return root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
+    if learning and not detectors:
+        hint = "name some, or write a protocol of the forces without detectors: cdtool protocol init"
+        raise root.fault("detectors", "is empty: nothing can be scored", f"{hint} {root.where}")
+    return _all_or(detectors) if learning else ()
 
 
 def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
@@ -440,7 +449,7 @@ def _groups(
         raise tables.fault(
             HOLDOUT, "is the name of the impact-free group", "choose another name for the group of impacts"
         )
-    profiles = read_force_limits(joined(found.base, force.text("limits")) if "limits" in force else None)
+    profiles = read_force_limits(_force_limits(force, found.base))
     profile = force.text("profile", "")
     if profile:
         _profile(profiles, force, "profile", force)
@@ -510,6 +519,10 @@ def _conditions(
             unchanged = groups.get(name, ImpactGroup((), window, is_impact_free=True))
             changed[group] = replace(unchanged, logs=tuple(logs), condition=condition, counterpart=name)
     return changed, sections
+
+
+def _force_limits(force: Table, base: Path) -> Path | None:
+    return joined(base, force.text("limits")) if "limits" in force else None
 
 
 def _profile(profiles: Mapping[str, ForceProfile], table: Table, key: str, force: Table) -> ForceProfile | None:

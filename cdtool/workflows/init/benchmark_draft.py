@@ -31,6 +31,7 @@ from cdtool.workflows.runs import read_named
 _HOLDOUT = 4
 # With fewer logs of impacts, a threshold learned from the others is not worth it.
 _ENOUGH_IMPACTS = 3
+_FORCE_ONLY = "  # the logs have no channels of a machine: a protocol of the forces needs no detector"
 _NORMAL_MAD = 1.4826
 _NUMBER = re.compile(r"[\W_]*\d+.*$")
 
@@ -46,11 +47,15 @@ class _Log:
 
 @dataclass(frozen=True)
 class BenchmarkDraft:
-    """The text of a benchmark file, the files it needs beside it by name, and the logs that cannot be used."""
+    """The text of a benchmark file, the files it needs beside it by name, and the logs that cannot be used.
+
+    `has_detectors`: a detector runs on the logs; those of a force rig may have only a force.
+    """
 
     text: str
     beside: Mapping[str, str]
     skipped: tuple[Skipped, ...]
+    has_detectors: bool
 
 
 def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Path) -> BenchmarkDraft:
@@ -110,14 +115,14 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
     lines = [
         f"# Draft by cdtool init from {counted(len(known), 'log')}: check each line marked CHECK.",
         f"machine = {json.dumps(relative_name(machine_file.path, folder), ensure_ascii=False)}",
-        f"detectors = {_listed(usable)}",
+        f"detectors = {_listed(usable)}" + ("" if usable or others else _FORCE_ONLY),
         *([f"# With inertia and friction in the machine file also: {', '.join(others)}"] if others else []),
-        *_learning(impacts, free, folder, "position" in first),
+        *(_learning(impacts, free, folder, "position" in first) if usable or others else []),
         *_groups(impacts, folder),
         *_onset(known, beside),
         *_comments(unknown, folder),
     ]
-    return BenchmarkDraft("\n".join(lines) + "\n", beside, tuple(skipped))
+    return BenchmarkDraft("\n".join(lines) + "\n", beside, tuple(skipped), bool(usable))
 
 
 def _contacts(recording: Recording) -> int | None:

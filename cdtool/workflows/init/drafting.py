@@ -113,6 +113,7 @@ class DraftedStudy:
     """A machine file and a benchmark file in one folder: their paths, the benchmark's text, and logs left out.
 
     `machine` is the draft of the machine file, None if one was given; `beside` are further files that were written.
+    `has_detectors`: the benchmark file names a detector.
     """
 
     machine: Drafted | None
@@ -121,6 +122,7 @@ class DraftedStudy:
     text: str
     beside: tuple[str, ...]
     skipped: tuple[Skipped, ...]
+    has_detectors: bool = True
 
     __repr__ = short_repr
 
@@ -181,7 +183,7 @@ def init_study(
     for name, text in made.beside.items():
         write_text(target / name, text)
     beside = tuple(str(target / name) for name in made.beside)
-    return DraftedStudy(drafted, str(machine_path), str(file), made.text, beside, made.skipped)
+    return DraftedStudy(drafted, str(machine_path), str(file), made.text, beside, made.skipped, made.has_detectors)
 
 
 def _refuse_existing(force: bool, *targets: Path) -> None:

@@ -12,6 +12,8 @@ from cdtool.evaluation.protocol.assessment import PointAssessment, judge
 from cdtool.evaluation.protocol.protocol import ExcludedRecording, FileDigest, Protocol, Role
 from cdtool.evaluation.results import Results
 from cdtool.ingest.run_reading import split_run
+from cdtool.remote.remote_path import joined, location
+from cdtool.tables import read_toml
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark import Benchmark
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file
@@ -96,7 +98,7 @@ def _made(file: ProtocolFile, setup: BenchmarkFile, results: Results | None, com
     base = setup.path.parent
     excluded = tuple(ExcludedRecording(shown_path(log, base), reason) for log, reason in assignment.excluded.items())
     verdict = judge(file.plan, points, file.path.name, assignment.absent)
-    files = (*_files(file, setup), *_recordings(assignment, points, base, results))
+    files = (*_files(file, setup), *_recordings(assignment, points, setup, results))
     detectors = results.detectors if results else ()
     return Protocol(file.plan, points, verdict, files, excluded, detectors, __version__, command)
 
@@ -111,24 +113,37 @@ def _latencies(results: Results) -> dict[tuple[str, str, int], dict[str, float |
 
 def _files(file: ProtocolFile, setup: BenchmarkFile) -> list[FileDigest]:
     """Return the files that a person wrote, with their SHA-256; names are relative to the benchmark file."""
-    paths: list[tuple[Path, Role]] = [(setup.path, "benchmark"), (setup.machine_file.path, "machine")]
-    if file.path.resolve() != setup.path.resolve():
-        paths.insert(0, (file.path, "protocol"))
-    if file.limits is not None:
-        paths.append((file.limits, "limits"))
-    return [FileDigest(shown_path(path, setup.path.parent), digest_of_file(path), role) for path, role in paths]
+    paths: list[tuple[Path | None, Role]] = [
+        (file.path, "protocol"),
+        (setup.path, "benchmark"),
+        (setup.machine_file.path, "machine"),
+        (_robot_model(setup.machine_file.path), "robot"),
+        (file.limits, "limits"),
+        (setup.force_limits, "limits"),
+        (location(setup.labels.source) if setup.labels else None, "labels"),
+    ]
+    # A table [protocol] of the benchmark file is in no file of its own, and both tables may name one file of limits.
+    roles = {path.resolve(): (path, role) for path, role in paths if path is not None}
+    base = setup.path.parent
+    return [FileDigest(shown_path(path, base), digest_of_file(path), role) for path, role in roles.values()]
+
+
+def _robot_model(machine_file: Path) -> Path | None:
+    """Return the URDF that a machine file names, or None."""
+    name = read_toml(machine_file, "a machine file")["machine"].get("urdf")
+    return joined(machine_file.parent, name) if isinstance(name, str) else None
 
 
 def _recordings(
-    assignment: Assignment, points: Sequence[PointAssessment], base: Path, results: Results | None
+    assignment: Assignment, points: Sequence[PointAssessment], setup: BenchmarkFile, results: Results | None
 ) -> list[FileDigest]:
     """Return every recording with its SHA-256: those of the points, the excluded ones, then those of the benchmark."""
     known = {item.recording: item.sha256 for point in points for item in point.repetitions}
     found: dict[str, FileDigest] = {name: FileDigest(name, digest, "measured") for name, digest in known.items()}
     for log in [log for item in assignment.points for _, log in item.logs]:
-        _add_unread(found, log, base, "measured")
+        _add_unread(found, log, setup, "measured")
     for log in assignment.excluded:
-        _add_unread(found, log, base, "excluded")
+        _add_unread(found, log, setup, "excluded")
     for row in results.recordings if results else ():
         found.setdefault(row.recording, FileDigest(row.recording, row.sha256, "scored"))
     provenance: Mapping[str, Mapping[str, str]] = results.provenance if results else {}
@@ -139,11 +154,15 @@ def _recordings(
     return list(found.values())
 
 
-def _add_unread(found: dict[str, FileDigest], log: Path, base: Path, role: Role) -> None:
-    """Add a file of which no contact was measured, unless it is known; one that cannot be opened has no digest."""
+def _add_unread(found: dict[str, FileDigest], log: Path, setup: BenchmarkFile, role: Role) -> None:
+    """Add a log of which no contact was measured, unless it is known, and the files that belong to a log.
+
+    A file that cannot be opened has no digest.
+    """
     file = split_run(log)[0]
-    name = shown_path(file, base)
-    if any(known.partition("#")[0] == name for known in found):
-        return
-    with suppress(OSError), file.open("rb") as opened:
-        found[name] = FileDigest(name, hashlib.file_digest(opened, "sha256").hexdigest(), role)
+    for path in (file, *setup.machine_file.files_beside(file)):
+        name = shown_path(path, setup.path.parent)
+        if any(known.partition("#")[0] == name for known in found):
+            continue
+        with suppress(OSError), path.open("rb") as opened:
+            found[name] = FileDigest(name, hashlib.file_digest(opened, "sha256").hexdigest(), role)

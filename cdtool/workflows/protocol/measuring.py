@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import ConfigurationError, nearest
+from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.protocol.assessment import PointAssessment, Repetition, Unmeasured, assess_point
 from cdtool.evaluation.protocol.plan import MeasuringPoint
@@ -32,6 +33,13 @@ from cdtool.workflows.runs import find_logs, resolve_all
 _EARLY = 0.6
 # Its first readings, over this time [s], are those nearest to the rest.
 _FIRST = 0.01
+# A contact that is slower than this from zero to the level at rest [s] is no contact, but a drift of the cell.
+_SLOWEST = 10.0
+_BEYOND_DOUBT = 3.0
+# The end of a record over which it shows where the reading returned to [s].
+_LAST = 0.2
+# Times of samples are equal within this [s].
+_EXACT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -160,19 +168,22 @@ def measured_point(
     profile = profiles_of(item, file, setup)
     repetitions: list[Repetition] = []
     unmeasured: list[Unmeasured] = []
+    contacts = 0
     for group, log in item.logs:
         for read in logs_to_score(setup, group, log):
             if isinstance(read, Skipped):
                 unmeasured.append(Unmeasured(read.recording, "unreadable", read.reason))
-            elif profile is not None:
+                continue
+            contacts += len(read.contacts)
+            if profile is not None:
                 mass = setup.rules_of(group).mass_before_cell
                 of_log, others = _measured(read, profile, mass)
                 repetitions += [
                     replace(one, latencies_ms=late.get((group, one.recording, one.contact), {})) for one in of_log
                 ]
                 unmeasured += others
-    plan = file.plan
-    return assess_point(item.point, profile, repetitions, unmeasured, plan.force_instrument, plan.pressure_instrument)
+    of_force, of_pressure = file.plan.force_instrument, file.plan.pressure_instrument
+    return assess_point(item.point, profile, repetitions, unmeasured, of_force, of_pressure, contacts)
 
 
 def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[list[Repetition], list[Unmeasured]]:
@@ -191,7 +202,7 @@ def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[lis
         repetitions.append(
             replace(
                 measured,
-                rest_error=_rest_error(recording, contact),
+                rest_error=_rest_error(recording, contact, curve),
                 losses=losses,
                 pressure=pressure_record(recording, contact, until, since),
                 speed=speed_before(recording, contact),
@@ -210,10 +221,32 @@ def _neighbours(contacts: Sequence[Contact], number: int) -> tuple[float, float]
     return since, contacts[number].start if number < len(contacts) else np.inf
 
 
-def _rest_error(recording: Recording, contact: Contact) -> float:
-    """Return by how much the rest before a contact differs from the first readings [N]; 0 of a record long enough."""
+def _rest_error(recording: Recording, contact: Contact, curve: ForceTimeCurve) -> float:
+    """Return by how much the rest before a contact may be wrong [N], because the record begins during a slow rise.
+
+    Of a record that begins shortly before the contact that is the difference to the first readings; of one that ends
+    below the level at rest, to the last ones. Where the reading rises from the beginning on, fast enough to have begun
+    at zero a few seconds ago, all of it may be a force.
+    """
+    rest = contact.rest
+    if not np.isfinite(rest):
+        return 0.0
     samples = cell_samples(recording["force"])
     begin = float(samples.time[0])
-    if contact.start - begin > _EARLY or not np.isfinite(contact.rest):
-        return 0.0
-    return abs(contact.rest - float(np.mean(samples.force[samples.time <= begin + _FIRST])))
+    first = samples.force[samples.time <= begin + _FIRST]
+    moved, length = rest - float(np.mean(first)), contact.start - begin
+    is_early = length <= _EARLY
+    is_moving = is_early and abs(moved) > _BEYOND_DOUBT * float(np.std(first)) / np.sqrt(len(first))
+    slope = moved / length if is_moving and length > 0.0 else contact.drift
+    at_peak = samples.force[np.searchsorted(samples.time, contact.start + curve.time[np.argmax(curve.force)] - _EXACT)]
+    rises_with_contact = slope * rest > 0.0 and (at_peak - rest) * rest > 0.0
+    if rises_with_contact and rest / slope <= _SLOWEST:
+        return abs(rest)
+    return max(abs(moved) if is_early else 0.0, _below_rest(curve))
+
+
+def _below_rest(curve: ForceTimeCurve) -> float:
+    """Return how far the reading is below the level at rest in the end [N]: nothing pulls, so that was a force."""
+    last = curve.force[curve.time >= curve.time[-1] - _LAST]
+    below = -float(np.median(last))
+    return below if below > _BEYOND_DOUBT * float(np.std(last)) else 0.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from cdtool.evaluation.force.curve import ForceTimeCurve
@@ -64,6 +64,12 @@ def sine(peak: float = 300.0) -> np.ndarray:
 
 
 def repetition(force: ForceTimeCurve, number: int = 1, rest: tuple[float, float] = (0.0, 0.0)) -> Repetition:
+    """Return a contact with noise of its own: no two measurements are equal."""
+    noise = np.random.default_rng(number).normal(0.0, 0.01, len(force.time))
+    return without_noise(replace(force, force=force.force + noise), number, rest)
+
+
+def without_noise(force: ForceTimeCurve, number: int = 1, rest: tuple[float, float] = (0.0, 0.0)) -> Repetition:
     return Repetition.of((f"{number}.csv", f"sha{number}"), 1, force, PROFILE, rest)
 
 
@@ -159,6 +165,107 @@ def test_the_same_recording_under_two_names_is_not_two_measurements():
     assert outcome([items[0], replace(items[1], sha256="sha1"), items[2]])[1] == ["same_recording"]
     # Two contacts of one recording are two measurements.
     assert outcome([items[0], replace(items[1], sha256="sha1", recording="1.csv", contact=2), items[2]])[0] == "pass"
+
+
+def test_one_measurement_in_two_files_is_not_two_measurements_nor_one_at_two_points():
+    one, two, three_ = three(curve(sine()))
+    again = replace(two, curve=replace(one.curve, force=one.curve.force.round(2)))
+    found = assess_point(POINT, PROFILE, [one, again, three_], instrument=METER)
+    assert [dict(reason.values) for reason in found.reasons] == [
+        {"point": "edge", "recording": "2.csv", "other": "1.csv", "contact": 1, "other_contact": 1}
+    ]
+    assert (found.outcome, found.reasons[0].kind.value) == ("incomplete", "same_measurement")
+    # The same contact, appended to its recording.
+    appended = replace(again, sha256=one.sha256, recording=one.recording, contact=2)
+    assert outcome([one, appended, three_]) == ("incomplete", ["same_measurement"])
+    points = [assess_point(POINT, PROFILE, items, instrument=METER) for items in ([one], [again])]
+    kinds = [reason.kind.value for reason in judge(PLAN, points, "p.toml").reasons]
+    assert kinds == ["too_few_repetitions", "too_few_repetitions", "same_measurement"]
+
+
+CHEST = replace(read_force_limits()["iso_ts_15066_chest"], pressures=())
+
+
+def of_chest(force: np.ndarray, time: np.ndarray = TIME, number: int = 1) -> tuple[str, list[str]]:
+    point = replace(POINT, repetitions=1, obstacle_stiffness_n_per_mm=25.0)
+    item = Repetition.of((f"{number}.csv", f"sha{number}"), 1, curve(force, time), CHEST)
+    found = assess_point(point, CHEST, [item])
+    return found.outcome, [reason.kind.value for reason in found.reasons]
+
+
+@pytest.mark.parametrize("seconds", [0.2, 0.49, 0.5, 0.501, 0.6, 0.99])
+def test_a_record_that_does_not_hold_half_a_second_of_the_last_step_is_no_pass(seconds):
+    count = round(1000 * seconds) + 1
+    assert of_chest(sine(200.0)[:count], TIME[:count]) == ("incomplete", ["last_step_too_short"])
+    assert of_chest(sine(200.0)[:1001], TIME[:1001]) == ("pass", [])
+
+
+def test_a_step_that_the_stated_record_does_not_reach_is_no_pass():
+    early = replace(CHEST, record_at_least_s=0.3)
+    item = Repetition.of(("1.csv", "sha"), 1, curve(sine(200.0)[:400], TIME[:400]), early)
+    found = assess_point(replace(POINT, repetitions=1, obstacle_stiffness_n_per_mm=25.0), early, [item])
+    assert {reason.kind.value for reason in found.reasons} == {"not_assessable"}
+    assert found.outcome == "incomplete" and found.reasons[-1].values["step"] == "quasi-static"
+
+
+@given(st.sampled_from([20.0, 50.0, 100.0, 200.0]), st.floats(0.0, 1.0), st.floats(0.02, 0.1))
+def test_without_a_stated_sample_rate_no_peak_above_the_limit_hides_between_samples(rate, phase, rise):
+    time = np.arange(round(3 * rate)) / rate
+    since = time + phase / rate
+    force = 284.0 * np.sin(np.pi * since / (2.0 * rise)) * (since < 2.0 * rise)
+    assume(force.max() > 0.1 * 284.0)  # below that, no contact is seen
+    assert of_chest(force, time)[0] != "pass"
+
+
+def test_without_a_stated_sample_rate_enough_samples_pass():
+    noise = np.random.default_rng(1).normal(0.0, 0.3, len(TIME))
+    assert of_chest(sine(278.0) + noise) == ("pass", [])
+    slow, time = sine(281.0)[::40], TIME[::40]
+    assert slow.max() < 280.0
+    assert of_chest(slow, time) == ("incomplete", ["peak_between_samples"])
+    assert of_chest(0.8 * slow, time) == ("pass", [])
+
+
+def test_a_reading_at_the_range_of_the_instrument_is_none():
+    at_range = sine(300.0)
+    at_range[150] = 300.0
+    for reach, wanted in ((300.0, ["beyond_range"]), (300.01, []), (5000.0, [])):
+        item = without_noise(curve(at_range), 3)
+        meter = replace(METER, range_n=reach)
+        found = assess_point(POINT, PROFILE, [*three(curve(sine()))[:2], item], instrument=meter)
+        of_third = [reason for reason in found.reasons if reason.values["recording"] == "3.csv"]
+        assert [reason.kind.value for reason in of_third] == wanted
+
+
+@pytest.mark.parametrize(("equal", "reach", "wanted"), [(2, 310.0, ["near_range"]), (1, 310.0, []), (2, 500.0, [])])
+def test_two_equal_readings_close_to_the_range_may_be_a_stop(equal, reach, wanted):
+    force = np.minimum(sine(305.0), 290.0 + 10.0 * np.sin(np.pi * TIME / 0.3))
+    force[150 : 150 + equal] = 302.0
+    items = [*three(curve(sine(200.0)))[:2], without_noise(curve(force), 3)]
+    found = assess_point(POINT, PROFILE, items, instrument=replace(METER, range_n=reach))
+    assert [reason.kind.value for reason in found.reasons] == wanted
+
+
+@pytest.mark.parametrize(
+    ("cell", "peak", "wanted"),
+    [(10.0, 396.0, ["resolution_decides"]), (10.0, 384.0, []), (1.22, 398.5, []), (0.1, 399.98, [])],
+)
+def test_a_mean_within_half_a_coarse_cell_of_its_limit_is_no_pass(cell, peak, wanted):
+    random = np.random.default_rng(3)
+    forces = [cell * np.round((sine(peak) + random.normal(0.0, 0.2 * cell, len(TIME))) / cell) for _ in range(3)]
+    forces = [np.minimum(force, cell * np.round(peak / cell)) for force in forces]
+    profile = replace(
+        PROFILE, steps=(PROFILE.steps[0], *(replace(step, at_most_n=300.0) for step in PROFILE.steps[1:]))
+    )
+    items = [Repetition.of((f"{n}.csv", f"{n}"), 1, curve(force), profile) for n, force in enumerate(forces)]
+    assert [reason.kind.value for reason in assess_point(POINT, profile, items).reasons] == wanted
+
+
+def test_an_error_of_a_repetition_above_the_limit_counts_for_the_mean_that_meets_it():
+    high = replace(repetition(curve(sine(500.0)), 3), rest_error=20.0)
+    items = [repetition(curve(sine(peak)), number) for number, peak in ((1, 340.0), (2, 350.0))]
+    assert outcome([*items, high])[1] == ["rest_decides"]
+    assert outcome([*items, replace(high, rest_error=8.0)]) == ("pass", [])
 
 
 def test_a_contact_in_progress_is_named_and_not_counted():
@@ -264,9 +371,9 @@ def test_a_plan_names_each_point_once():
 
 @pytest.mark.parametrize(("held", "found"), [(1, []), (4, []), (20, ["rate_too_low"])])
 def test_a_log_that_repeats_each_reading_has_the_sample_rate_of_the_cell(held, found):
-    noise = np.random.default_rng(held).normal(0.0, 0.5, len(TIME))
-    slow = np.repeat((sine() + noise)[::held], held)[: len(TIME)]
-    items = [repetition(curve(slow), number) for number in (1, 2, 3)]
+    noise = np.random.default_rng(held).normal(0.0, 0.5, (3, len(TIME)))
+    slow = [np.repeat((sine() + some)[::held], held)[: len(TIME)] for some in noise]
+    items = [without_noise(curve(force), number) for number, force in enumerate(slow, 1)]
     assert items[0].sample_rate == pytest.approx(1000.0 / held, rel=1e-3)
     meter = replace(METER, sample_rate_hz=1000.0 / held)
     reasons = assess_point(POINT, PROFILE, items, instrument=meter).reasons
@@ -275,4 +382,4 @@ def test_a_log_that_repeats_each_reading_has_the_sample_rate_of_the_cell(held, f
 
 def test_a_coarse_cell_under_a_steady_force_is_no_slow_cell():
     coarse = 2.0 * np.round((sine() + np.where(TIME < 3.0, 20.0, 0.0)) / 2.0)
-    assert repetition(curve(coarse)).sample_rate == pytest.approx(1000.0)
+    assert without_noise(curve(coarse)).sample_rate == pytest.approx(1000.0)

@@ -9,9 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.evaluation.force.limits import ForceProfile, ForceStep, read_force_limits
+from cdtool.evaluation.protocol.assessment import Repetition, assess_point, judge
 from cdtool.evaluation.protocol.plan import MachineParticulars
+from cdtool.evaluation.protocol.protocol import Protocol
+from cdtool.report.protocol.blocks import Grid
 from cdtool.report.protocol.document import protocol_document
 from cdtool.report.protocol.html import to_html
+from cdtool.report.protocol.words import words_of
 from tests.report.hostile import HOSTILE
 
 GOLDEN = Path(__file__).with_name("golden")
@@ -48,6 +53,65 @@ def test_it_loads_nothing_runs_nothing_and_shows_hostile_names_as_text(protocols
     assert "<script" not in page and "&lt;script" in page.replace("<wbr>", "")
     assert not re.search(r'(src|href)="(?!data:)', page)
     assert "default-src 'none'; style-src 'sha256-" in html.unescape(page)
+
+
+def with_profile(protocol: Protocol, profile: ForceProfile) -> Protocol:
+    """Return a protocol of the same recordings, assessed by another profile."""
+    (point,) = protocol.points
+    repetitions = [
+        Repetition.of((item.recording, item.sha256), item.contact, item.curve, profile) for item in point.repetitions
+    ]
+    points = (assess_point(point.point, profile, repetitions),)
+    return replace(protocol, points=points, verdict=judge(protocol.plan, points, "protocol.toml"))
+
+
+def forces(protocol: Protocol) -> list[Grid]:
+    """Return the tables of forces."""
+    blocks = protocol_document(protocol).blocks
+    return [item for item in blocks if isinstance(item, Grid) and item.columns[:2] == ("No.", "Recording")]
+
+
+@pytest.mark.parametrize(("count", "tables"), [(1, 1), (2, 1), (4, 1), (9, 2)])
+def test_every_step_of_a_profile_has_its_column(count, tables, protocols):
+    steps = tuple(ForceStep(0.5 * number, 400.0 - number, f"step {number}") for number in range(count))
+    profile = ForceProfile("own", "own", "own", True, steps)
+    shown = forces(with_profile(protocols["pass"], profile))
+    columns = [name for grid in shown for name in grid.columns]
+    assert len(shown) == tables and [name for name in columns if name.startswith("step")] == [
+        f"step {number} [N]" for number in range(count)
+    ]
+    assert ("t_dyn [ms]" in columns) == (count > 1)
+    for number in range(count):
+        grid = next(item for item in shown if f"step {number} [N]" in item.columns)
+        assert grid.rows[-1][grid.columns.index(f"step {number} [N]")] == f"{400 - number}"
+
+
+def test_a_profile_without_sample_rate_and_record_is_said_to_have_none(protocols):
+    profile = replace(
+        read_force_limits()["iso_ts_15066_chest"],
+        steps=(ForceStep(0.0, 600.0, "transient"), ForceStep(0.5, 300.0, "b")),
+    )
+    made = with_profile(protocols["pass"], profile)
+    page = text_of(to_html(protocol_document(made)))
+    assert "No sample rate is stated by iso_ts_15066_chest; measured at 1000 Hz or more." in page
+    assert "No length of the record is stated by iso_ts_15066_chest: 0.5 s of the last step are required." in page
+    assert "the profile states none; at least 1, which includes 0.5 s of the last step" in page
+    assert "the profile states none" not in text_of(to_html(protocol_document(protocols["pass"])))
+
+
+def test_a_mean_just_above_its_limit_is_above_it_in_table_and_reason(protocols):
+    point = protocols["pass"].points[0]
+    mean = point.verdict.steps[0].force
+    profile = replace(
+        point.profile, steps=(ForceStep(0.0, round(mean, 4) - 0.0003, "dynamic"), *point.profile.steps[1:])
+    )
+    page = text_of(to_html(protocol_document(with_profile(protocols["pass"], profile))))
+    limit = words_of("en").limit(profile.steps[0].at_most_n)
+    lines = page.splitlines()
+    (reason,) = (line for line in lines if "limit " in line and "mean of" in line)
+    said = float(re.search(r"peaks ([\d.]+) N, limit ([\d.]+) N", reason)[1])
+    assert said > float(limit) and limit in reason
+    assert float(lines[lines.index("mean") + 1]) > float(limit)
 
 
 def test_the_same_protocol_gives_the_same_page(documents):

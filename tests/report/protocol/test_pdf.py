@@ -11,9 +11,11 @@ import pytest
 
 from cdtool.errors import UsageError
 from cdtool.evaluation.protocol.protocol import Protocol
-from cdtool.report.protocol.blocks import Grid, Heading
+from cdtool.evaluation.protocol.reasons import Reason, Verdict
+from cdtool.report.protocol.blocks import Grid, Heading, Items
 from cdtool.report.protocol.document import protocol_document
 from cdtool.report.protocol.pdf import to_pdf
+from cdtool.report.protocol.words import words_of
 from tests.report.hostile import HOSTILE
 from tests.report.protocol.conftest import LONG
 
@@ -127,6 +129,37 @@ def test_no_heading_is_the_last_text_of_a_page(times, protocols, pypdf):
         footer = next(n for n, line in enumerate(lines) if line.startswith("Daten(SHA256)"))
         body = [line for line in lines[:footer] if line]
         assert body[-1] not in headings, body
+
+
+@pytest.mark.parametrize("name", ["fail", "incomplete"])
+def test_the_first_page_has_the_first_reasons_and_the_page_of_the_others(name, protocols, pypdf):
+    long = "Nebenschließkante {number}, 300 mm über dem Boden, bei geöffnetem Flügel, von der Straße aus gesehen"
+    made = many(protocols[name], 25)
+    points = tuple(
+        replace(point, point=replace(point.point, name=long.format(number=number)), repetitions=())
+        for number, point in enumerate(made.points)
+    )
+    reasons = tuple(
+        Reason(item.kind, {**item.values, "point": point.point.name}, item.cause)
+        for point in points
+        for item in point.reasons
+    )
+    plan = replace(made.plan, language="en", points=tuple(item.point for item in points))
+    document = protocol_document(replace(made, plan=plan, points=points, verdict=Verdict(reasons)))
+    pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(to_pdf(document))).pages]
+    first = " ".join(pages[0].split())
+    assert first.index("Nebenschließkante 0") < first.index("To be observed")
+    more, page = re.search(r"and (\d+) more, see all reasons on page (\d+)", first).groups()
+    assert "All reasons" in pages[int(page) - 1] and int(page) == 2
+    listed = next(item.items for item in document.blocks if isinstance(item, Items))
+    assert len(listed) + int(more) == len(reasons) and len(listed) >= 3
+    everything = squeezed("".join(pages))
+    assert all(squeezed(words_of("en").reason(item)) in everything for item in reasons)
+
+
+def test_a_few_reasons_are_listed_once(documents):
+    headings = [item.text for item in documents["incomplete"].blocks if isinstance(item, Heading)]
+    assert "All reasons" not in headings and "What is incomplete" in headings
 
 
 def test_hostile_names_are_text_and_the_same_document_gives_the_same_bytes(protocols, pypdf):

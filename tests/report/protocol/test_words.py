@@ -7,6 +7,8 @@ import string
 import typing
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cdtool.evaluation.force.limits import read_force_limits
 from cdtool.evaluation.force.verdict import CauseKind, StepCause
@@ -83,8 +85,24 @@ def test_values_that_are_not_filled_in_are_one_sentence_for_each_file():
     assert words_of("en").reasons(Verdict(reasons), "incomplete") == ["Missing in p.toml: a, b"]
 
 
-def test_a_force_just_above_its_limit_is_shown_with_the_digits_that_exceed_it():
-    values = {"point": "edge", "step": "dynamic", "limit": 400.0, "count": 3, "averaged": "mean"}
+def test_no_value_of_a_reason_is_rounded_across_its_limit():
     words = words_of("de")
-    assert "400,04 N, Grenze 400 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**values, "force": 400.04}))
-    assert "Spitzenwerten 412,3 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**values, "force": 412.345}))
+    exceeds = {"point": "edge", "step": "dynamic", "limit": 400.0, "count": 3, "averaged": "mean"}
+    assert "400,04 N, Grenze 400 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**exceeds, "force": 400.04}))
+    assert "Spitzenwerten 412,3 N" in words.reason(Reason(ReasonKind.POINT_EXCEEDS, {**exceeds, "force": 412.345}))
+    about = {"point": "edge", "repetition": 1, "recording": "a.csv", "profile": "p", "step": "static"}
+    short = Reason(ReasonKind.RECORD_TOO_SHORT, {**about, "end": 4.99996, "needed": 5.0})
+    assert "endet 4,99996 s nach dem Kontakt, p fordert 5 s" in words.reason(short)
+    beyond = Reason(ReasonKind.BEYOND_RANGE, {**about, "reading": 5000.4, "range": 5000.0})
+    assert "5000,4 N" in words.reason(beyond)
+    cause = StepCause("may_exceed", {"missing_ms": 3.0, "most": 150.004, "limit": 150.0})
+    assert "150,004 N" in words.reason(Reason(ReasonKind.NOT_ASSESSABLE, about, cause))
+    assert "150.004 N" in cause.sentence()
+
+
+@given(st.floats(-2000.0, 2000.0), st.sampled_from([25.0, 150.0, 400.0, 1234.5, 399.98]))
+def test_a_value_beside_its_limit_is_on_the_same_side_as_it_is_shown(value, limit):
+    words = words_of("en")
+    shown, shown_limit = (float(text.replace("−", "-")) for text in (words.beside(value, limit), words.limit(limit)))
+    assert shown_limit == limit and (shown > limit) == (value > limit)
+    assert shown == pytest.approx(value, rel=1e-3)

@@ -211,7 +211,7 @@ def test_a_film_reader_may_have_a_file_and_a_clock_of_its_own(tmp_path):
     assert result(protocol) == ("pass", [])
     record = protocol.points[0].pressures[0].record
     assert record is not None and record.peak == pytest.approx(180.0, rel=1e-3)
-    assert [item.role for item in protocol.files].count("measured") == 1
+    assert [item.role for item in protocol.files].count("measured") == 2
     (tmp_path / "films" / "01.csv").unlink()
     assert result(cdtool.protocol(path)) == ("incomplete", ["pressure_not_measured"])
 

@@ -22,6 +22,7 @@ from cdtool.evaluation.protocol.plan import (
     TestParticulars,
 )
 from cdtool.evaluation.protocol.protocol import Protocol
+from cdtool.evaluation.protocol.reasons import Verdict
 from cdtool.report.protocol.words import words_of
 from cdtool.workflows.protocol.checking import check_protocol
 from cdtool.workflows.protocol.drafting import draft_protocol
@@ -45,8 +46,12 @@ def made(rig) -> Protocol:
     return make_protocol(read_protocol_file(rig / "protocol.toml"), cdtool.benchmark(rig / "benchmark.toml"))
 
 
+def kinds_of(verdict: Verdict) -> list[str]:
+    return [reason.kind.value for reason in verdict.reasons]
+
+
 def kinds(protocol: Protocol) -> list[str]:
-    return [reason.kind.value for reason in protocol.verdict.reasons]
+    return kinds_of(protocol.verdict)
 
 
 def test_three_good_repetitions_pass_with_their_quantities_and_latencies(made):
@@ -95,6 +100,45 @@ def test_a_recording_that_cannot_be_read_has_its_hash_too(tmp_path):
     assert files["edge/04.csv"] == (hashlib.sha256(b"no table\n").hexdigest(), "measured")
 
 
+def test_every_file_that_a_figure_depends_on_has_its_hash(tmp_path):
+    write_rig(tmp_path, FORCES)
+    (tmp_path / "yard.toml").write_bytes(Path("cdtool/evaluation/force/limits.toml").read_bytes())
+    (tmp_path / "own.toml").write_bytes(Path("cdtool/evaluation/force/limits.toml").read_bytes() + b"\n")
+    with (tmp_path / "benchmark.toml").open("a", encoding="utf-8") as opened:
+        opened.write('[force]\nlimits = "yard.toml"\nprofile = "en_12453_reducing_gap"\n')
+    path = write_protocol(tmp_path)
+    text = path.read_text(encoding="utf-8").replace('profile = "en_', '# "')
+    path.write_text(text, encoding="utf-8")
+    first = cdtool.protocol(path)
+    assert first.verdict.outcome == "pass"
+    assert [item.name for item in first.files if item.role == "limits"] == ["yard.toml"]
+    path.write_text(text.replace('number = "P-17"', 'limits = "own.toml"'), encoding="utf-8")
+    assert [item.name for item in cdtool.protocol(path).files if item.role == "limits"] == ["own.toml", "yard.toml"]
+    # The report must not overwrite it, either.
+    assert tmp_path / "yard.toml" in cdtool.benchmark(tmp_path / "benchmark.toml").inputs
+
+
+def test_a_file_of_labels_and_a_load_cell_in_its_own_file_have_their_hash(tmp_path):
+    write_rig(tmp_path, FORCES)
+    machine = (tmp_path / "machine.toml").read_text(encoding="utf-8")
+    time = 'time = { column = "t", unit = "s" }, time_offset = 0.0'
+    own = f'force = {{ file = "{{stem}}_force.csv", column = "load_cell", unit = "N", {time} }}'
+    (tmp_path / "machine.toml").write_text(
+        machine.replace('force = { column = "load_cell", unit = "N" }', own), encoding="utf-8"
+    )
+    for log in sorted((tmp_path / "edge").glob("*.csv")):
+        log.with_stem(f"{log.stem}_force").write_bytes(log.read_bytes())
+    benchmark = (tmp_path / "benchmark.toml").read_text(encoding="utf-8")
+    (tmp_path / "benchmark.toml").write_text(
+        benchmark.replace("[onset]", '[onset]\nlabels = "labels.csv"'), encoding="utf-8"
+    )
+    (tmp_path / "labels.csv").write_text("recording,start_s,end_s\n01.csv,3.0,3.3\n", encoding="utf-8")
+    files = {item.name: item.role for item in cdtool.protocol(write_protocol(tmp_path)).files}
+    names = set(files)
+    assert files["labels.csv"] == "labels"
+    assert {f"edge/0{number}{end}.csv" for number in (1, 2, 3) for end in ("", "_force")} <= names
+
+
 def test_an_excluded_recording_is_named_and_not_counted(tmp_path):
     write_rig(tmp_path, (*FORCES, half_sine(900.0)))
     more = '[[protocol.exclusion]]\nlogs = ["edge/04.csv"]\nreason = "the rig slipped"'
@@ -126,6 +170,44 @@ def test_a_slow_contact_that_begins_with_the_record_does_not_pass_by_a_wrong_res
     protocol = cdtool.protocol(write_protocol(tmp_path))
     assert protocol.points[0].repetitions[0].verdict.steps[1].peak < 150.0 < reading
     assert kinds(protocol) == ["rest_decides"] * 3
+
+
+@pytest.mark.parametrize(
+    ("slope", "level", "early"),
+    [(2.0, 18.0, 3.0), (5.0, 17.0, 3.0), (1.0, 18.0, 3.0), (20.0, 40.0, 0.5), (15.0, 30.0, 0.55)],
+)
+def test_a_record_that_begins_in_the_middle_of_a_slow_rise_does_not_pass_by_a_wrong_rest(slope, level, early, tmp_path):
+    def rise_and_impact(time):
+        rise = np.where(time < 0.3, np.maximum(level + slope * np.minimum(time, 0.0), 0.0), 0.0)
+        return rise + half_sine(405.0 - level)(time)
+
+    write_rig(tmp_path, (rise_and_impact,) * 3)
+    for path in (tmp_path / "edge").iterdir():
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([header, *rows[round(1000 * (3.0 - early)) :], ""]), encoding="utf-8")
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert protocol.points[0].repetitions[0].curve.peak < 400.0
+    assert protocol.verdict.outcome == "incomplete" and "rest_decides" in kinds(protocol)
+
+
+@pytest.mark.parametrize("early", [0.1, 0.3, 0.5])
+def test_a_trigger_shortly_before_the_contact_and_an_offset_of_the_cell_are_no_slow_rise(early, tmp_path):
+    write_rig(tmp_path, ())
+    for number in (1, 2, 3):
+        path = tmp_path / "edge" / f"{number}.csv"
+        write_log(path, half_sine(390.0), rest=50.0)
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([header, *rows[round(1000 * (3.0 - early)) :], ""]), encoding="utf-8")
+    assert kinds(cdtool.protocol(write_protocol(tmp_path))) == []
+
+
+def test_a_point_without_a_profile_has_one_reason_the_true_one(tmp_path):
+    write_rig(tmp_path, FORCES)
+    path = write_protocol(tmp_path)
+    path.write_text(path.read_text(encoding="utf-8").replace('profile = "en_', '# "'), encoding="utf-8")
+    assert kinds(cdtool.protocol(path)) == kinds_of(check_protocol(path).verdict) == ["no_profile"]
+    path.write_text(path.read_text(encoding="utf-8").replace("repetitions = 3", "repetitions = 4"), encoding="utf-8")
+    assert kinds(cdtool.protocol(path)) == ["no_profile", "too_few_repetitions"]
 
 
 def test_rows_that_the_reader_drops_are_never_a_pass(tmp_path):
@@ -180,6 +262,30 @@ def test_a_copy_of_a_recording_at_another_point_is_no_measurement_of_it(tmp_path
     protocol = cdtool.protocol(path)
     assert (protocol.verdict.outcome, kinds(protocol)) == ("incomplete", ["same_recording"])
     assert protocol.verdict.reasons[0].values == {"point": "other", "recording": "edge/06.csv", "other": "edge/01.csv"}
+
+
+def _with_decimals(rows: list[list[str]]) -> list[list[str]]:
+    return [[*row[:3], f"{float(row[3]):.1f}"] for row in rows]
+
+
+EXPORTS = {
+    "fewer decimals": _with_decimals,
+    "samples cut": lambda rows: rows[37:-5],
+    "every second sample": lambda rows: rows[::2],
+    "times that begin at 12 s": lambda rows: [[f"{float(row[0]) + 12.0:.4f}", *row[1:]] for row in rows],
+}
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_a_measurement_that_was_exported_again_is_no_repetition(name, tmp_path):
+    write_rig(tmp_path, FORCES[:2])
+    header, *rows = (tmp_path / "edge" / "02.csv").read_text(encoding="utf-8").splitlines()
+    written = [",".join(row) for row in EXPORTS[name]([row.split(",") for row in rows])]
+    (tmp_path / "edge" / "third.csv").write_text("\n".join([header, *written, ""]), encoding="utf-8")
+    protocol = cdtool.protocol(write_protocol(tmp_path))
+    assert protocol.verdict.outcome == "incomplete" and "same_measurement" in kinds(protocol)
+    sentence = words_of("en").reasons(protocol.verdict, "incomplete")[0]
+    assert sentence == "edge: edge/02.csv (contact 1) and edge/third.csv (contact 1) hold the same measurement"
 
 
 @pytest.mark.parametrize(
