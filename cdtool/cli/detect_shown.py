@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -40,6 +41,22 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
         _show_force(force)
     if len(forces) > _SHOWN:
         typer.echo(f"estimated force: and {counted(len(forces) - _SHOWN, 'more operation')} (--json has all)")
+
+
+def show_conclusion(done: Sequence[Detected]) -> None:
+    """Print in one line how many operations have which verdict, and what became of the contacts."""
+    detections = [detection for found in done for detection in found.detections]
+    matches = [item for found in done for matching in found.matchings for item in matching.matches]
+    parts = [
+        ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(Counter(names).items()))
+        for names in (
+            [detection.verdict.outcome for detection in detections],
+            [item.outcome for item in matches],
+        )
+    ]
+    words = f"{counted(len(detections), 'operation')}: {parts[0]}" if detections else "no operation"
+    words += f"; {counted(len(matches), 'contact')}: {parts[1]}" if matches else "; no contact"
+    say(words, tone="bad" if any(item.outcome == "missed" for item in matches) else "")
 
 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
