@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli import completions
+from cdtool.cli.colour import Toned
 from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, say, table
 from cdtool.cli.options import (
     ClusterOption,
@@ -136,11 +137,11 @@ def _show_telling(done: Coverage) -> None:
         typer.echo(f"  {item.detector} at {where}: {_why(item)}")
 
 
-def _row(cells: Sequence[Cell]) -> tuple[str, str, str, str]:
+def _row(cells: Sequence[Cell]) -> tuple[object, ...]:
     latencies = [value for cell in cells for value in cell.range_ms if math.isfinite(value)]
     forces = [cell.force_n for cell in cells if math.isfinite(cell.force_n)]
     counts = (sum(cell.contacts for cell in cells), sum(cell.missed for cell in cells))
-    return str(counts[0]), str(counts[1]), _range(latencies), _range(forces)
+    return counts[0], Toned(counts[1], "bad" if counts[1] else ""), _range(latencies), _range(forces)
 
 
 def _why(item: TellingCell) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cdtool.cli.colour import Toned
 from cdtool.cli.console import number, plain, say, table
 from cdtool.cli.contact_rows import contact_as_json
 from cdtool.cli.truth_shown import NEGATIVE
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 _SHOWN, _SECTIONS = 6, 3
 # `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
+# The colours of outcomes.
+_TONES = {"missed": "bad", "not_assessable": "unknown"}
 
 
 def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
@@ -44,7 +47,7 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
 
 
 def show_conclusion(done: Sequence[Detected]) -> None:
-    """Print in one line how many operations have which verdict, and what became of the contacts."""
+    """Print in one line how many operations have which verdict, and how many contacts which outcome."""
     detections = [detection for found in done for detection in found.detections]
     matches = [item for found in done for matching in found.matchings for item in matching.matches]
     parts = [
@@ -83,6 +86,8 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
 
 
 def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
+    from cdtool.workflows.detection import NO_CONTACT
+
     name = detection.operation.name
     latency = {item.alarm: item for item in matching.matches if item.alarm}
     rows: list[tuple[object, ...]] = []
@@ -96,17 +101,19 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
             later = 1e3 * latency[alarm].contact.uncertainty
             missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"
             why = f"{why}; {missing}" if why else missing
-        rows.append((name, "alarm", f"{alarm.time:.3f}", alarm.joint, *figures, why))
+        verdict = Toned("alarm", "bad" if why == NO_CONTACT else "")
+        rows.append((name, verdict, f"{alarm.time:.3f}", alarm.joint, *figures, why))
     for item in matching.matches:
         if not item.alarm:
             outcome = item.outcome.replace("_", " ")
             at = "until" if item.contact.in_progress else "at"
             time = item.contact.end if item.contact.in_progress else item.contact.start
             why = f"contact {at} {time:.3f} s{': ' + item.reason if item.reason else ''}"
-            rows.append((name, outcome, "-", "-", "-", "-", "-", why))
+            rows.append((name, Toned(outcome, _TONES.get(item.outcome, "")), "-", "-", "-", "-", "-", why))
     if not rows:
         outcome = detection.verdict.outcome.replace("_", " ")
-        rows.append((name, outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
+        verdict = Toned(outcome, _TONES.get(detection.verdict.outcome, ""))
+        rows.append((name, verdict, "-", "-", "-", "-", "-", detection.verdict.reason))
     return rows
 
 

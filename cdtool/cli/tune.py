@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli import completions
+from cdtool.cli.colour import Toned
 from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, say, table
 from cdtool.cli.options import ForceOption, JsonOption, QuietOption, listed
 from cdtool.cli.place import Place, location
@@ -144,11 +145,11 @@ def _show(done: Tuning, *, quiet: bool) -> None:
         edges = [item.name for item in tuned.sensitivities if item.is_at_edge]
         text = f"{tuned.short_name}: {settings or 'default settings'}"
         text += f"; at the edge of the search: {', '.join(edges)}" if edges else ""
-        typer.echo(plain(text))
+        say(text)
         if tuned.default_reason:
-            typer.echo(plain(f"  The default cannot be used: {tuned.default_reason}"))
+            say(f"The default cannot be used: {tuned.default_reason}", indent="  ")
         for words in rejection_words(tuned):
-            typer.echo(plain(f"  {words}"))
+            say(words, indent="  ")
     if not quiet:
         say(_meaning(done) + injected_words(done))
 
@@ -171,7 +172,7 @@ def _show_table(done: Tuning) -> None:
                     number(before.groups[group].mean_ms) if before else "-",
                     number(figures.mean_ms),
                     range_words(figures) if interval.reason else f"{number(interval.low)} to {number(interval.high)}",
-                    f"{figures.missed} of {figures.contacts}",
+                    Toned(f"{figures.missed} of {figures.contacts}", "bad" if figures.missed else ""),
                     f"{tuned.honest.alarming} of {tuned.honest.free}" if first else "",
                     alarms_words(tuned.honest) if first else "",
                 )
