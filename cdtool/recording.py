@@ -15,6 +15,7 @@ from cdtool.derived import StoresDerived
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
 from cdtool.html_table import html_table
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class Series(StoresDerived):
     unit: str
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -101,6 +103,7 @@ class TableRows:
     kept: BoolArray | None = None
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     @property
     def count(self) -> int:
@@ -148,6 +151,7 @@ class Recording(StoresDerived):
     label_kinds: tuple[tuple[float, str], ...] = ()
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def __post_init__(self) -> None:
         for name, series in self.channels.items():
@@ -160,6 +164,11 @@ class Recording(StoresDerived):
                     "give one column per joint in [channels], in the order of machine.joints",
                     channel=name,
                 )
+
+    def __getattr__(self, name: str) -> Any:
+        """Say how to reach a channel that is taken for an attribute."""
+        hint = f"; use recording['{name}']" if name in vars(self).get("channels", ()) else ""
+        raise AttributeError(f"Recording has no attribute '{name}'{hint}")
 
     def __contains__(self, channel: str) -> bool:
         return channel in self.channels

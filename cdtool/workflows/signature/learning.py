@@ -21,6 +21,7 @@ from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.plain_text import counted
 from cdtool.remote.remote_path import location
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.signature_store import read_signature, write_signature
@@ -49,6 +50,7 @@ class Learned:
     findings: tuple[RecordingFinding, ...]
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def save(self, path: str | Path) -> None:
         """Write the signature file, as `cdtool learn-signature -o` does; raises SignatureError."""
