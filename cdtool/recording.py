@@ -166,7 +166,7 @@ class Recording(StoresDerived):
                 )
 
     def __getattr__(self, name: str) -> Any:
-        """Say how to reach a channel that is taken for an attribute."""
+        """Raise AttributeError, which says how to read a channel."""
         hint = f"; use recording['{name}']" if name in vars(self).get("channels", ()) else ""
         raise AttributeError(f"Recording has no attribute '{name}'{hint}")
 

@@ -17,7 +17,7 @@ from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
 from cdtool.frozen import frozen
 from cdtool.html_table import html_table
 from cdtool.near_attributes import NearAttributes
-from cdtool.notebook.log_by_name import UnknownLogError, place_of
+from cdtool.notebook.log_by_name import UnknownLogError, number_of
 from cdtool.notebook.presenting import described, presented
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
@@ -263,13 +263,13 @@ class DetectionResults(NearAttributes, Sequence[DetectionResult]):
         """Return a result by number, or by the name of its log or the end of it; of a slice, several."""
         if isinstance(number, slice):
             return DetectionResults(self.runs[number])
-        return self.runs[place_of(str(number), self.names) if isinstance(number, str | PurePath) else number]
+        return self.runs[number_of(str(number), self.names) if isinstance(number, str | PurePath) else number]
 
     def __contains__(self, item: object) -> bool:
         if not isinstance(item, str | PurePath):
             return item in self.runs
         try:
-            place_of(str(item), self.names)
+            number_of(str(item), self.names)
         except UnknownLogError as fault:
             return fault.several
         return True

@@ -15,14 +15,14 @@ class UnknownLogError(UsageError, KeyError):
     several = False
 
 
-def place_of(name: str, logs: Sequence[str]) -> int:
-    """Return the place of the log of that name, or of the only one whose path ends in it.
+def number_of(name: str, logs: Sequence[str]) -> int:
+    """Return the number of the log of that name, or of the only one whose path ends in it.
 
     Raises UnknownLogError with the nearest names, or with those that the name fits.
 
     Examples
     --------
-    >>> place_of("03.csv", ["stiff/02.csv", "stiff/03.csv"])
+    >>> number_of("03.csv", ["stiff/02.csv", "stiff/03.csv"])
     1
     """
     wanted = PurePath(name).parts
