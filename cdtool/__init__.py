@@ -24,7 +24,7 @@ Every command is available as a function:
     cdtool.identify(logs, "machine.toml", "machine.toml")               -> IdentifiedMachine: parameters with errors
     cdtool.inject("benchmark.toml", "injected")                         -> Injected: impacts made from impact-free logs
     cdtool.coverage("benchmark.toml")                                   -> Coverage: latency over position and stiffness
-    cdtool.tune("benchmark.toml", "1/100op")                            -> Tuning: gains, threshold, debounce
+    cdtool.tune("benchmark.toml", "1/100op")                            -> TuningResult: gains, threshold, debounce
     cdtool.info("run.csv", machine="machine.toml")                      -> Info
     cdtool.study_sensors("machine.toml", ...)                           -> SensorStudy
     cdtool.simulate_gate(folder, {"free": 14, "stiff": 30}, seed=1)     -> number of recordings written
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from cdtool.machine_file import MachineFile, read_machine_file
     from cdtool.notebook.benchmark_result import BenchmarkResult, benchmark, read_results, score
     from cdtool.notebook.detection_result import DetectionResult, DetectionResults, detect, detect_runs
+    from cdtool.notebook.reading import read
+    from cdtool.notebook.tuning_result import TuningResult, tune
     from cdtool.pipeline import Detection
     from cdtool.recording import Contact, Recording, Series
     from cdtool.simulation.arm_recordings import write_arm_recordings as simulate_arm
@@ -65,17 +67,15 @@ if TYPE_CHECKING:
     from cdtool.workflows.planning import plan
     from cdtool.workflows.protocol.making import protocol
     from cdtool.workflows.recovering import recover
-    from cdtool.workflows.runs import read_log as read
     from cdtool.workflows.signature.forecasting import forecast_signature
     from cdtool.workflows.signature.learning import learn_signature
     from cdtool.workflows.signature.upkeep import check_signature
     from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
     from cdtool.workflows.study.study import study_sensors
-    from cdtool.workflows.tuning.tuning import tune
 
 _API = {
     "__version__": "cdtool.version:__version__",
-    "read": "cdtool.workflows.runs:read_log",
+    "read": "cdtool.notebook.reading:read",
     "learn_signature": "cdtool.workflows.signature.learning:learn_signature",
     "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
     "forecast_signature": "cdtool.workflows.signature.forecasting:forecast_signature",
@@ -98,7 +98,7 @@ _API = {
     "plan": "cdtool.workflows.planning:plan",
     "info": "cdtool.workflows.information:info",
     "study_sensors": "cdtool.workflows.study.study:study_sensors",
-    "tune": "cdtool.workflows.tuning.tuning:tune",
+    "tune": "cdtool.notebook.tuning_result:tune",
     "simulate_arm": "cdtool.simulation.arm_recordings:write_arm_recordings",
     "simulate_gate": "cdtool.simulation.gate_recordings:write_gate_recordings",
     "read_results": "cdtool.notebook.benchmark_result:read_results",
@@ -107,6 +107,7 @@ _API = {
     "BenchmarkResult": "cdtool.notebook.benchmark_result:BenchmarkResult",
     "DetectionResult": "cdtool.notebook.detection_result:DetectionResult",
     "DetectionResults": "cdtool.notebook.detection_result:DetectionResults",
+    "TuningResult": "cdtool.notebook.tuning_result:TuningResult",
     "Recording": "cdtool.recording:Recording",
     "Series": "cdtool.recording:Series",
     "Contact": "cdtool.recording:Contact",
@@ -140,6 +141,7 @@ __all__ = [
     "Signal",
     "Signature",
     "Status",
+    "TuningResult",
     "Verdict",
     "__version__",
     "benchmark",
@@ -176,7 +178,11 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _API:
-        raise AttributeError(f"module 'cdtool' has no attribute '{name}'")
+        from difflib import get_close_matches
+
+        close = [] if name.startswith("_") else get_close_matches(name, __all__, n=2)
+        hint = f"; did you mean {' or '.join(close)}?" if close else ""
+        raise AttributeError(f"module 'cdtool' has no attribute '{name}'{hint}")
     module, _, attribute = _API[name].partition(":")
     return getattr(import_module(module), attribute)
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.recording import BoolArray, FloatArray
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 
 StatusArray = npt.NDArray[np.uint8]
@@ -67,6 +68,7 @@ class Signal:
     channels: tuple[tuple[str, str], ...] = ()
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     @property
     def valid(self) -> BoolArray:
@@ -164,6 +166,7 @@ class Band:
     upper: FloatArray
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def part(self, rows: slice) -> Band:
         """Return these rows of the band; the band itself for all rows."""

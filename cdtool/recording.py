@@ -15,6 +15,7 @@ from cdtool.derived import StoresDerived
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
 from cdtool.html_table import html_table
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ class Series(StoresDerived):
     unit: str
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def __post_init__(self) -> None:
         time = _frozen(self.time)
@@ -106,6 +108,7 @@ class TableRows:
     kept: BoolArray | None = None
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     @property
     def count(self) -> int:
@@ -153,6 +156,7 @@ class Recording(StoresDerived):
     label_kinds: tuple[tuple[float, str], ...] = ()
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def __post_init__(self) -> None:
         for name, series in self.channels.items():
@@ -165,6 +169,11 @@ class Recording(StoresDerived):
                     "give one column per joint in [channels], in the order of machine.joints",
                     channel=name,
                 )
+
+    def __getattr__(self, name: str) -> Any:
+        """Raise AttributeError, which says how to read a channel."""
+        hint = f"; use recording['{name}']" if name in vars(self).get("channels", ()) else ""
+        raise AttributeError(f"Recording has no attribute '{name}'{hint}")
 
     def __contains__(self, channel: str) -> bool:
         return channel in self.channels

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from difflib import get_close_matches
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,9 @@ from cdtool.errors import CdtoolError, UsageError, nearest
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+
+# A hint has room for so many names.
+_FEW = 10
 
 
 @dataclass(frozen=True)
@@ -148,10 +152,18 @@ class Registry:
             return found[0]
         if found:
             raise UsageError(f"the short name '{name}' belongs to {' and '.join(found)}", "give the full name")
-        hint = nearest(name, [*self.names(plugins=True), *self.short_names, *filter(None, short.values())])
+        hint = self._hint(name, [*self.names(plugins=True), *self.short_names, *filter(None, short.values())])
         # Failures come before the hint: the list of known names is cut at the end of the line.
         told = "; ".join([f"unknown {self.kind} '{name}'", *(item.message for item in broken.values())])
         raise UsageError(told, hint)
+
+    def _hint(self, name: str, known: list[str]) -> str:
+        """Return the nearest known names, or all of them if they are few; then where the list is."""
+        if len(known) <= _FEW:
+            return nearest(name, known)
+        close = get_close_matches(name, sorted(known), n=2, cutoff=0.5)
+        listed = f"cdtool list {self.kind}s shows all"
+        return f"did you mean {' or '.join(close)}? {listed}" if close else listed
 
 
 def entry_points(*, group: str) -> Iterable[EntryPoint]:

@@ -11,7 +11,7 @@ import typer
 from cdtool.cli import completions
 from cdtool.cli.colour import coloured, shows_colour
 from cdtool.cli.console import columns_to_fill, fits_terminal, leave, plain, table
-from cdtool.cli.options import ForceOption, JsonOption
+from cdtool.cli.options import ForceOption, JsonOption, QuietOption
 from cdtool.cli.place import Place, location
 from cdtool.exit_status import Fact
 from cdtool.plain_text import shorten
@@ -72,6 +72,7 @@ def compare(
         ),
     ] = None,
     force: ForceOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare two builds and separate real changes from noise: latency, misses, false alarms, force at the alarm.
@@ -94,22 +95,34 @@ def compare(
     if as_json:
         typer.echo(to_json(found), nl=False)
     else:
-        _show(found)
-        for path in targets:
+        _show(found, quiet=quiet)
+        for path in () if quiet else targets:
             typer.echo(f"written: {plain(path)}")
     leave(facts=found.facts if require_power else set(found.facts) & {Fact.WORSE})
 
 
-def _show(found: BuildComparison) -> None:
-    """Print what is missing from one file, the numbers, each row in words, the differences, and the verdict."""
+def _show(found: BuildComparison, *, quiet: bool) -> None:
+    """Print what is missing from one file, the numbers, each row in words, the differences, and the verdict.
+
+    If `quiet`, of the rows only those that are worse, and no table.
+    """
+    for which, names in (("old", found.only_old), ("new", found.only_new)):
+        for name in names:
+            _say(f"only in {which}, not compared: {name}")
+    if not quiet:
+        _show_table(found)
+    _show_rows([row for row in found.rows if not quiet or _TONES.get(row.outcome) == "bad"])
+    if not quiet:
+        _show_differences(found)
+    _say(found.words, _TONES.get(found.verdict, ""))
+
+
+def _show_table(found: BuildComparison) -> None:
     from cdtool.detectors import DETECTORS
     from cdtool.report.comparison_model import both, contacts_of, ranges_of
     from cdtool.report.few_contacts import EXPLAINED
     from cdtool.report.number_text import NOTHING
 
-    for which, names in (("old", found.only_old), ("new", found.only_new)):
-        for name in names:
-            _say(f"only in {which}, not compared: {name}")
     heads = ("contacts", "latency\nms", "range\nms", "missed", "n.a.", "false\nalarms", "force at\nalarm N")
     columns = [("group", "left"), ("detector", "left"), *((name, "right") for name in heads)]
     figures: tuple[Figure, ...] = ("missed", "not_assessable", "false_alarms", "force_at_alarm_n")
@@ -134,10 +147,16 @@ def _show(found: BuildComparison) -> None:
     if any(row.few for row in found.rows):
         _say(EXPLAINED)
     typer.echo()
-    for rows_alike in _alike(found.rows):
+
+
+def _show_rows(rows: Sequence[BuildRow]) -> None:
+    for rows_alike in _alike(rows):
         first = rows_alike[0]
         alike = ", ".join(shorten(row.detector, 2 * _LONGEST_DETECTOR) for row in rows_alike)
         _say(f"{shorten(first.group, 2 * _LONGEST_GROUP)}, {alike}: {first.words}", _TONES.get(first.outcome, ""))
+
+
+def _show_differences(found: BuildComparison) -> None:
     typer.echo()
     for item in found.changed[:_SHOWN]:
         _say(f"differs: {item.key}: {item.old}, now {item.new}")
@@ -145,7 +164,6 @@ def _show(found: BuildComparison) -> None:
         _say(f"differs: and {len(found.changed) - _SHOWN} more settings")
     for note in found.notes:
         _say(note)
-    _say(found.words, _TONES.get(found.verdict, ""))
 
 
 def _alike(rows: Sequence[BuildRow]) -> list[list[BuildRow]]:

@@ -8,7 +8,7 @@ import typer
 
 from cdtool.cli.console import leave_with, plain, print_json, with_findings
 from cdtool.cli.late_progress import late_progress
-from cdtool.cli.options import FromOption, JsonOption, ToOption, section_of
+from cdtool.cli.options import FromOption, JsonOption, QuietOption, ToOption, section_of
 from cdtool.cli.place import Place, location
 from cdtool.plain_text import counted
 
@@ -37,6 +37,7 @@ def convert(
     from_: FromOption = None,
     to: ToOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Convert a log to another file format without rounding; each channel keeps its own clock, unit and provenance.
@@ -46,7 +47,7 @@ def convert(
     from cdtool.findings.containers import Unverified
     from cdtool.workflows.convert.converting import convert as write
 
-    with late_progress("converting") as advance:
+    with late_progress("converting", quiet=quiet) as advance:
         section = section_of(from_, to)
         done = write(source, output, machine=machine, section=section, force=force, progress=advance)
     if as_json:

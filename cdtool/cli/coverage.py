@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli import completions
-from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
-from cdtool.cli.options import ClusterOption, ForceOption, JobsOption, JsonOption, RetriesOption, TimeoutOption, listed
+from cdtool.cli.colour import Toned
+from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, say, table
+from cdtool.cli.options import (
+    ClusterOption,
+    ForceOption,
+    JobsOption,
+    JsonOption,
+    QuietOption,
+    RetriesOption,
+    TimeoutOption,
+    listed,
+)
 from cdtool.cli.place import Place, location
 from cdtool.plain_text import counted, digits
 
@@ -50,6 +60,7 @@ def coverage(
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
     retries: RetriesOption = 1,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Map where a machine notices contacts: latency, force and misses over position and stiffness of the obstacle.
@@ -62,7 +73,7 @@ def coverage(
 
     targets = output or []
     check_coverage_files(targets, [file], force=force)
-    with progress("coverage") as advance:
+    with progress("coverage", quiet=quiet) as advance:
         done = run(
             file,
             detectors=listed(detectors or ""),
@@ -75,13 +86,23 @@ def coverage(
     if as_json:
         print_json(coverage_summary(done))
     else:
-        _show(done)
-        for target in targets:
+        _show(done, quiet=quiet)
+        for target in () if quiet else targets:
             typer.echo(f"written: {plain(target)}")
     leave(done.skipped)
 
 
-def _show(done: Coverage) -> None:
+def _show(done: Coverage, *, quiet: bool) -> None:
+    from cdtool.report.html.coverage_page import coverage_counts, coverage_headline, coverage_tone
+
+    if not quiet:
+        _show_table(done)
+    say(f"{coverage_headline(done.map)}: {coverage_counts(done.map)}", tone=coverage_tone(done.map))
+    if not quiet:
+        _show_telling(done)
+
+
+def _show_table(done: Coverage) -> None:
     from cdtool.evaluation.coverage_map import CellKey
 
     made = done.map
@@ -102,7 +123,11 @@ def _show(done: Coverage) -> None:
         f"{counted(len(made.positions), 'position')} from {made.positions[0]:g} to {made.positions[-1]:g} {made.unit}"
     )
     means = "least and greatest mean of the positions and brackets"
-    typer.echo(f"{plain(done.machine)}: injected contacts at {places}; {means}")
+    say(f"{done.machine}: injected contacts at {places}; {means}")
+
+
+def _show_telling(done: Coverage) -> None:
+    made = done.map
     telling = made.most_telling()
     if telling:
         typer.echo("a test at the rig would tell most here:")
@@ -112,11 +137,11 @@ def _show(done: Coverage) -> None:
         typer.echo(f"  {item.detector} at {where}: {_why(item)}")
 
 
-def _row(cells: Sequence[Cell]) -> tuple[str, str, str, str]:
+def _row(cells: Sequence[Cell]) -> tuple[object, ...]:
     latencies = [value for cell in cells for value in cell.range_ms if math.isfinite(value)]
     forces = [cell.force_n for cell in cells if math.isfinite(cell.force_n)]
     counts = (sum(cell.contacts for cell in cells), sum(cell.missed for cell in cells))
-    return str(counts[0]), str(counts[1]), _range(latencies), _range(forces)
+    return counts[0], Toned(counts[1], "bad" if counts[1] else ""), _range(latencies), _range(forces)
 
 
 def _why(item: TellingCell) -> str:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli.console import leave, plain, print_error, print_json, print_not_assessable, print_skipped, progress
-from cdtool.cli.detect_shown import as_rows, show_detected
+from cdtool.cli.detect_shown import as_rows, show_conclusion, show_detected
 from cdtool.cli.log_options import LogOptions
 from cdtool.cli.option_groups import with_options
-from cdtool.cli.options import ForceOption, JsonOption, figure_name
+from cdtool.cli.options import ForceOption, JsonOption, QuietOption, figure_name
 from cdtool.cli.place import Place, location
 from cdtool.errors import CdtoolError, OutputError, SignatureError, UsageError
 from cdtool.exit_status import Fact
@@ -42,6 +42,7 @@ def detect(
         typer.Option("--plot", parser=location, help="PNG, SVG or PDF file to draw; a folder for several logs."),
     ] = None,
     force: ForceOption = False,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run one detector over logs and show its alarms.
@@ -65,7 +66,7 @@ def detect(
         into_folder=plot is not None and (plot.is_dir() or not plot.suffix),
     )
     folder = made_folder(plot) if plot and not plot.suffix else nullcontext()
-    with folder, progress("detecting") as advance:
+    with folder, progress("detecting", quiet=quiet) as advance:
         for i, log in enumerate(logs, 1):
             try:
                 run.add(log)
@@ -81,7 +82,7 @@ def detect(
         for item in run.skipped:
             print_error(CdtoolError(item.reason))
         leave(facts=[Fact.NOTHING_USABLE])
-    run.show(as_json=as_json)
+    run.show(as_json=as_json, quiet=quiet)
 
 
 @dataclass
@@ -131,7 +132,7 @@ class _Run:
             raise UsageError(f"--plot names one file for {runs} runs", "give a folder, or name one run as LOG#ID")
         return [name.with_name(f"{name.stem}_{number:03d}{name.suffix}") for number in range(1, runs + 1)]
 
-    def show(self, *, as_json: bool) -> None:
+    def show(self, *, as_json: bool, quiet: bool) -> None:
         """Print the results and exit with their status."""
         from cdtool.evaluation.results import RecordingFinding
         from cdtool.findings import Finding
@@ -145,6 +146,8 @@ class _Run:
         print_skipped(self.skipped, [*learned, *self.findings, *absent])
         if as_json:
             print_json(as_rows(self.done, self.forces))
+        elif quiet:
+            show_conclusion([found for _, found in self.done])
         else:
             show_detected([found for _, found in self.done], self.forces)
             for plot in self.plotted:

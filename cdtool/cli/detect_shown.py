@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from cdtool.cli.colour import Toned
 from cdtool.cli.console import number, plain, say, table
 from cdtool.cli.contact_rows import contact_as_json
 from cdtool.cli.truth_shown import NEGATIVE
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 _SHOWN, _SECTIONS = 6, 3
 # `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
+# The colours of outcomes.
+_TONES = {"missed": "bad", "not_assessable": "unknown"}
 
 
 def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
@@ -40,6 +44,22 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
         _show_force(force)
     if len(forces) > _SHOWN:
         typer.echo(f"estimated force: and {counted(len(forces) - _SHOWN, 'more operation')} (--json has all)")
+
+
+def show_conclusion(done: Sequence[Detected]) -> None:
+    """Print in one line how many operations have which verdict, and how many contacts which outcome."""
+    detections = [detection for found in done for detection in found.detections]
+    matches = [item for found in done for matching in found.matchings for item in matching.matches]
+    parts = [
+        ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(Counter(names).items()))
+        for names in (
+            [detection.verdict.outcome for detection in detections],
+            [item.outcome for item in matches],
+        )
+    ]
+    words = f"{counted(len(detections), 'operation')}: {parts[0]}" if detections else "no operation"
+    words += f"; {counted(len(matches), 'contact')}: {parts[1]}" if matches else "; no contact"
+    say(words, tone="bad" if any(item.outcome == "missed" for item in matches) else "")
 
 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
@@ -66,6 +86,8 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
 
 
 def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
+    from cdtool.workflows.detection import NO_CONTACT
+
     name = detection.operation.name
     latency = {item.alarm: item for item in matching.matches if item.alarm}
     rows: list[tuple[object, ...]] = []
@@ -79,17 +101,19 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
             later = 1e3 * latency[alarm].contact.uncertainty
             missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"
             why = f"{why}; {missing}" if why else missing
-        rows.append((name, "alarm", f"{alarm.time:.3f}", alarm.joint, *figures, why))
+        verdict = Toned("alarm", "bad" if why == NO_CONTACT else "")
+        rows.append((name, verdict, f"{alarm.time:.3f}", alarm.joint, *figures, why))
     for item in matching.matches:
         if not item.alarm:
             outcome = item.outcome.replace("_", " ")
             at = "until" if item.contact.in_progress else "at"
             time = item.contact.end if item.contact.in_progress else item.contact.start
             why = f"contact {at} {time:.3f} s{': ' + item.reason if item.reason else ''}"
-            rows.append((name, outcome, "-", "-", "-", "-", "-", why))
+            rows.append((name, Toned(outcome, _TONES.get(item.outcome, "")), "-", "-", "-", "-", "-", why))
     if not rows:
         outcome = detection.verdict.outcome.replace("_", " ")
-        rows.append((name, outcome, "-", "-", "-", "-", "-", detection.verdict.reason))
+        verdict = Toned(outcome, _TONES.get(detection.verdict.outcome, ""))
+        rows.append((name, verdict, "-", "-", "-", "-", "-", detection.verdict.reason))
     return rows
 
 

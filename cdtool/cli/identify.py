@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdtool.cli import completions
-from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
-from cdtool.cli.options import ForceOption, JobsOption, JsonOption
+from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, say, table
+from cdtool.cli.options import ForceOption, JobsOption, JsonOption, QuietOption
 from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError, nearest
 from cdtool.plain_text import counted, digits
@@ -81,6 +81,7 @@ def identify(
     ] = None,
     force: ForceOption = False,
     jobs: JobsOption = 1,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Identify the model of an axis or robot from impact-free logs, with honest standard errors.
@@ -105,9 +106,9 @@ def identify(
     if by is not None and (loaded or struck) is not None:
         raise UsageError("--by with logs of a payload or of contacts", "identify one machine at a time with them")
     if by is not None:
-        _identify_fleet(logs, machine, by, targets, Workers(jobs), as_json=as_json)
+        _identify_fleet(logs, machine, by, targets, Workers(jobs), as_json=as_json, quiet=quiet)
     else:
-        _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json)
+        _identify_machine(logs, machine, targets, Workers(jobs), loaded or struck, as_json=as_json, quiet=quiet)
 
 
 def _loaded_runs(
@@ -164,13 +165,14 @@ def _identify_machine(
     other_logs: LoadedRuns | ContactLogs | None,
     *,
     as_json: bool,
+    quiet: bool,
 ) -> None:
     from cdtool.report.identification_files import MACHINE, PAGE, write_identification
     from cdtool.workflows.identification.identification_outputs import evidence_of, identification_summary
     from cdtool.workflows.identification.identifying import identify as run
     from cdtool.workflows.runs import find_logs
 
-    with progress("identifying") as advance:
+    with progress("identifying", quiet=quiet) as advance:
         done = run(logs, machine, workers=workers, progress=advance, other_logs=other_logs)
     # The plan of a robot has numbers that only the samples have.
     needs_samples = done.robot is not None or any(target.suffix.lower() == PAGE for target in targets)
@@ -181,29 +183,36 @@ def _identify_machine(
     if as_json:
         print_json(identification_summary(done, evidence, written))
     else:
-        _show(done, evidence, written, targets)
+        _show(done, evidence, written, targets, quiet=quiet)
     leave(done.skipped)
 
 
 def _identify_fleet(
-    logs: Sequence[str], machine: Path, by: str, targets: Sequence[Path], workers: Workers, *, as_json: bool
+    logs: Sequence[str],
+    machine: Path,
+    by: str,
+    targets: Sequence[Path],
+    workers: Workers,
+    *,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     from cdtool.report.identification_files import write_fleet
     from cdtool.workflows.identification.fleet_identification import Division, identify_fleet
     from cdtool.workflows.runs import find_logs
 
-    with progress("identifying") as advance:
+    with progress("identifying", quiet=quiet) as advance:
         fleet = identify_fleet(logs, machine, Division(by), workers=workers, progress=advance)
     write_fleet(fleet, targets, [machine, *find_logs(logs, Path(), "LOGS")])
     print_skipped(fleet.skipped, fleet.findings)
     if as_json:
         print_json(fleet.summary)
     else:
-        _show_fleet(fleet, targets)
+        _show_fleet(fleet, targets, quiet=quiet)
     leave(fleet.skipped)
 
 
-def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path]) -> None:
+def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path], *, quiet: bool) -> None:
     rows = [
         (
             item.machine,
@@ -216,7 +225,7 @@ def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path]) -> None:
         for item in fleet.machines
         for series in item.changed
     ]
-    if rows:
+    if rows and not quiet:
         columns = [("machine", "left"), ("parameter", "left"), ("first", "right"), ("last", "right"), ("unit", "left")]
         table([*columns, ("change in\nstandard errors", "right")], rows)
     changed = sum(bool(item.changed) for item in fleet.machines)
@@ -230,14 +239,19 @@ def _show_fleet(fleet: FleetIdentification, targets: Sequence[Path]) -> None:
 
 
 def _show(
-    done: IdentifiedMachine, evidence: Sequence[JointEvidence], written: Sequence[Path], targets: Sequence[Path]
+    done: IdentifiedMachine,
+    evidence: Sequence[JointEvidence],
+    written: Sequence[Path],
+    targets: Sequence[Path],
+    *,
+    quiet: bool,
 ) -> None:
     runs = counted(len(done.runs), "impact-free run")
     typer.echo(f"{plain(done.machine)}: identified from {runs}")
-    if done.changes:
+    if done.changes and not quiet:
         _show_changes(done)
     if done.robot is not None:
-        _show_robot(done, done.robot, evidence)
+        _show_robot(done, done.robot, evidence, quiet=quiet)
     else:
         for joint in done.joints:
             _show_axis(joint, is_named=len(done.joints) > 1)
@@ -275,7 +289,9 @@ def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Seque
         typer.echo("nothing is written: give -o machine.toml")
 
 
-def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence]) -> None:
+def _show_robot(
+    done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence], *, quiet: bool
+) -> None:
     """Show a table of all joints, what is missing per joint, then what belongs to the whole robot."""
     from cdtool.report.identification_words import words_of_decision
     from cdtool.workflows.identification.robot_evidence import decision_of
@@ -290,8 +306,9 @@ def _show_robot(done: IdentifiedMachine, robot: RobotIdentification, evidence: S
         rows.append([joint.joint, unit, *errors, words_of_decision(decision)])
     headings = ("torque", "old\nfriction", "new\nfriction", "between\nequal runs")
     columns = [("joint", "left"), ("unit", "left"), *((heading, "right") for heading in headings), ("used", "left")]
-    typer.echo("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
-    table(columns, rows)
+    if not quiet:
+        say("RMS of the torque, and of what the model leaves unexplained in parts that were left out of the fit:")
+        table(columns, rows)
     for place, shown in enumerate(evidence):
         _show_robot_joint(done.joints[place], shown)
     _show_whole_robot(done, robot, evidence)

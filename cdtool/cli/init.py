@@ -12,7 +12,7 @@ import typer
 
 from cdtool.cli.console import leave, leave_with, plain, print_json, print_skipped, with_findings
 from cdtool.cli.late_progress import late_progress
-from cdtool.cli.options import JsonOption
+from cdtool.cli.options import JsonOption, QuietOption
 from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
 
@@ -46,6 +46,7 @@ def init(
             metavar="KEY=VALUE",
         ),
     ] = None,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Draft a machine file from a log, or with a folder as output also a benchmark file from several logs.
@@ -64,24 +65,25 @@ def init(
         if len(logs) > 1 or machine is not None:
             what = "--machine" if machine is not None else f"{len(logs)} logs"
             raise UsageError(f"--output is the file {output}, with {what}", "give a folder: -o study")
-        with late_progress("analysing the log"):
+        with late_progress("analysing the log", quiet=quiet):
             drafted = draft(logs[0], output, force=force, csv=settings)
         if as_json:
             print_json(with_findings(drafted))
         else:
-            typer.echo(drafted.text)
+            if not quiet:
+                typer.echo(drafted.text)
             first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
             typer.echo(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
             typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(drafted.path)}")
         _warn(drafted)
         leave_with(drafted.findings)
         return
-    with late_progress("analysing the logs"):
+    with late_progress("analysing the logs", quiet=quiet):
         study = init_study(logs, output, machine=machine, force=force, csv=settings)
     if as_json:
         print_json(asdict(study))
     else:
-        _show(study, logs, output)
+        _show(study, logs, output, quiet=quiet)
     if study.machine:
         _warn(study.machine)
     print_skipped(study.skipped)
@@ -102,10 +104,11 @@ def _settings(given: list[str]) -> dict[str, Any]:
     return values
 
 
-def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
+def _show(study: DraftedStudy, logs: list[Path], output: Path, *, quiet: bool) -> None:
     from cdtool.workflows.init.benchmark_draft import patterns
 
-    typer.echo(study.text)
+    if not quiet:
+        typer.echo(study.text)
     names = [*([study.machine_path] if study.machine else []), study.path, *study.beside]
     typer.echo(
         f"{', '.join(map(plain, names))} written: drafts based on guesses. Check each line marked CHECK, then run"

@@ -8,7 +8,7 @@ import typer
 
 from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
-from cdtool.cli.options import ClusterOption, JobsOption, JsonOption, RetriesOption, TimeoutOption
+from cdtool.cli.options import ClusterOption, JobsOption, JsonOption, QuietOption, RetriesOption, TimeoutOption
 from cdtool.cli.place import Place, location
 from cdtool.plain_text import counted
 
@@ -35,6 +35,7 @@ def inject(
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
     retries: RetriesOption = 1,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Put simulated contacts into impact-free logs: every channel changes as it would, and the onset is exact.
@@ -50,7 +51,7 @@ def inject(
 
     if file_format is not None and file_format not in FORMATS:
         raise UsageError(f"--format is '{file_format}'", nearest(file_format, FORMATS))
-    with progress("injecting") as advance:
+    with progress("injecting", quiet=quiet) as advance:
         done = run(
             file,
             output,

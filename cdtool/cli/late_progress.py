@@ -18,12 +18,13 @@ _AFTER = 1.0
 
 
 @contextmanager
-def late_progress(what: str, after: float = _AFTER) -> Iterator[Progress | None]:
-    """Show the bar of `progress` once the block has taken longer than `after` [s]; yield None without a terminal.
+def late_progress(what: str, after: float = _AFTER, *, quiet: bool = False) -> Iterator[Progress | None]:
+    """Show the bar of `progress` once the block has taken longer than `after` [s].
 
-    The bar only pulses until the total amount of work is known.
+    Without a terminal, or if `quiet`, it yields None and draws nothing. The bar only pulses until the total amount
+    of work is known.
     """
-    if not sys.stderr.isatty():
+    if quiet or not sys.stderr.isatty():
         yield None
         return
     with ExitStack() as drawn:

@@ -22,6 +22,7 @@ from cdtool.cli.options import (
     MachineOption,
     OnsetAboveOption,
     OperationsOption,
+    QuietOption,
     RearmOption,
     RetriesOption,
     TimeoutOption,
@@ -116,6 +117,7 @@ def learn_signature(
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
     retries: RetriesOption = 1,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Learn the normal behaviour for a detector from impact-free runs: a signature or any other threshold.
@@ -140,7 +142,7 @@ def learn_signature(
     own: dict[str, Any] = {"rule": rule, "alignment": align, "force": force}
     own |= {"safety_factor": safety_factor} if safety_factor is not None else {}
     own |= {"sides": sides} if sides is not None else {}
-    with progress("reading runs") as advance:
+    with progress("reading runs", quiet=quiet) as advance:
         learned = learn(
             logs,
             machine_file,
@@ -163,11 +165,11 @@ def learn_signature(
             text = f"{counted(runs, 'run')}{which}, fewer than {ENOUGH_RUNS}: its limits are less certain"
             typer.echo(f"warning: {text}", err=True)
     print_skipped(learned.skipped, learned.findings)
-    _show(learned, output, as_json)
+    _show(learned, output, as_json=as_json, quiet=quiet)
     leave(learned.skipped, learned.findings)
 
 
-def _show(learned: Learned, output: Path, as_json: bool) -> None:
+def _show(learned: Learned, output: Path, *, as_json: bool, quiet: bool) -> None:
     signature = learned.signature
     if as_json:
         print_json(
@@ -195,5 +197,6 @@ def _show(learned: Learned, output: Path, as_json: bool) -> None:
         (signature.detector, motion.described if motion else "any", runs, signature.unit)
         for motion, runs in learned.runs
     ]
-    table([("detector", "left"), ("class", "left"), ("runs", "right"), ("unit", "left")], rows)
+    if not quiet:
+        table([("detector", "left"), ("class", "left"), ("runs", "right"), ("unit", "left")], rows)
     typer.echo(f"{signature.described}; written to {plain(output)}")

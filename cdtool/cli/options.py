@@ -163,7 +163,7 @@ RetriesOption = Annotated[
     int, typer.Option("--retries", min=0, help="How often a log that took too long or ended its worker is tried again.")
 ]
 QuietOption = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print the verdict and what is not met; no tables, no progress.")
+    bool, typer.Option("--quiet", "-q", help="Print the conclusion and what is wrong; no tables, no progress.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 

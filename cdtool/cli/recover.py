@@ -8,6 +8,7 @@ import typer
 
 from cdtool.cli.console import leave, plain
 from cdtool.cli.late_progress import late_progress
+from cdtool.cli.options import QuietOption
 from cdtool.cli.place import Place, location
 from cdtool.exit_status import Fact
 
@@ -18,6 +19,7 @@ def recover(
     unverified: Annotated[
         bool, typer.Option("--unverified", help="Also keep messages without a checksum, marked as such.")
     ] = False,
+    quiet: QuietOption = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
 ) -> None:
     """Write the readable messages of a damaged MCAP file to a clean one, and report what was lost.
@@ -28,7 +30,7 @@ def recover(
     """
     from cdtool.workflows.recovering import recover as write_what_is_left
 
-    with late_progress("recovering") as advance:
+    with late_progress("recovering", quiet=quiet) as advance:
         done = write_what_is_left(log, output, unverified, force=force, progress=advance)
     for finding in done.findings:
         typer.echo(f"{finding.severity}: {plain(finding)}")

@@ -18,6 +18,7 @@ from cdtool.cli.options import (
     JsonOption,
     MachineOption,
     OnsetAboveOption,
+    QuietOption,
     RetriesOption,
     TimeoutOption,
     figure_name,
@@ -128,6 +129,7 @@ def check(
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
+    quiet: QuietOption = False,
     retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -145,7 +147,7 @@ def check(
 
     if plot is not None and not plot.is_dir():
         figure_name(plot, force=force)
-    with progress("reading runs") as advance:
+    with progress("reading runs", quiet=quiet) as advance:
         checked = check_signature(
             file,
             logs,
@@ -162,7 +164,7 @@ def check(
         print_json(checked_as_json(checked))
     else:
         for item in checked.classes:
-            show_class(item)
+            show_class(item, quiet=quiet)
     for path, audit in names:
         from cdtool.report.plots.drift_plot import plot_drift
 
@@ -224,6 +226,7 @@ def forecast(
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
+    quiet: QuietOption = False,
     retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -239,7 +242,7 @@ def forecast(
 
     if plot is not None and not plot.is_dir():
         figure_name(plot, force=force)
-    with progress("reading runs") as advance:
+    with progress("reading runs", quiet=quiet) as advance:
         done = forecast_signature(
             file,
             logs,
@@ -294,6 +297,7 @@ def update(
     jobs: JobsOption = 1,
     cluster: ClusterOption = None,
     timeout: TimeoutOption = None,
+    quiet: QuietOption = False,
     retries: RetriesOption = 1,
     as_json: JsonOption = False,
 ) -> None:
@@ -307,7 +311,7 @@ def update(
     from cdtool.workflows.signature.normal_runs import notes_on
     from cdtool.workflows.signature.upkeep import update_with_runs
 
-    with progress("reading runs") as advance:
+    with progress("reading runs", quiet=quiet) as advance:
         done = update_with_runs(
             file,
             logs,

@@ -113,7 +113,7 @@ def _summary_as_json(summary: SignatureSummary) -> dict[str, Any]:
     return {**asdict(summary), "motion": summary.motion.to_dict()}
 
 
-def show_class(item: CheckedClass) -> None:
+def show_class(item: CheckedClass, *, quiet: bool = False) -> None:
     """Print the result of a check for one class of motion."""
     from cdtool.evaluation.upkeep.summary import summarise_signature
 
@@ -121,7 +121,7 @@ def show_class(item: CheckedClass) -> None:
     if item.coverage:
         _show_coverage(item.coverage)
     if item.drift:
-        _show_drift(item.drift)
+        _show_drift(item.drift, quiet=quiet)
     found = summarise_signature(item.signature, item.first)
     for joint in found.joints:
         if joint.moved > 0.0:
@@ -144,13 +144,15 @@ def _show_coverage(found: Coverage) -> None:
         typer.echo(f"  no limit: and {counted(len(found.gaps) - _SHOWN, 'more section')} (--json has all)")
 
 
-def _show_drift(found: DriftAudit) -> None:
+def _show_drift(found: DriftAudit, *, quiet: bool) -> None:
     from cdtool.evaluation.upkeep.words import verdicts
 
     for joint in found.joints:
         typer.echo(f"season of {counted(len(joint.runs), 'run')}, {plain(joint.joint)}:")
         for verdict in verdicts(joint):
             say(verdict, indent="  ")
+        if quiet:
+            continue
         step = max(1, math.ceil(len(joint.runs) / _SHOWN))
         rows = [
             (

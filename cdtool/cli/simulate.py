@@ -11,7 +11,7 @@ import typer
 
 from cdtool.cli import completions
 from cdtool.cli.console import plain, print_json, progress
-from cdtool.cli.options import JsonOption
+from cdtool.cli.options import JsonOption, QuietOption
 from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError, nearest
 from cdtool.exit_status import statuses_words
@@ -76,6 +76,7 @@ def gate(
     current_offset: CurrentOffsetOption = 0.0,
     acceleration_offset: AccelerationOffsetOption = 0.0,
     warming: WarmingOption = 0.0,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the heavy sliding gate of chapter 5 of the thesis: recordings, machine.toml and benchmark.toml.
@@ -88,7 +89,7 @@ def gate(
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
-    with progress("simulating") as advance:
+    with progress("simulating", quiet=quiet) as advance:
         written = write_gate_recordings(
             output, counts, seed, file_format, advance, references=reference, changed=changed
         )
@@ -112,6 +113,7 @@ def arm(
     current_offset: CurrentOffsetOption = 0.0,
     acceleration_offset: AccelerationOffsetOption = 0.0,
     warming: WarmingOption = 0.0,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the light robot arm of chapter 6 of the thesis: recordings, machine.toml and benchmark.toml.
@@ -124,7 +126,7 @@ def arm(
 
     counts = {"free": free, "holdout": holdout, "stiff": stiff, "soft": soft}
     changed = ChangedMachine(friction, speed, mass, current_offset, acceleration_offset, warming)
-    with progress("simulating") as advance:
+    with progress("simulating", quiet=quiet) as advance:
         written = write_arm_recordings(
             *(output, counts, seed, 1 if trial == 1 else 2, file_format, advance), references=reference, changed=changed
         )
@@ -154,6 +156,7 @@ def season(
     runs_per_day: Annotated[int, typer.Option("--runs-per-day", min=1, help="Runs per day.")] = 4,
     seed: SeedOption = 1,
     file_format: FormatOption = "csv",
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate a season of the sliding gate without impacts: drifting friction, weather, a growing obstruction.
@@ -171,7 +174,7 @@ def season(
         start=_day(start),
         weather=Weather(temperature, temperature_swing),
     )
-    with progress("simulating") as advance:
+    with progress("simulating", quiet=quiet) as advance:
         written = write_gate_season(output, wanted, seed, file_format, advance)
     _report(output, written, {"free": runs}, seed, as_json)
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli import completions
-from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, table
-from cdtool.cli.options import ForceOption, JsonOption, listed
+from cdtool.cli.colour import Toned
+from cdtool.cli.console import leave, number, plain, print_json, print_skipped, progress, say, table
+from cdtool.cli.options import ForceOption, JsonOption, QuietOption, listed
 from cdtool.cli.place import Place, location
 from cdtool.plain_text import counted
 
@@ -79,6 +80,7 @@ def tune(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Decides which recordings assess which others.")] = 0,
     force: ForceOption = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Number of candidates to measure in parallel.")] = 1,
+    quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Tune gains, threshold and debounce at a false-alarm budget, with results on recordings not used for the choice.
@@ -103,11 +105,11 @@ def tune(
         shortest_debounce=1e-3 * shortest_debounce,
         seed=seed,
         workers=Workers(jobs),
-        watch=_watch,
+        watch=_unwatched if quiet else _watch,
     )
     setup = read_benchmark_file(file, detectors=names)
     searches = open_folder(output, setup.inputs, setup.detectors, force=force)
-    with progress("reading") as advance:
+    with progress("reading", quiet=quiet) as advance:
         done = tune_detectors(setup, replace(options, journals=searches, progress=advance))
     written = write_tuning(done, output)
     left_out = [*done.skipped, *(Skipped(name, f"not tuned: {reason}") for name, reason in done.unusable.items())]
@@ -115,8 +117,8 @@ def tune(
     if as_json:
         print_json(tuning_summary(done))
     else:
-        _show(done)
-        for path in written:
+        _show(done, quiet=quiet)
+        for path in () if quiet else written:
             typer.echo(f"written: {plain(path)}")
     leave(left_out)
 
@@ -128,15 +130,32 @@ def _watch(detector: str, count: int, best: str) -> None:
         typer.echo(plain(words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."), err=True)
 
 
-def _show(done: Tuning) -> None:
-    from cdtool.report.html.tuning_page import (
-        alarms_words,
-        debounce_words,
-        injected_words,
-        range_words,
-        rejection_words,
-    )
+def _unwatched(detector: str, count: int, best: str) -> None:
+    pass
+
+
+def _show(done: Tuning, *, quiet: bool) -> None:
+    from cdtool.report.html.tuning_page import injected_words, rejection_words
     from cdtool.workflows.tuning.tuned_files import described_choice
+
+    if not quiet:
+        _show_table(done)
+    for tuned in done.detectors:
+        settings = described_choice(tuned)
+        edges = [item.name for item in tuned.sensitivities if item.is_at_edge]
+        text = f"{tuned.short_name}: {settings or 'default settings'}"
+        text += f"; at the edge of the search: {', '.join(edges)}" if edges else ""
+        say(text)
+        if tuned.default_reason:
+            say(f"The default cannot be used: {tuned.default_reason}", indent="  ")
+        for words in rejection_words(tuned):
+            say(words, indent="  ")
+    if not quiet:
+        say(_meaning(done) + injected_words(done))
+
+
+def _show_table(done: Tuning) -> None:
+    from cdtool.report.html.tuning_page import alarms_words, debounce_words, range_words
 
     rows = []
     for tuned in done.detectors:
@@ -153,7 +172,7 @@ def _show(done: Tuning) -> None:
                     number(before.groups[group].mean_ms) if before else "-",
                     number(figures.mean_ms),
                     range_words(figures) if interval.reason else f"{number(interval.low)} to {number(interval.high)}",
-                    f"{figures.missed} of {figures.contacts}",
+                    Toned(f"{figures.missed} of {figures.contacts}", "bad" if figures.missed else ""),
                     f"{tuned.honest.alarming} of {tuned.honest.free}" if first else "",
                     alarms_words(tuned.honest) if first else "",
                 )
@@ -168,17 +187,6 @@ def _show(done: Tuning) -> None:
     ]
     columns += [("alarming\nfree runs", "right"), ("95 % interval", "right")]
     table(columns, rows, title=f"mean latency at {done.options.budget}, {kind} results")
-    for tuned in done.detectors:
-        settings = described_choice(tuned)
-        edges = [item.name for item in tuned.sensitivities if item.is_at_edge]
-        text = f"{tuned.short_name}: {settings or 'default settings'}"
-        text += f"; at the edge of the search: {', '.join(edges)}" if edges else ""
-        typer.echo(plain(text))
-        if tuned.default_reason:
-            typer.echo(plain(f"  The default cannot be used: {tuned.default_reason}"))
-        for words in rejection_words(tuned):
-            typer.echo(plain(f"  {words}"))
-    typer.echo(_meaning(done) + injected_words(done))
 
 
 def _meaning(done: Tuning) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +26,7 @@ def write_reports(
     """Write all reports and return what to show; a bar until the last figure is written. Raises CdtoolError."""
     from cdtool.report.outputs import write_outputs
 
-    with nullcontext() if quiet or not targets else late_progress("writing reports", AFTER_S) as advance:
+    with late_progress("writing reports", AFTER_S, quiet=quiet or not targets) as advance:
         return write_outputs(report, targets, force=force, inputs=inputs, progress=advance)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.evaluated import Evaluated
@@ -15,9 +15,11 @@ from cdtool.evaluation.results import Results
 from cdtool.evaluation.summary import FIGURES
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.html_table import html_table
-from cdtool.notebook.presenting import presented
+from cdtool.near_attributes import NearAttributes
+from cdtool.notebook.presenting import described, presented
 from cdtool.plain_text import counted, shorten
 from cdtool.remote.remote_path import location
+from cdtool.same_values import equal_by_values
 from cdtool.workflows.benchmark.benchmark import Benchmark
 from cdtool.workflows.benchmark.benchmark import benchmark as run_benchmark
 from cdtool.workflows.benchmark.stored_outcomes import StoreReport
@@ -36,7 +38,7 @@ _SHOWN = ("group", "detector", "detected", "missed", "not assessable", "median [
 
 
 @dataclass(frozen=True, repr=False)
-class BenchmarkResult:
+class BenchmarkResult(NearAttributes):
     """What a benchmark measured: DataFrames, figures and reports.
 
     `contacts`, `false_alarms` and the other frames have a column per field of `results.json`, under the same names,
@@ -70,9 +72,11 @@ class BenchmarkResult:
 
     evaluated: Evaluated
     traces: tuple[Trace, ...] = ()
-    inputs: tuple[Path, ...] = ()
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    stored: StoreReport | None = None
+    inputs: tuple[Path, ...] = field(default=(), compare=False)
+    seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
+    stored: StoreReport | None = field(default=None, compare=False)
+
+    __eq__ = equal_by_values
 
     @classmethod
     def of(cls, done: Benchmark | Score) -> BenchmarkResult:
@@ -232,7 +236,7 @@ class BenchmarkResult:
 
 
 @dataclass(frozen=True)
-class BenchmarkPlots:
+class BenchmarkPlots(NearAttributes):
     """The plots of a benchmark's reports: each a `matplotlib.figure.Figure`, which Jupyter shows without pyplot."""
 
     result: BenchmarkResult
@@ -241,19 +245,19 @@ class BenchmarkPlots:
         """Return the latency of every contact, by group and detector, with the counts to read it with."""
         from cdtool.report.plots.latency_plot import latency_figure
 
-        return _described(latency_figure(self.result.evaluated), "latency of every contact by group and detector")
+        return described(latency_figure(self.result.evaluated), "latency of every contact by group and detector")
 
     def survival(self) -> Figure:
         """Return the share of the contacts that are still undetected over the time since their onset."""
         from cdtool.report.plots.survival_plot import survival_figure
 
-        return _described(survival_figure(self.result.evaluated), "share of the contacts still undetected over time")
+        return described(survival_figure(self.result.evaluated), "share of the contacts still undetected over time")
 
     def amoc(self) -> Figure:
         """Return the median latency against the false alarms, with all limits moved; needs an impact-free group."""
         from cdtool.report.plots.amoc_plot import amoc_figure
 
-        return _described(amoc_figure(self.result.evaluated), "median latency against false alarms")
+        return described(amoc_figure(self.result.evaluated), "median latency against false alarms")
 
     def triggers(self, recording: str | None = None, *, group: str | None = None) -> Figure:
         """Return all detectors below the load-cell curve of one recording.
@@ -288,13 +292,7 @@ class BenchmarkPlots:
             hint = nearest(asked, tuple(known)) if known else "run the benchmark, or keep results.traces.json.gz"
             raise UsageError(f"no curves of '{asked}' were kept" if asked else "no curves were kept", hint)
         trace = most_informative(found)
-        return _described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
-
-
-def _described(figure: Any, description: str) -> Figure:
-    figure.description = description
-    shown: Figure = figure
-    return shown
+        return described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
 
 
 benchmark = presented(

@@ -16,10 +16,13 @@ from cdtool.evaluation.frames import OUTCOMES, rows_as_frame
 from cdtool.evaluation.results import ContactResult, RecordingFinding, Skipped
 from cdtool.frozen import frozen
 from cdtool.html_table import html_table
-from cdtool.notebook.presenting import presented
+from cdtool.near_attributes import NearAttributes
+from cdtool.notebook.log_by_name import UnknownLogError, number_of
+from cdtool.notebook.presenting import described, presented
 from cdtool.pipeline import Detection
 from cdtool.plain_text import counted
 from cdtool.recording import Recording
+from cdtool.same_values import equal_by_values, same_values
 from cdtool.workflows.detection import Detected, DetectedRuns, contact_of, detect_log, detect_log_runs
 from cdtool.workflows.detection_options import DetectionOptions
 from cdtool.workflows.keyword_options import by_keywords
@@ -63,7 +66,7 @@ class OperationRow:
 
 
 @dataclass(frozen=True, repr=False)
-class DetectionResult:
+class DetectionResult(NearAttributes):
     """What a detector says about one log: alarms and contacts as DataFrames, its signal, its figure.
 
     Parameters
@@ -83,6 +86,8 @@ class DetectionResult:
     """
 
     detected: Detected
+
+    __eq__ = equal_by_values
 
     @property
     def recording(self) -> Recording:
@@ -149,9 +154,9 @@ class DetectionResult:
         """Return signal, limits, trigger and load cell over time, as `cdtool detect --plot` draws them; no pyplot."""
         from cdtool.report.plots.detection_plot import detection_figure
 
-        figure = detection_figure(self.detected)
-        figure.description = f"{self.recording.name}: signal, limits, trigger and load cell"  # type: ignore[attr-defined]
-        return figure
+        return described(
+            detection_figure(self.detected), f"{self.recording.name}: signal, limits, trigger and load cell"
+        )
 
     def __repr__(self) -> str:
         return f"DetectionResult({PurePath(self.recording.name).name}, {self._detector}: {', '.join(self._words())})"
@@ -170,8 +175,10 @@ class DetectionResult:
         return _html([self], f"{self._detector} on {self.recording.name}", self.detected.threshold)
 
 
-class DetectionResults(Sequence[DetectionResult]):
+class DetectionResults(NearAttributes, Sequence[DetectionResult]):
     """What a detector says about several logs: a sequence of `DetectionResult`, with the same frames over all of them.
+
+    A log is found by its number or its name: `found[0]`, `found["03.csv"]`.
 
     Parameters
     ----------
@@ -191,6 +198,8 @@ class DetectionResults(Sequence[DetectionResult]):
     DetectionResults(2 logs, momentum: 1 alarm)
     >>> [log.outcome for log in found]
     ['alarm', 'no alarm']
+    >>> found["stiff/03.csv"].outcome
+    'alarm'
     """
 
     def __init__(
@@ -209,6 +218,13 @@ class DetectionResults(Sequence[DetectionResult]):
         return cls(
             runs, [item for log in found for item in log.skipped], [item for log in found for item in log.findings]
         )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DetectionResults):
+            return NotImplemented
+        return same_values((self.runs, self._skipped), (other.runs, other._skipped))
+
+    __hash__ = None  # type: ignore[assignment]
 
     @cached_property
     def alarms(self) -> pd.DataFrame:
@@ -232,14 +248,31 @@ class DetectionResults(Sequence[DetectionResult]):
     def __len__(self) -> int:
         return len(self.runs)
 
+    @property
+    def names(self) -> list[str]:
+        """The name of each log: the path it was given by."""
+        return [run.recording.source or run.recording.name for run in self.runs]
+
     @overload
-    def __getitem__(self, number: int) -> DetectionResult: ...
+    def __getitem__(self, number: int | str | PurePath) -> DetectionResult: ...
 
     @overload
     def __getitem__(self, number: slice) -> DetectionResults: ...
 
-    def __getitem__(self, number: int | slice) -> DetectionResult | DetectionResults:
-        return DetectionResults(self.runs[number]) if isinstance(number, slice) else self.runs[number]
+    def __getitem__(self, number: int | str | PurePath | slice) -> DetectionResult | DetectionResults:
+        """Return a result by number, or by the name of its log or the end of it; of a slice, several."""
+        if isinstance(number, slice):
+            return DetectionResults(self.runs[number])
+        return self.runs[number_of(str(number), self.names) if isinstance(number, str | PurePath) else number]
+
+    def __contains__(self, item: object) -> bool:
+        if not isinstance(item, str | PurePath):
+            return item in self.runs
+        try:
+            number_of(str(item), self.names)
+        except UnknownLogError as fault:
+            return fault.several
+        return True
 
     def __iter__(self) -> Iterator[DetectionResult]:
         return iter(self.runs)

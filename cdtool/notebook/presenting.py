@@ -6,11 +6,20 @@ import inspect
 import re
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _Given = ParamSpec("_Given")
 _Plain = TypeVar("_Plain")
 _Shown = TypeVar("_Shown")
+
+
+def described(figure: Figure, description: str) -> Figure:
+    """Return a figure with a description for readers who do not see it."""
+    figure.description = description  # type: ignore[attr-defined]
+    return figure
 
 
 def presented(

@@ -25,13 +25,14 @@ class Column:
     """A column; `numeric` columns are right-aligned and begin with their largest number when sorted.
 
     `choice`: readers may select one of its values. `below`: where width is scarce, it is shown in small print below the
-    column to its left.
+    column to its left. `names_row`: its cells can be the heading of their row, as a name can and an outcome cannot.
     """
 
     heading: str
     numeric: bool = False
     choice: bool = False
     below: bool = False
+    names_row: bool = True
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,11 @@ class Table:
     def counted_title(self) -> str:
         """The title with the number of rows, also those that are not shown."""
         return f"{self.title} ({len(self.rows) + self.more})"
+
+    @property
+    def row_heading(self) -> int:
+        """The column whose cells are the headings of the rows: the first one that can be."""
+        return next((place for place, column in enumerate(self.columns) if column.names_row), 0)
 
     def cells(self, heading: str) -> list[Cell]:
         """Return the cells below a heading."""

@@ -39,8 +39,8 @@ def signature_name(detector: str) -> str:
     return f"signature_{detector}.json"
 
 
-def open_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] = (), *, force: bool = False) -> Path:
-    """Create the output folder and return that of the searches in it.
+def check_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] = (), *, force: bool = False) -> None:
+    """Check that the files of a tuning may be written into a folder.
 
     Raises UsageError for a folder at a URL, a file of that name, an input in it that would be replaced, or a file that
     `cdtool tune` did not write, unless `force`.
@@ -57,6 +57,11 @@ def open_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] =
     refuse_inputs(kinds, inputs)
     for target, kind in kinds.items():
         refuse_other_kind(target, kind, force=force)
+
+
+def open_folder(folder: Path, inputs: Iterable[Path], detectors: Iterable[str] = (), *, force: bool = False) -> Path:
+    """Create the output folder and return that of the searches in it; raises UsageError (see `check_folder`)."""
+    check_folder(folder, inputs, detectors, force=force)
     try:
         (folder / SEARCH).mkdir(parents=True, exist_ok=True)
     except OSError as fault:

@@ -360,6 +360,10 @@ def same_contact(found: Detected, contact: Contact, alarm: Alarm) -> str:
     return f"same contact, {alarm.joint} again"
 
 
+# Why a false alarm has no latency.
+NO_CONTACT = "no contact"
+
+
 def why_no_contact(found: Detected, alarm: Alarm) -> str:
     """Explain why an alarm without a contact has no latency: no ground truth, ground truth ended, or a false alarm."""
     channel = next((name for name in SHOWS_CONTACTS if name in found.recording), None)
@@ -375,4 +379,4 @@ def why_no_contact(found: Detected, alarm: Alarm) -> str:
         k = int(np.searchsorted(present, alarm.time))
         if k > 0 and present[k] - present[k - 1] > longest_step(present):
             return f"unknown: load-cell samples are missing from {present[k - 1]:.3f} to {present[k]:.3f} s"
-    return "no contact"
+    return NO_CONTACT

@@ -10,6 +10,7 @@ from cdtool.evaluation.explanation.explanation import Explanation, explain_opera
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.machine_file import MachineFile
 from cdtool.pipeline import Detection
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.workflows.detection import Detected, detect_log_runs
 from cdtool.workflows.detection_options import DetectionOptions
@@ -25,6 +26,7 @@ class Explained:
     explanations: tuple[tuple[Explanation, ...], ...]
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     @property
     def events(self) -> list[tuple[Detection, Explanation]]:

@@ -25,6 +25,7 @@ from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.recording import Recording, Series
 from cdtool.remote.remote_path import location
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
@@ -70,6 +71,7 @@ class Info:
     origin: float = 0.0
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
 
 def info(log: str | Path, *, machine: str | Path | MachineFile | None = None) -> Info:

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
+from cdtool.errors import nearest
+
 _Given = ParamSpec("_Given")
 _First = TypeVar("_First")
 _Options = TypeVar("_Options")
@@ -37,6 +39,8 @@ def by_keywords(options: Callable[..., Any], run: Callable[..., Any]) -> Callabl
 
     @wraps(run)
     def call(*values: Any, **named: Any) -> Any:
+        for name in named.keys() - signature.parameters.keys():
+            raise TypeError(f"no parameter '{name}' ({nearest(name, signature.parameters)})")
         given = signature.bind(*values, **named).arguments
         return run(*(given.pop(other.name) for other in others), options(**given))
 

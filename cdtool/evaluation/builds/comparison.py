@@ -33,6 +33,7 @@ from cdtool.evaluation.comparison import SIGNIFICANT, check_significance
 from cdtool.evaluation.results import Results
 from cdtool.exit_status import Fact
 from cdtool.plain_text import counted, shorten
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 
 # Provenance keys of settings that define the results, and where the benchmark file sets them.
@@ -99,6 +100,7 @@ class BuildComparison:
     notes: tuple[str, ...]
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     @property
     def facts(self) -> tuple[Fact, ...]:

@@ -131,10 +131,11 @@ def _open(item: Question, asked: int) -> str:
     """Describe what remains open about a quantity."""
     if item.figure in ("latency_ms", "force_at_alarm_n"):
         what, unit = ("latency", "ms") if item.figure == "latency_ms" else ("force at the alarm", "N")
-        seen = f"{what} {figure(item.old)} {unit} to {figure(item.new)} {unit}"
         if item.detectable == math.inf or math.isnan(item.detectable):
-            return f"{seen}, {item.reason or _too_few(asked)}"
-        return f"{seen}, only a change of {figure(item.detectable)} {unit} would have been shown"
+            # Without its values, which the tables have: of many detectors this is then one sentence.
+            return f"{what} ({item.reason or _too_few(asked)})"
+        change = f"only a change of {figure(item.detectable)} {unit} would have been shown"
+        return f"{what} {figure(item.old)} {unit} to {figure(item.new)} {unit}, {change}"
     what = {"missed": "missed", "not_assessable": "not assessable", "false_alarms": "false alarms"}[item.figure]
     seen = f"{what} {item.old:g} to {item.new:g}"
     if item.left_open == math.inf:

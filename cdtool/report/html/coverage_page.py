@@ -111,9 +111,9 @@ def coverage_html(done: Coverage) -> str:
         data=script_json(_data(made, list(traces))),
         traces=[script_json(item) for item in traces.values()],
         scope=_scope(done),
-        headline=_headline(made),
-        tone=_tone(made),
-        counts=_counts(made),
+        headline=coverage_headline(made),
+        tone=coverage_tone(made),
+        counts=coverage_counts(made),
         certificate=NO_CERTIFICATE,
         maps=[_map(made, name, speed, scale, numbers) for name in made.cells for speed in made.speeds],
         steps=scale.steps,
@@ -160,7 +160,8 @@ def _totals(made: CoverageMap) -> tuple[int, int]:
     return sum(cell.missed for cell in cells), sum(cell.assessable for cell in cells)
 
 
-def _headline(made: CoverageMap) -> str:
+def coverage_headline(made: CoverageMap) -> str:
+    """Return which detectors miss contacts."""
     missed, assessable = _totals(made)
     if not assessable:
         return "No contact is assessable"
@@ -170,12 +171,14 @@ def _headline(made: CoverageMap) -> str:
     return f"Contacts are missed by {', '.join(names)}"
 
 
-def _tone(made: CoverageMap) -> str:
+def coverage_tone(made: CoverageMap) -> str:
+    """Return whether that is good, bad or unknown."""
     missed, assessable = _totals(made)
     return "unknown" if not assessable else "bad" if missed else "good"
 
 
-def _counts(made: CoverageMap) -> str:
+def coverage_counts(made: CoverageMap) -> str:
+    """Return how many contacts each detector misses."""
     parts = []
     for name, cells in made.cells.items():
         missed, assessable = (

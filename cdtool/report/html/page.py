@@ -82,6 +82,6 @@ def _printed(failed: Sequence[Log], of_logs: Mapping[Log, Sequence[int]]) -> str
     if not failed:
         return ""
     plotted = sum(bool(of_logs.get(log)) for log in failed)
-    words = f"{plotted} of {counted(len(failed), 'failed recording')} have trigger plots, which are printed here."
+    words = f"{plotted} of {counted(len(failed), 'failed recording')} have trigger plots."
     left_out = " The others are listed above; no curves were kept of them." if plotted < len(failed) else ""
     return f"{words}{left_out} Detectors that detected the contact are left out where a plot has five others."

@@ -52,6 +52,7 @@ class PageTable:
             "name": self.name,
             "caption": table.title,
             "columns": [_values(column, [row[i] for row in table.rows]) for i, column in enumerate(table.columns)],
+            "row_heading": table.row_heading,
             "rows": len(table.rows),
             "marks": {**marks, "with a trigger plot": list(self.opens)} if marks else {},
             "opens": {str(i): traces for i, traces in self.opens.items()},

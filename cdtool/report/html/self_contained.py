@@ -29,16 +29,21 @@ def page_part(name: str) -> str:
 @cache
 def page_template(name: str) -> Template:
     """Return a template that escapes every text and shows characters that cannot be seen."""
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
     from markupsafe import Markup
 
     def harmless(value: object) -> object:
         return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, finalize=harmless, trim_blocks=True, lstrip_blocks=True
+        loader=FunctionLoader(page_part),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=harmless,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
-    return environment.from_string(page_part(name))
+    return environment.get_template(name)
 
 
 def content_policy(style: str, script: str | None = None) -> str:

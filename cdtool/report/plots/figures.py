@@ -55,7 +55,7 @@ _STYLE: dict[str, object] = {
     "legend.fontsize": 8,
     "legend.frameon": False,
     "lines.linewidth": 1.2,
-    "hatch.linewidth": 0.6,
+    "hatch.linewidth": 0.8,
     "figure.constrained_layout.h_pad": 0.03,
     "figure.constrained_layout.w_pad": 0.05,
 }

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_PALE = "0.72"
 _WORST = "#A3123F"
 _EMPHASISED = 6
 _MOST_CURVES = 100
@@ -142,7 +143,7 @@ def _name_limits(axes: Axes, curves: Sequence[ForceCurve], profile: ForceProfile
 def _draw_curves(axes: Axes, curves: Sequence[ForceCurve]) -> None:
     """Draw the worst contact on top, the next ones grey, the rest paler."""
     for rank, curve in reversed(list(enumerate(curves[:_MOST_CURVES]))):
-        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < _EMPHASISED else (NOT_ASSESSED, 0.5)
+        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < _EMPHASISED else (_PALE, 0.5)
         kept = kept_samples(axes.xaxis.get_transform().transform(curve.time), curve.force, _PIXELS)
         axes.plot(curve.time[kept], curve.force[kept], color=colour, linewidth=width, zorder=4 if rank == 0 else 3)
     worst = curves[0]

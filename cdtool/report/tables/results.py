@@ -53,7 +53,7 @@ def detector_cell(results: Results, detector: str) -> Cell:
 def limits_table(results: Results, *, met: bool) -> Table:
     """Return the limits that are met, or the others, violated ones first."""
     fields: Fields[LimitResult] = (
-        (Column("outcome", choice=True), lambda item: outcome_cell(item.outcome)),
+        (Column("outcome", choice=True, names_row=False), lambda item: outcome_cell(item.outcome)),
         (Column("detector"), lambda item: detector_cell(results, item.detector)),
         (Column("group"), lambda item: name_cell(item.group)),
         (Column("result"), lambda item: Cell(item.figure)),

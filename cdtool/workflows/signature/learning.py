@@ -21,7 +21,7 @@ from cdtool.motion import MotionClass
 from cdtool.operations import Operation
 from cdtool.plain_text import counted
 from cdtool.remote.remote_path import location
-from cdtool.short_repr import short_repr
+from cdtool.same_values import equal_by_values
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds.base import Threshold
@@ -48,7 +48,14 @@ class Learned:
     skipped: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
 
-    __repr__ = short_repr
+    __eq__ = equal_by_values
+
+    def __repr__(self) -> str:
+        classes = ", ".join(
+            f"{motion.described if motion else 'any motion'} from {runs} runs" for motion, runs in self.runs
+        )
+        skipped = f", {len(self.skipped)} left out" if self.skipped else ""
+        return f"Learned({self.signature.detector}, {self.signature.threshold}: {classes}{skipped})"
 
     def save(self, path: str | Path) -> None:
         """Write the signature file, as `cdtool learn-signature -o` does; raises SignatureError."""

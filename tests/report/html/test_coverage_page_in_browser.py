@@ -50,10 +50,10 @@ def test_a_row_and_the_next_button_show_other_trigger_plots(shown: Any) -> None:
     page.execute_script("arguments[0].click()", cell_of(page, "slow: 0.5 m, 10 N/mm"))
     page.execute_script("arguments[0].click()", all_of(page, "#cell-table tr.opens")[1])
     assert texts(page, "#viewer-title") == ["10000_0.5_0.csv"]
-    assert texts(page, "#cell-table tr.open td:first-child") == ["▸ 10000_0.5_0.csv"]
+    assert texts(page, "#cell-table tr.open > :first-child") == ["▸ 10000_0.5_0.csv"]
     page.execute_script("arguments[0].click()", all_of(page, '[data-do="after"]')[0])
     (recording,) = texts(page, "#viewer-title")
-    assert f"▸ {recording}" in texts(page, "#cell-table tr.open td:first-child")
+    assert f"▸ {recording}" in texts(page, "#cell-table tr.open > :first-child")
 
 
 def test_without_trigger_plots_a_cell_lists_its_contacts(shown: Any) -> None:  # noqa: F811
@@ -61,7 +61,7 @@ def test_without_trigger_plots_a_cell_lists_its_contacts(shown: Any) -> None:  #
 
     page = shown(coverage_html(replace(coverage_case(), traces={})))
     page.execute_script("arguments[0].click()", cell_of(page, "slow: 0.5 m, 10 N/mm"))
-    assert texts(page, "#cell-table tbody td:first-child") == ["10000_0.5_1.csv", "10000_0.5_0.csv"]
+    assert texts(page, "#cell-table tbody tr > :first-child") == ["10000_0.5_1.csv", "10000_0.5_0.csv"]
     assert page.get_log("browser") == []
 
 

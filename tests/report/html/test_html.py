@@ -467,7 +467,7 @@ def test_a_report_without_anything_failed_has_no_such_section():
 def test_failed_recordings_without_a_trigger_plot_are_counted(made):
     evaluated, traces = case()
     text = to_html(Report(evaluated, traces[:1]))
-    assert "1 of 25 failed recordings have trigger plots, which are printed here. The others are listed above" in text
+    assert "1 of 25 failed recordings have trigger plots. The others are listed above" in text
 
 
 def luminance(colour: str) -> float:
@@ -490,6 +490,7 @@ def test_texts_and_marks_have_enough_contrast(dark):
         for ground in ("page", "raised", "band"):
             assert contrast(colours[name], colours[ground]) >= 4.5, (name, ground)
     assert contrast(colours["limit"], colours["page"]) >= 3.0
+    assert all(contrast(colours["not-assessed"], colours[ground]) >= 3.0 for ground in ("page", "band"))
 
 
 def test_headings_descend_one_level_at_a_time(made):

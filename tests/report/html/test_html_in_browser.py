@@ -196,12 +196,12 @@ def test_recordings_are_paged_searched_and_filtered(shown):
     all_of(browser, f"{table} .pages button")[-1].click()
     assert len(all_of(browser, f"{table} tbody tr")) == 10
     all_of(browser, f"{table} input[type=search]")[0].send_keys("SOFT/0")
-    assert [name.lstrip("▸ ") for name in texts(browser, f"{table} tbody td:first-child")] == [
+    assert [name.lstrip("▸ ") for name in texts(browser, f"{table} tbody tr > :first-child")] == [
         f"soft/0{i}.csv" for i in range(1, 10)
     ]
     choice = all_of(browser, f"{table} .filters label:last-child option")
     next(item for item in choice if "missed contact" in item.text).click()
-    assert texts(browser, f"{table} tbody td:first-child") == ["soft/01.csv"]
+    assert texts(browser, f"{table} tbody tr > :first-child") == ["soft/01.csv"]
 
 
 def test_of_many_recordings_the_failed_cases_are_found_by_filters_and_shown_with_their_traces(shown, monkeypatch):
@@ -221,9 +221,9 @@ def test_of_many_recordings_the_failed_cases_are_found_by_filters_and_shown_with
     rows = [row.split() for row in texts(browser, f"{table} tbody td:nth-child(n+2):nth-child(-n+4)")]
     assert rows and rows[::3] == [["soft"]] * (len(rows) // 3)
     assert rows[1::3] == [["pure_inertia"]] * (len(rows) // 3) and rows[2::3] == [["missed"]] * (len(rows) // 3)
-    first = texts(browser, f"{table} tbody td:first-child")[0].removeprefix("▸ ")
+    first = texts(browser, f"{table} tbody tr > :first-child")[0].removeprefix("▸ ")
     all_of(browser, f"{table} input[type=search]")[0].send_keys(first[-12:])
-    assert [name.removeprefix("▸ ") for name in texts(browser, f"{table} tbody td:first-child")] == [first]
+    assert [name.removeprefix("▸ ") for name in texts(browser, f"{table} tbody tr > :first-child")] == [first]
     browser.execute_script("arguments[0].click()", all_of(browser, f"{table} tbody tr.opens")[0])
     assert texts(browser, "#viewer-title") == [first]
     assert "missed" in texts(browser, "#viewer-plot text")
@@ -327,7 +327,7 @@ def test_hostile_names_stay_text(shown, kind):
     assert len(all_of(browser, "script")) == len(all_of(browser, 'script[type="application/json"]')) + 1
     name = plain(f"{hostile}stiff/{hostile}01.csv")
     assert texts(browser, "#viewer-title") == [name]
-    assert texts(browser, '[data-table="recordings-table"] tbody td button')[0] == f"▸ {name}"
+    assert texts(browser, '[data-table="recordings-table"] tbody th button')[0] == f"▸ {name}"
 
 
 def test_paper_shows_every_failed_recording_all_rows_and_headings(shown):
@@ -339,9 +339,9 @@ def test_paper_shows_every_failed_recording_all_rows_and_headings(shown):
     assert [len(item.find_elements("css selector", "path.line")) for item in plots] == [2, 2, 2, 2]
     assert {item.get_dom_attribute("viewBox").split()[2] for item in plots} == {"1030"}
     assert len(all_of(browser, '[data-table="recordings-table"] tbody tr')) == 25 > shown_rows
-    assert not all_of(browser, "th button") and not all_of(browser, "details:not([open])")
+    assert not all_of(browser, "thead th button") and not all_of(browser, "details:not([open])")
     browser.execute_script("dispatchEvent(new Event('afterprint'))")
-    assert not all_of(browser, "#printed-plots figure") and all_of(browser, "th button")
+    assert not all_of(browser, "#printed-plots figure") and all_of(browser, "thead th button")
     assert len(all_of(browser, '[data-table="recordings-table"] tbody tr')) == shown_rows
     assert browser.get_log("browser") == []
 
@@ -384,3 +384,42 @@ def test_without_script_every_table_is_there_and_the_plots_say_what_they_need(sh
         assert not any(item.is_displayed() for item in all_of(browser, "svg.plot"))
     finally:
         browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+def report_of_failures(count: int) -> str:
+    """Return a report with so many failed recordings that have a trigger plot; one detector, the worst first."""
+    evaluated, traces = case()
+    results = evaluated.results
+    missed = next(item for item in results.contacts if item.outcome == "missed")
+    logs = [f"soft/{i:03}.csv" for i in range(count)]
+    contacts = tuple(replace(missed, recording=log, peak_force_n=1000.0 - i) for i, log in enumerate(logs))
+    trace = next(item for item in traces if item.group == missed.group and item.contacts)
+    recordings = tuple(replace(results.recordings[0], recording=log, group=missed.group) for log in logs)
+    few = replace(results, contacts=contacts, recordings=recordings, false_alarms=(), forces=(), points=(), limits=())
+    return to_html(Report(evaluate(few), tuple(replace(trace, recording=log) for log in logs)))
+
+
+@pytest.mark.parametrize(("ending", "pages"), [("", 20), ("#print-pages=3", 3), ("#print-pages=all", 45)])
+def test_of_many_failed_recordings_the_worst_are_printed_and_the_others_counted(shown, ending, pages):
+    browser = shown(report_of_failures(45))
+    browser.get(f"{browser.current_url.partition('#')[0]}{ending}")
+    browser.refresh()
+    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+    assert texts(browser, "#printed-plots h3") == [f"soft/{i:03}.csv" for i in range(pages)]
+    words = texts(browser, "#printed-cut")[0]
+    if pages < 45:
+        assert (
+            f"The {pages} worst of 45 trigger plots are printed here. The other {45 - pages} are on the screen" in words
+        )
+    else:
+        assert not words
+
+
+def test_a_reader_chooses_on_how_many_pages_plots_are_printed(shown):
+    browser = shown(report_of_failures(45))
+    choice = ".controls[data-for=print] option"
+    assert texts(browser, choice) == ["at most 20", "at most 50", "at most 100", "all"]
+    all_of(browser, choice)[-1].click()
+    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+    assert len(all_of(browser, "#printed-plots h3")) == 45
+    assert not all_of(shown(report_of_failures(4)), choice)

@@ -18,6 +18,7 @@ from cdtool.report.protocol.document import protocol_document
 from cdtool.report.protocol.html import to_html
 from cdtool.report.protocol.words import words_of
 from tests.report.hostile import HOSTILE
+from tests.report.table_headings import unnamed
 
 GOLDEN = Path(__file__).with_name("golden")
 
@@ -116,3 +117,10 @@ def test_a_mean_just_above_its_limit_is_above_it_in_table_and_reason(protocols):
 
 def test_the_same_protocol_gives_the_same_page(documents):
     assert to_html(documents["fail"]) == to_html(documents["fail"])
+
+
+def test_every_table_is_named_by_the_heading_above_it_and_every_row_by_its_first_cell(documents):
+    page = to_html(documents["fail"])
+    assert unnamed(page) == []
+    ids = re.findall(r' id="([^"]*)"', page)
+    assert len(set(ids)) == len(ids) and set(re.findall(r'aria-labelledby="([^"]*)"', page)) <= set(ids)

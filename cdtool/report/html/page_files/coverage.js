@@ -18,7 +18,7 @@ class ContactList {
       const at = traces[i];
       const kinds = [at >= 0 ? "opens" : "", at >= 0 && at === trace ? "open" : ""];
       const line = make(this.body, "tr", { class: kinds.filter(Boolean).join(" ") });
-      const name = make(line, "td");
+      const name = make(line, "th", { scope: "row" });
       if (at >= 0) {
         make(name, "button", { type: "button" }, `▸ ${recording}`);
         line.addEventListener("click", () => open(at));

@@ -50,7 +50,7 @@ function makeForces(data, viewer) {
 
 /** Show the headings of tables as text or as buttons: on later pages a browser repeats headings without buttons. */
 function headingsForPrint() {
-  const buttons = [...document.querySelectorAll("th button")];
+  const buttons = [...document.querySelectorAll("thead th button")];
   const words = buttons.map((button) => document.createTextNode(button.textContent));
   buttons.forEach((button, i) => button.replaceWith(words[i]));
   return () => buttons.forEach((button, i) => words[i].replaceWith(button));
@@ -60,18 +60,19 @@ function headingsForPrint() {
 function completeForPrint(data, viewer, paged) {
   let folded = [],
     restoreHeadings = () => {};
+  const chosen = makePrintChoice(data);
   addEventListener("beforeprint", () => {
     folded = [...document.querySelectorAll("details:not([open])")];
     for (const part of folded) part.open = true;
     for (const table of paged) table.printing(true);
     restoreHeadings = headingsForPrint();
-    if (viewer) printFailed(data, data.failed.map(viewer.traceAt));
+    if (viewer) printFailed(data, data.failed.map(viewer.traceAt), chosen());
   });
   addEventListener("afterprint", () => {
     for (const part of folded) part.open = false;
     restoreHeadings();
     for (const table of paged) table.printing(false);
-    if (viewer) printFailed(data, []);
+    if (viewer) printFailed(data, [], 0);
   });
 }
 

@@ -167,7 +167,11 @@ class PagedTable {
         column.tones ? column.tones[row] : "",
         words.length > LONGEST_WORD && !words.includes("\n") ? "long" : "",
       ];
-      const cell = make(line, "td", { class: kinds.filter(Boolean).join(" ") });
+      const style = kinds.filter(Boolean).join(" ");
+      const cell =
+        place === this.table.row_heading
+          ? make(line, "th", { scope: "row", class: style })
+          : make(line, "td", { class: style });
       if (place || !traces.length) this.fill(cell, words);
       else this.drawOpener(cell, words, traces);
     });

@@ -1,0 +1,42 @@
+"""Tables of every page: a caption or a name, headings of columns, and one heading in each row."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from cdtool.report.html.coverage_page import coverage_html
+from cdtool.report.html.page import to_html
+from cdtool.report.html.sections_page import PageSection, SectionsPage
+from cdtool.report.table import Cell, Column, Table
+from cdtool.report.writers.base import Report
+from tests.report.html.coverage_case import coverage_case
+from tests.report.html.html_case import case
+from tests.report.table_headings import unnamed
+
+
+def benchmark_page() -> str:
+    return to_html(Report(*case()))
+
+
+def coverage_page() -> str:
+    return coverage_html(coverage_case())
+
+
+def sections_page() -> str:
+    table = Table("one", "One table", (Column("name"), Column("value")), [[Cell("a"), Cell("1")]])
+    return SectionsPage("Kind", "title", "headline", "", "good", (), (PageSection("Section", (table,)),)).html()
+
+
+@pytest.mark.parametrize("page", [benchmark_page, coverage_page, sections_page])
+def test_every_table_has_a_name_and_every_row_a_heading(page):
+    assert unnamed(page()) == []
+
+
+def test_a_row_is_named_by_a_name_and_not_by_an_outcome():
+    page = benchmark_page()
+    table = page[page.index('id="not-met-table"') :]
+    first = re.search(r"<tr>\n(.*?)</tr>", table[table.index("<tbody>") :], re.DOTALL)
+    assert first
+    assert re.search(r'<th scope="row"[^>]*>(quick|slow)', first[1]) and '<td class="bad">violated' in first[1]
