@@ -98,6 +98,17 @@ def test_a_folder_is_replaced_without_an_exchange_of_folders(on_windows, monkeyp
     assert (tmp_path / "report" / "a.md").read_text() == "new" and left(tmp_path) == []
 
 
+def test_an_existing_folder_is_replaced_without_the_mount_points_that_python_311_does_not_know(monkeypatch, tmp_path):
+    def unsupported(self):
+        raise NotImplementedError("Path.is_mount() is unsupported on this system")
+
+    monkeypatch.setattr(Path, "is_mount", unsupported)
+    for text in ("old", "new"):
+        with replaced_folder(tmp_path / "report", lambda _: True) as part:
+            write_text(part / "a.md", text)
+    assert (tmp_path / "report" / "a.md").read_text() == "new"
+
+
 def test_a_journal_is_removed_at_its_end_and_when_it_is_taken_over(on_windows, tmp_path):
     entry = Entry("ab" * 32, "detector", "stiff/1.csv", "momentum", "[1.5]")
     own = Journal(tmp_path)
