@@ -347,7 +347,8 @@ def _has_to_stay(folder: Path) -> bool:
         inside = Path(os.path.realpath(Path.cwd())).is_relative_to(folder)
     except FileNotFoundError:  # the current folder is gone
         inside = False
-    return inside or folder.is_mount() or not os.access(folder.parent, os.W_OK | os.X_OK)
+    # Path.is_mount is not available on Windows before Python 3.12.
+    return inside or os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK)
 
 
 def _flush(path: Path) -> None:

@@ -7,6 +7,7 @@ and a read-only home), kernels are recompiled in each process, and a warning is 
 from __future__ import annotations
 
 import gc
+import os
 import re
 import threading
 import types
@@ -241,6 +242,14 @@ def _signature(item: Kernel) -> Any:
     return eval(item.signature, names)
 
 
+def _why_not_stored(fault: Exception) -> str:
+    """Return which folders cannot be written; numba names only the file of the kernel."""
+    if isinstance(fault, OSError):
+        return str(fault)
+    folder = os.environ.get("NUMBA_CACHE_DIR")
+    return f"NUMBA_CACHE_DIR = {folder}" if folder else "neither that of cdtool nor one below the home folder"
+
+
 def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[..., Any]:
     global _told
     with _no_collection():
@@ -254,8 +263,8 @@ def _compile(item: Kernel, suffix: str, options: dict[str, Any]) -> Callable[...
             if not _told:
                 _told = True
                 warnings.warn(
-                    f"no writable folder for compiled kernels ({fault}); they are compiled in every process. "
-                    "Set NUMBA_CACHE_DIR to a writable folder to avoid the wait.",
+                    f"no writable folder for compiled kernels ({_why_not_stored(fault)}); they are compiled in every "
+                    "process. Set NUMBA_CACHE_DIR to a writable folder to avoid the wait.",
                     UserWarning,
                     stacklevel=4,
                 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -78,6 +79,16 @@ def test_without_a_writable_cache_it_compiles_and_warns_once(no_cache_folder):
     with pytest.warns(UserWarning, match="NUMBA_CACHE_DIR") as told:
         assert (first(1.0), second(1.0)) == (2.0, 3.0)
     assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    ("folder", "named"), [("/cache/numba", "(NUMBA_CACHE_DIR = /cache/numba)"), ("", "(neither that of cdtool nor one")]
+)
+def test_the_warning_names_the_folder_that_cannot_be_written(no_cache_folder, monkeypatch, folder, named):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", folder)
+    with pytest.warns(UserWarning, match=re.escape(named)) as told:
+        assert kernel("float64(float64)")(lambda x: x + 3.0)(1.0) == 4.0
+    assert "\n" not in str(told[0].message)
 
 
 _DEFINE = "from cdtool.kernels import kernel\n@kernel('float64(float64)')\ndef "

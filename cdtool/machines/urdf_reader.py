@@ -65,9 +65,15 @@ def read_urdf(
 def _pinocchio(path: Path) -> Any:
     try:
         return import_module("pinocchio")
-    except ImportError as fault:
+    except ModuleNotFoundError as fault:
         raise ConfigurationError(
             f"{path}: reading a URDF needs pinocchio, which is not installed", "pip install 'cdtool[urdf]'"
+        ) from fault
+    except ImportError as fault:  # a library of the system that the wheel does not contain
+        why = str(fault).partition("\n")[0]
+        raise ConfigurationError(
+            f"{path}: reading a URDF needs pinocchio, which cannot be loaded: {why}",
+            "install the named library (libgomp.so.1 on Debian: apt-get install libgomp1)",
         ) from fault
 
 

@@ -33,7 +33,7 @@ def forget() -> None:
 def note(folder: Path, name: str) -> None:
     """Note in a folder of the first process what this process, a worker, has read."""
     with suppress(OSError):
-        (folder / f"{name}{_SUFFIX}").write_text(f"{_bytes} {_requests}", encoding="ascii")
+        (folder / f"{name}{_SUFFIX}").write_text(f"{_bytes} {_requests}", encoding="ascii", newline="\n")
 
 
 def altogether(folder: Path | None) -> tuple[int, int]:

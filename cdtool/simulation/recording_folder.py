@@ -113,9 +113,9 @@ def _write_all(
             ambient.append((f"{item.group}/{path.name}", date, f"{temperature:.1f}"))
         if progress:
             progress(done, len(planned))
-    (folder / "machine.toml").write_text(bench.machine_toml, encoding="utf-8")
+    (folder / "machine.toml").write_text(bench.machine_toml, encoding="utf-8", newline="\n")
     if not without_benchmark({group: sum(item.group == group for item in planned) for group in GROUPS}):
-        (folder / "benchmark.toml").write_text(_benchmark_toml(planned, bench), encoding="utf-8")
+        (folder / "benchmark.toml").write_text(_benchmark_toml(planned, bench), encoding="utf-8", newline="\n")
     _write_table(folder / "contacts.csv", [("recording", "true_contact_s", "kind"), *contacts])
     if ambient:
         _write_table(folder / "ambient.csv", [("recording", "date", "temperature_c"), *ambient])

@@ -151,4 +151,4 @@ def _write_benchmark(
     onset = {key: value for key, value in given.get("onset", {}).items() if not key.startswith("labels")}
     values["onset"] = {**onset, "labels": CONTACTS}
     text = "# Made by cdtool inject: every contact in [impacts] is simulated and was added to an impact-free log.\n"
-    (folder / "benchmark.toml").write_text(text + tomlkit.dumps(values), encoding="utf-8")
+    (folder / "benchmark.toml").write_text(text + tomlkit.dumps(values), encoding="utf-8", newline="\n")

@@ -410,6 +410,8 @@ def _glob(path: Path) -> Iterator[Path]:
     pattern = path.relative_to(root).as_posix() if path.is_absolute() else str(path)
     if pattern == ".":  # the root or the working folder itself, which is not a log
         return iter(())
+    if path.name == "**":  # folders only: from Python 3.13 on it would match files as well
+        pattern += "/"
     # As in a shell, a name that begins with a dot must be matched explicitly. Incomplete files have such names.
     written_out = set(path.parts)
     return (

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from mcap.reader import NonSeekingReader
 
+from tests.bits import every_value
 from tests.formats.mcap_damage import logs, messages
 from tests.formats.mcap_damage.assembly import assemble, blocks_of
 from tests.formats.mcap_damage.assessment import faults, faults_in, warm_up
@@ -62,8 +63,8 @@ def test_every_kind_of_damage_is_among_the_cases():
 
 def test_a_case_depends_only_on_its_seed_and_number():
     (alone,) = cases(3, 1, 7)
-    assert alone == list(cases(3, 8))[7]
-    assert alone != next(cases(4, 1, 7))
+    assert every_value(alone) == every_value(list(cases(3, 8))[7])
+    assert every_value(alone) != every_value(next(cases(4, 1, 7)))
 
 
 @pytest.mark.parametrize("compression", ["", "lz4", "zstd"])

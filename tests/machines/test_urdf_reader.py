@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cdtool.errors import ConfigurationError
+from cdtool.machines import urdf_reader
 from cdtool.machines.urdf_reader import read_urdf
 from tests.data_folder import UR10E_LOGS
 
@@ -212,6 +213,15 @@ def refused(path: Path, joints=("j",), locked=None) -> ConfigurationError:
     assert "\n" not in str(caught.value)
     assert caught.value.hint
     return caught.value
+
+
+def test_an_installed_pinocchio_that_cannot_be_loaded_is_reported_with_the_missing_library(tmp_path, monkeypatch):
+    def refusing(name):
+        raise ImportError("libgomp.so.1: cannot open shared object file: No such file or directory")
+
+    monkeypatch.setattr(urdf_reader, "import_module", refusing)
+    fault = refused(write(tmp_path, *ARM))
+    assert "cannot be loaded: libgomp.so.1" in fault.message and "libgomp1" in fault.hint
 
 
 def test_without_pinocchio_the_extra_to_install_is_named(tmp_path, monkeypatch):

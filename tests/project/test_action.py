@@ -19,10 +19,12 @@ ROOT = Path(__file__).parents[2]
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
 STEPS = ACTION["runs"]["steps"]
 
-# The calls of `gh api` that the action makes, on comments in a file; with GH_FAILS every call is refused.
+# The calls of `gh api` that the action makes, on comments in a file. With GH_FAILS=read every call is refused, with
+# GH_FAILS=write those that write: the token of a fork may read.
 GH = """
 import json, os, pathlib, sys
-if os.environ.get("GH_FAILS"):
+fails = os.environ.get("GH_FAILS")
+if fails == "read" or fails == "write" and "--method" in sys.argv:
     sys.exit("HTTP 403: Resource not accessible by integration")
 store = pathlib.Path(os.environ["COMMENTS"])
 comments = json.loads(store.read_text()) if store.exists() else []
@@ -165,10 +167,27 @@ def test_a_long_summary_is_shortened_to_what_a_comment_may_have(runner):
     assert len(body) < 65_536 and body.endswith("Shortened: the whole summary is on the page of the job.\n")
 
 
-def test_a_fork_whose_token_may_not_write_gets_a_notice_and_no_failure(runner):
-    runner.environment |= {"SUMMARY": "table\n", "GH_FAILS": "1"}
+@pytest.mark.parametrize(
+    ("fails", "why"), [("read", "cannot be read"), ("write", "a fork, or no pull-requests: write")]
+)
+def test_a_fork_whose_token_may_not_write_gets_a_notice_and_no_failure(runner, fails, why):
+    runner.environment |= {"SUMMARY": "table\n", "GH_FAILS": fails}
     assert runner.all_steps() == 0
-    assert "::notice::" in runner.run("Comment on the pull request").stdout and not runner.comments()
+    (line,) = runner.run("Comment on the pull request").stdout.splitlines()
+    assert line.startswith("::notice::") and why in line and "page of the job" in line
+    assert not runner.comments() and (runner.folder / "step_summary.md").read_text() == "table\n"
+
+
+def test_without_a_pull_request_there_is_no_comment_and_every_other_step_runs():
+    (commenting,) = [item for item in STEPS if "gh api" in item.get("run", "")]
+    assert commenting["if"] == "inputs.comment == 'true' && github.event_name == 'pull_request'"
+    assert [item["name"] for item in STEPS if "if" not in item] == ["Install cdtool", "Benchmark", "Summary", "Status"]
+
+
+def test_every_input_reaches_a_step():
+    text = json.dumps([item.get("env", {}) | item.get("with", {}) | {"if": item.get("if", "")} for item in STEPS])
+    for name in ACTION["inputs"]:
+        assert f"inputs.{name}" in text, name
 
 
 @pytest.mark.parametrize("name", ["$(touch hacked).toml", '"; touch hacked; ".toml', "`touch hacked`", "--json"])

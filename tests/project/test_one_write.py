@@ -49,6 +49,18 @@ def _is_write(call: ast.Call) -> bool:
     )
 
 
+def texts_without_line_ends(tree: ast.AST) -> Iterator[int]:
+    """Return the lines on which text is written to a file and `newline` is not given."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call) or "devnull" in ast.unparse(node.func):
+            continue
+        is_method = isinstance(node.func, ast.Attribute) and node.func.attr == "write_text"
+        modes = {item.value for item in node.args if isinstance(item, ast.Constant)}
+        is_text = _called(node) in ("open", "fdopen") and bool(modes & {"w", "a", "x"})
+        if (is_method or is_text) and "newline" not in {item.arg for item in node.keywords}:
+            yield node.lineno
+
+
 @pytest.mark.parametrize(
     ("code", "count"),
     [
@@ -73,3 +85,30 @@ def test_files_are_written_only_by_the_module_for_it():
         if name != "cdtool/files.py" and not name.startswith("cdtool/formats/"):
             found |= {name for _ in writes(ast.parse(path.read_text(encoding="utf-8")))}
     assert found == set(ELSEWHERE)
+
+
+@pytest.mark.parametrize(
+    ("code", "count"),
+    [
+        ('path.write_text(text, encoding="utf-8")', 1),
+        ('path.open("a", encoding="utf-8")', 1),
+        ('path.write_text(text, encoding="utf-8", newline="\\n")', 0),
+        ('path.open("w", newline="")', 0),
+        ('path.open("wb")', 0),
+        ('path.open(encoding="utf-8")', 0),
+        ("write_text(path, text)", 0),
+        ('Path(os.devnull).open("w")', 0),
+    ],
+)
+def test_text_without_its_line_ends_is_recognised(code, count):
+    assert len(list(texts_without_line_ends(ast.parse(code)))) == count
+
+
+def test_a_text_file_has_the_same_bytes_on_every_system():
+    """Windows would write another line end where none is given."""
+    found = [
+        f"{path.relative_to(ROOT).as_posix()}:{line}"
+        for path in sorted((ROOT / "cdtool").rglob("*.py"))
+        for line in texts_without_line_ends(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert found == []

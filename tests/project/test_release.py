@@ -189,7 +189,9 @@ def test_workflows_pin_their_actions_and_ask_for_few_rights():
         assert "pull_request_target" not in text, name
         for used in re.findall(r"uses: (\S+)", text):
             assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", used), (name, used)
+        assert values["permissions"] in ({"contents": "read"}, {}), name
         for job, content in values["jobs"].items():
+            assert content["timeout-minutes"] <= 90, (name, job)
             rights = content.get("permissions", values.get("permissions"))
             assert isinstance(rights, dict), (name, job)
             for step in content["steps"]:

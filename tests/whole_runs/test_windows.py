@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import os
 import re
 import sys
 from pathlib import Path, PureWindowsPath
@@ -14,6 +15,7 @@ from cdtool import file_locks
 from cdtool.cli import streams
 from cdtool.file_locks import holding, lock_handle
 from cdtool.files import replaced_folder, write_text
+from cdtool.formats.mcap.container import file_bytes
 from cdtool.report.plots.figures import slug
 from cdtool.workflows.execution import processes
 from cdtool.workflows.runs import shown_path
@@ -96,6 +98,17 @@ def test_a_folder_is_replaced_without_an_exchange_of_folders(on_windows, monkeyp
         with replaced_folder(tmp_path / "report", lambda _: True) as part:
             write_text(part / "a.md", text)
     assert (tmp_path / "report" / "a.md").read_text() == "new" and left(tmp_path) == []
+
+
+def test_an_existing_folder_is_replaced_without_the_mount_points_that_python_311_does_not_know(monkeypatch, tmp_path):
+    def unsupported(self):
+        raise NotImplementedError("Path.is_mount() is unsupported on this system")
+
+    monkeypatch.setattr(Path, "is_mount", unsupported)
+    for text in ("old", "new"):
+        with replaced_folder(tmp_path / "report", lambda _: True) as part:
+            write_text(part / "a.md", text)
+    assert (tmp_path / "report" / "a.md").read_text() == "new"
 
 
 def test_a_journal_is_removed_at_its_end_and_when_it_is_taken_over(on_windows, tmp_path):
@@ -196,3 +209,22 @@ def test_every_file_of_the_repository_can_exist_on_every_system():
         assert not FORBIDDEN.search(path.name) and path.name.partition(".")[0].lower() not in DEVICES, shown
         assert seen.setdefault(shown.lower(), path) == path, f"{shown}: the same name in other letters"
         assert len(shown) < 120, f"{shown}: with the folder of a user it is longer than 260 characters"
+
+
+@pytest.mark.parametrize("positioned", [True, False])
+def test_a_large_record_is_read_in_as_many_calls_as_the_system_needs(monkeypatch, tmp_path, positioned):
+    """macOS refuses 2 GiB and more in one call; Windows has no reading from a position."""
+    monkeypatch.setattr(file_bytes, "_MOST_AT_ONCE", 1000)
+    monkeypatch.setattr(file_bytes, "_POSITIONED", positioned)
+    whole = os.preadv
+
+    def refusing(descriptor, views, at):
+        if len(views[0]) > 1000:
+            raise OSError(errno.EINVAL, "Invalid argument")
+        return whole(descriptor, views, at)
+
+    monkeypatch.setattr(os, "preadv", refusing)
+    content = bytes(range(256)) * 40
+    (tmp_path / "a.mcap").write_bytes(content)
+    with file_bytes.FileBytes(tmp_path / "a.mcap") as file:
+        assert bytes(file.read(5, 9000)) == content[5:9005]

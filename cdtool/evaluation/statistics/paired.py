@@ -165,8 +165,10 @@ def unpaired_difference(
         return Difference(mean, math.nan, math.nan, n, k)
     from scipy import stats
 
-    ranks = stats.mannwhitneyu(_means(all_of_a), _means(all_of_b))
-    return Difference(mean, _exchanged_p(first, second, seed), float(ranks.pvalue), n, k)
+    means = _means(all_of_a), _means(all_of_b)
+    # With all means equal, SciPy returns 1 before version 1.18 and NaN from then on.
+    ranks_p = float(stats.mannwhitneyu(*means).pvalue) if np.ptp(np.concatenate(means)) else 1.0
+    return Difference(mean, _exchanged_p(first, second, seed), ranks_p, n, k)
 
 
 def mcnemar_p(only_first: int, only_second: int) -> float:

@@ -11,7 +11,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cdtool.errors import UsageError
+from cdtool.errors import OutputError, UsageError
 from cdtool.files import write_bytes
 from cdtool.plain_text import plain, shorten
 from cdtool.report.number_text import number
@@ -66,8 +66,17 @@ _LONGEST_NAME = 40
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Apply matplotlib's defaults and this project's style within a `with`, whatever the user's matplotlibrc."""
-    import matplotlib
+    """Apply matplotlib's defaults and this project's style within a `with`, whatever the user's matplotlibrc.
+
+    Raises OutputError if matplotlib finds no writable folder.
+    """
+    try:
+        import matplotlib
+    except OSError as fault:
+        raise OutputError(
+            "matplotlib finds no writable folder, neither for its settings nor for temporary files",
+            "set MPLCONFIGDIR to a writable folder",
+        ) from fault
 
     defaults: Any = matplotlib.rcParamsDefault
     settings: Any = {key: defaults[key] for key in defaults if not key.startswith(_NOT_STYLE)} | _STYLE

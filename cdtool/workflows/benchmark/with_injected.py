@@ -55,7 +55,7 @@ def injected_logs(
         raise OutputError(f"{folder}: exists and holds other files", "set another [inject] folder, or remove it")
     with replaced_folder(folder, _may_replace) as part:
         write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
-        (part / _DIGEST).write_text(_digest(setup, section) + "\n", encoding="utf-8")
+        (part / _DIGEST).write_text(_digest(setup, section) + "\n", encoding="utf-8", newline="\n")
     return read_injected(folder)
 
 

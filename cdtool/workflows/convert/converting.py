@@ -115,7 +115,7 @@ def convert(
             written = writer(temporary[i], part, row_progress.of(rows.parts(part)), provenance)
             if machine_file is not None:
                 text = machine_text(machine_file, path, part, written, companions[i])
-                temporary[len(names) + i].write_text(text, encoding="utf-8")
+                temporary[len(names) + i].write_text(text, encoding="utf-8", newline="\n")
     width = sum(len(parts) for group in rows.groups for parts in group.flat)
     made = tuple(map(str, names)), tuple(map(str, companions))
     return Converted(str(log), *made, width, len(rows.groups), tuple(rows.findings))

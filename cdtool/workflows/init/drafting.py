@@ -202,7 +202,7 @@ def _settled(log: Path, draft: Draft) -> Drafted:
         trial = Path(folder) / "draft.toml"
         while True:
             text = draft_text(draft, left_out, turned)
-            trial.write_text(text, encoding="utf-8")
+            trial.write_text(text, encoding="utf-8", newline="\n")
             mapped = tuple(name for name in draft.channels.found if name not in left_out)
             try:
                 findings = info(log, machine=read_machine_file(trial)).findings

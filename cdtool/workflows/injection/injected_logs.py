@@ -294,7 +294,7 @@ def write_injected(
         raise RecordingError(f"no contact can be injected: {reason}", "choose other logs or positions")
     injected = InjectedLogs(folder, cases, skipped)
     machine_toml = next(item.machine_toml for item in done if item.machine_toml)
-    injected.machine_path.write_text(machine_toml, encoding="utf-8")
+    injected.machine_path.write_text(machine_toml, encoding="utf-8", newline="\n")
     _write_manifest(injected)
     return injected
 
@@ -360,7 +360,7 @@ def _write_manifest(injected: InjectedLogs) -> None:
     table = csv.writer(rows, lineterminator="\n")
     table.writerow(("recording", "start_s", "end_s", "kind", "uncertainty_s"))
     table.writerows((case.file, repr(case.start), repr(case.end), case.obstacle, 0) for case in injected.cases)
-    (injected.folder / CONTACTS).write_text(rows.getvalue(), encoding="utf-8")
+    (injected.folder / CONTACTS).write_text(rows.getvalue(), encoding="utf-8", newline="\n")
     manifest = {
         "tool": "cdtool",
         "tool_version": __version__,
@@ -369,7 +369,7 @@ def _write_manifest(injected: InjectedLogs) -> None:
         "skipped": [asdict(item) for item in injected.skipped],
     }
     text = json.dumps(manifest, indent=1, allow_nan=False) + "\n"
-    (injected.folder / MANIFEST).write_text(text, encoding="utf-8")
+    (injected.folder / MANIFEST).write_text(text, encoding="utf-8", newline="\n")
 
 
 def read_injected(folder: Path) -> InjectedLogs:

@@ -22,13 +22,13 @@ class Journal:
         self.known = self._read()
         # A line that was cut off would spoil the next one: what is known is written again.
         lines = [json.dumps({"search": key}), *(_line(*item) for item in self.known.items())]
-        with _explained(path), path.open("w", encoding="utf-8") as file:
+        with _explained(path), path.open("w", encoding="utf-8", newline="\n") as file:
             file.writelines(f"{line}\n" for line in lines)
 
     def add(self, candidate: Candidate, measured: Measured) -> None:
         """Append a measurement."""
         self.known[candidate.key] = measured
-        with _explained(self.path), self.path.open("a", encoding="utf-8") as file:
+        with _explained(self.path), self.path.open("a", encoding="utf-8", newline="\n") as file:
             file.write(f"{_line(candidate.key, measured)}\n")
 
     def _read(self) -> dict[str, Measured]:

@@ -24,6 +24,7 @@ from cdtool.recording import Recording
 from cdtool.thresholds.limit import Limit
 from cdtool.workflows.runs import RunReading, load_runs
 from cdtool.workflows.signature.normal_runs import normal_motions
+from tests.bits import every_value
 
 LOGS = Path(__file__).parents[3] / "sample_logs"
 NINE = Activation(9)
@@ -138,7 +139,7 @@ def test_the_load_cell_is_not_an_input_of_the_cause(gate):
     wild = changed(whole, "force", lambda time, _: 1e4 * np.sin(40.0 * time)[:, np.newaxis])
     found = [explained("gate", item, gate, 300.0) for item in (whole, bare, wild)]
     assert found[0].cause == found[1].cause == found[2].cause
-    assert found[0].moved == found[1].moved == found[2].moved
+    assert len({every_value(item.moved) for item in found}) == 1
 
 
 def test_rows_that_are_missing_right_before_an_alarm_are_named_with_their_number(gate):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import json
 import re
 from dataclasses import replace
@@ -14,7 +15,7 @@ import pytest
 
 from cdtool.activation import Activation
 from cdtool.detection import REASONS, Signal, Status, Verdict
-from cdtool.errors import CdtoolError, UsageError
+from cdtool.errors import CdtoolError, OutputError, UsageError
 from cdtool.evaluation.traces.file import _trace as trace_from
 from cdtool.evaluation.traces.file import as_read, trace_values
 from cdtool.evaluation.traces.trace import ContactOutcome, Trace, make_trace
@@ -366,3 +367,18 @@ def test_a_contact_that_is_detected_during_an_earlier_alarm_begins_its_own_inter
     trace = replace(trace, contacts=(hit,), contact=0, panels=(panel,), view=(first - 0.1, first + 2.0))
     spans = trigger_plot._triggers(trace, panel, trace.view)
     assert np.ravel(sorted(spans)[:2]) == pytest.approx([first, first + 0.3, first + 0.3, again])
+
+
+def test_without_any_writable_folder_for_matplotlib_one_line_names_the_setting(monkeypatch):
+    """As in a container with a read-only file system: matplotlib raises while it is imported."""
+    imported = builtins.__import__
+
+    def read_only(name, *rest):
+        if name == "matplotlib":
+            raise OSError("Matplotlib requires access to a writable cache directory")
+        return imported(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", read_only)
+    with pytest.raises(OutputError, match="no writable folder") as fault, drawing():
+        pass
+    assert "MPLCONFIGDIR" in fault.value.hint

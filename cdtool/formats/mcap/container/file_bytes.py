@@ -20,6 +20,7 @@ from cdtool.remote.ranges import RangedBytes
 from cdtool.remote.remote_path import RemotePath
 
 _PIECE, _SMALL = 1 << 20, 1 << 12
+_MOST_AT_ONCE = 1 << 30  # macOS refuses to read 2 GiB and more in one call
 _POSITIONED = hasattr(os, "preadv")  # reading from a position without moving to it first; not on Windows
 
 
@@ -87,7 +88,7 @@ class FileBytes:
         """Fill `target` with the bytes from `at`; raises DamageError if the file ends before."""
         view, filled = target.data, 0
         while filled < len(view):
-            count = self._fill(view[filled:], at + filled)
+            count = self._fill(view[filled : filled + _MOST_AT_ONCE], at + filled)
             if not count:
                 raise DamageError("the file became shorter while it was read")
             filled += count
