@@ -39,8 +39,9 @@ from cdtool.report.protocol.pressure_parts import (
 )
 from cdtool.report.protocol.words import Words, words_of
 
-# The reasons on the first page: so many lines, with so many characters on each, and those left for a second outcome.
-_FIRST_LINES, _IN_A_LINE, _LEFT_LINES = 18, 95, 6
+# The first page: so many lines for reasons and notices, at least so many for the reasons, and those left for a second
+# outcome; with so many characters on each.
+_FIRST_LINES, _LEAST_LINES, _LEFT_LINES, _IN_A_LINE = 28, 12, 6, 95
 # Names of measuring points on the first page: so many characters.
 _NAMED = 200
 _ALL_REASONS = "all-reasons"
@@ -130,20 +131,24 @@ def _reasons(protocol: Protocol, words: Words) -> list[tuple[str, list[str]]]:
 
 def _first_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
     """Yield the reasons that fit on the first page, at least one of each outcome; the others are referred to."""
-    space = _FIRST_LINES
+    space = max(_LEAST_LINES, _FIRST_LINES - sum(map(_lines, _notices(protocol, words))))
     reasons = _reasons(protocol, words)
     for number, (outcome, sentences) in enumerate(reasons, 1):
         # The first outcome leaves some lines for the second one.
-        ends = accumulate(1 + len(sentence) // _IN_A_LINE for sentence in sentences)
+        ends = accumulate(map(_lines, sentences))
         most = space if number == len(reasons) else space - _LEFT_LINES
         count = max(1, sum(end <= most for end in ends))
-        space -= sum(1 + len(sentence) // _IN_A_LINE for sentence in sentences[:count])
+        space -= sum(map(_lines, sentences[:count]))
         yield Heading(words(f"verdict.why_{outcome}"))
         yield Items(tuple(map(plain, sentences[:count])))
         if count < len(sentences):
             more = len(sentences) - count
             on_paper = words("verdict.more_on_page", count=more, page="{page}")
             yield Reference(words("verdict.more_below", count=more), on_paper, _ALL_REASONS)
+
+
+def _lines(sentence: str) -> int:
+    return 1 + len(sentence) // _IN_A_LINE
 
 
 def _all_reasons(protocol: Protocol, words: Words) -> Iterator[Block]:
