@@ -14,6 +14,7 @@ import typer
 from cdtool.cli.console import leave, plain, print_error, print_json, print_not_assessable, print_skipped, progress
 from cdtool.cli.detect_shown import as_rows, show_conclusion, show_detected
 from cdtool.cli.log_options import LogOptions
+from cdtool.cli.logs_argument import logs_argument
 from cdtool.cli.option_groups import with_options
 from cdtool.cli.options import ForceOption, JsonOption, QuietOption, figure_name
 from cdtool.cli.place import Place, location
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 @with_options
 def detect(
-    logs: Annotated[list[Place], typer.Argument(parser=location, help="Recordings to analyse.", metavar="LOG...")],
+    logs: Annotated[list[Place], logs_argument("Recordings to analyse.")],
     options: LogOptions,
     contact_at: Annotated[
         str, typer.Option("--contact-at", help="Robots: estimate the force at LINK:X,Y,Z (m, in the link's frame).")

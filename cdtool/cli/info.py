@@ -8,6 +8,7 @@ import typer
 
 from cdtool.cli import completions
 from cdtool.cli.console import leave_with, number, plain, print_error, print_json, table, with_findings
+from cdtool.cli.logs_argument import logs_argument
 from cdtool.cli.options import JsonOption
 from cdtool.cli.place import Place, location
 from cdtool.errors import CdtoolError
@@ -18,9 +19,7 @@ if TYPE_CHECKING:
 
 
 def info(
-    logs: Annotated[
-        list[Place], typer.Argument(parser=location, help="Recordings: CSV, MCAP, MAT and more.", metavar="LOG...")
-    ],
+    logs: Annotated[list[Place], logs_argument("Recordings: CSV, MCAP, MAT and more.")],
     machine: Annotated[
         Place | None,
         typer.Option(

@@ -12,6 +12,7 @@ import typer
 
 from cdtool.cli.console import leave, leave_with, plain, print_json, print_skipped, with_findings
 from cdtool.cli.late_progress import late_progress
+from cdtool.cli.logs_argument import logs_argument
 from cdtool.cli.options import JsonOption, QuietOption
 from cdtool.cli.place import Place, location
 from cdtool.errors import UsageError
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def init(
-    logs: Annotated[list[Place], typer.Argument(parser=location, help="Recordings of one machine.", metavar="LOG...")],
+    logs: Annotated[list[Place], logs_argument("Recordings of one machine.")],
     output: Annotated[
         Place,
         typer.Option(

@@ -10,6 +10,7 @@ import typer
 
 from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress, table
+from cdtool.cli.logs_argument import logs_argument
 from cdtool.cli.options import (
     ClusterOption,
     DebounceOption,
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 def learn_signature(
     logs: Annotated[
         list[Place],
-        typer.Argument(parser=location, help="Impact-free recordings, 10 or more per class.", metavar="LOG..."),
+        logs_argument("Impact-free recordings, 10 or more per class."),
     ],
     machine: MachineOption,
     output: Annotated[Place, typer.Option("--output", "-o", parser=location, help="Signature file to write (.json).")],

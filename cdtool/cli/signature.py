@@ -11,6 +11,7 @@ import typer
 
 from cdtool.cli import completions
 from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
+from cdtool.cli.logs_argument import logs_argument
 from cdtool.cli.options import (
     ClusterOption,
     ForceOption,
@@ -107,11 +108,7 @@ def check(
     file: FileArgument,
     logs: Annotated[
         list[Place],
-        typer.Argument(
-            parser=location,
-            help="Impact-free recordings: the runs learned from and later ones, in order.",
-            metavar="LOG...",
-        ),
+        logs_argument("Impact-free recordings: the runs learned from and later ones, in order."),
     ],
     machine: MachineOption,
     operations: CutOption = None,
@@ -180,11 +177,7 @@ def forecast(
     file: FileArgument,
     logs: Annotated[
         list[Place],
-        typer.Argument(
-            parser=location,
-            help="Impact-free recordings of a season; runs learned from are not used.",
-            metavar="LOG...",
-        ),
+        logs_argument("Impact-free recordings of a season; runs learned from are not used."),
     ],
     machine: MachineOption,
     ambient: Annotated[
@@ -279,9 +272,7 @@ def forecast(
 @signature.command("update", epilog=statuses_words("signature update"))
 def update(
     file: FileArgument,
-    logs: Annotated[
-        list[Place], typer.Argument(parser=location, help="Impact-free recordings to add.", metavar="LOG...")
-    ],
+    logs: Annotated[list[Place], logs_argument("Impact-free recordings to add.")],
     machine: MachineOption,
     operations: CutOption = None,
     forget: Annotated[

@@ -54,7 +54,7 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
     """
     found: dict[Path, None] = {}
     for pattern in patterns:
-        matches = _matches(base, pattern)
+        matches = matching_logs(base, pattern)
         of_runs = [] if matches else _runs_matching(pattern, base)
         if not matches and not (runs and of_runs):
             hint = 'to name runs of a file, set operations = "column:NAME"' if of_runs else "check the path"
@@ -65,7 +65,7 @@ def find_logs(patterns: Iterable[str], base: Path, key: str, *, runs: bool = Fal
     return list(found)
 
 
-def _matches(base: Path, pattern: str) -> list[Path]:
+def matching_logs(base: Path, pattern: str) -> list[Path]:
     """Return the log of that name below `base`, or those that match the pattern; the name of `base` is no pattern."""
     path = joined(base, pattern)
     if path.is_file() or is_bag_folder(path):
@@ -76,7 +76,7 @@ def _matches(base: Path, pattern: str) -> list[Path]:
 def _runs_matching(pattern: str, base: Path) -> list[Path]:
     """Return FILE#IDS for each file that the part before a # names; a file name may contain the mark, too."""
     for place in (i for i, character in enumerate(pattern) if character == "#"):
-        if files := _matches(base, pattern[:place]):
+        if files := matching_logs(base, pattern[:place]):
             return [location(f"{file}{pattern[place:]}") for file in files]
     return []
 

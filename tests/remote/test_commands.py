@@ -203,3 +203,19 @@ def test_a_rosbag2_folder_at_a_url_is_one_log(memory, tmp_path):
     here, there = api.read(folder, MACHINE), api.read("memory://bag", MACHINE)
     assert list(here.channels) == list(there.channels) and here.digest == there.digest
     assert there.source == "memory://bag" and there.name == here.name
+
+
+@pytest.mark.parametrize("pattern", ["free/*.csv", "free/0[1-5].csv", "**/free/*.csv"])
+def test_a_pattern_of_a_url_names_the_logs_that_a_shell_would_name_in_a_folder(gate, tmp_path, pattern):
+    names = sorted((GATE / "free").glob("0[1-5].csv" if "[" in pattern else "*.csv"))
+    learn = ("learn-signature", "-m", MACHINE, "-d", "gm", "--force", "-o")
+    by_pattern = cdtool(*learn, tmp_path / "a.json", f"{gate}/{pattern}")
+    by_name = cdtool(*learn, tmp_path / "b.json", *(f"{gate}/free/{path.name}" for path in names))
+    assert by_pattern.status == by_name.status == 0
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def test_a_pattern_of_a_url_without_a_match_is_a_missing_file(gate):
+    done = cdtool("info", f"{gate}/fre/*.csv")
+    assert done.status == 2
+    assert f"{gate}/fre/*.csv: no such file" in done.err
