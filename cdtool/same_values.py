@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from numbers import Number
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,9 @@ def same_values(first: Any, second: Any) -> bool:
         )
     if isinstance(first, Sequence) and not isinstance(first, str | bytes):
         return type(first) is type(second) and len(first) == len(second) and all(map(same_values, first, second))
-    return bool(first == second) or (isinstance(first, float) and first != first and second != second)
+    return bool(first == second) or (
+        isinstance(first, Number | np.generic) and bool(first != first and second != second)
+    )
 
 
 def equal_by_values(self: Any, other: object) -> bool:

@@ -93,8 +93,10 @@ def leave(
     items = len({item.recording for item in skipped})
     parts = [f"{counted(items, 'item', 'were')} left out"] if items else []
     parts += [f"{counted(logs, 'log', 'are')} damaged"] if logs else []
+    facts = tuple(facts)
     if parts:
-        typer.echo(f"done, but {' and '.join(parts)}", err=True)
+        start = "nothing can be used:" if Fact.NOTHING_USABLE in facts else "done, but"
+        typer.echo(f"{start} {' and '.join(parts)}", err=True)
     found = [*facts, *([Fact.LEFT_OUT] if items else []), *([Fact.LOST] if logs else [])]
     status = status_of(found)
     if status:

@@ -263,7 +263,10 @@ class DetectionResults(NearAttributes, Sequence[DetectionResult]):
         """Return a result by number, or by the name of its log or the end of it; of a slice, several."""
         if isinstance(number, slice):
             return DetectionResults(self.runs[number])
-        return self.runs[number_of(str(number), self.names) if isinstance(number, str | PurePath) else number]
+        if isinstance(number, str | PurePath):
+            left_out = {item.recording: item.reason for item in self._skipped}
+            return self.runs[number_of(str(number), self.names, left_out)]
+        return self.runs[number]
 
     def __contains__(self, item: object) -> bool:
         if not isinstance(item, str | PurePath):

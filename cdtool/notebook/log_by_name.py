@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import PurePath
 
@@ -15,10 +15,11 @@ class UnknownLogError(UsageError, KeyError):
     several = False
 
 
-def number_of(name: str, logs: Sequence[str]) -> int:
+def number_of(name: str, logs: Sequence[str], left_out: Mapping[str, str] | None = None) -> int:
     """Return the number of the log of that name, or of the only one whose path ends in it.
 
-    Raises UnknownLogError with the nearest names, or with those that the name fits.
+    `left_out` are logs without a result, with the reason. Raises UnknownLogError with that reason, with the nearest
+    names, or with those that the name fits.
 
     Examples
     --------
@@ -27,9 +28,7 @@ def number_of(name: str, logs: Sequence[str]) -> int:
     """
     wanted = PurePath(name).parts
     exact = [place for place, log in enumerate(logs) if log == name]
-    found = exact or [
-        place for place, log in enumerate(logs) if wanted and PurePath(log).parts[-len(wanted) :] == wanted
-    ]
+    found = exact or [place for place, log in enumerate(logs) if _ends_in(log, wanted)]
     if len(found) == 1:
         return found[0]
     if found:
@@ -37,7 +36,19 @@ def number_of(name: str, logs: Sequence[str]) -> int:
         fault = UnknownLogError(f"{len(found)} logs are named '{name}'", f"give more of the path or the number: {same}")
         fault.several = True
         raise fault
+    reason = next((reason for log, reason in (left_out or {}).items() if _ends_in(log, wanted)), None)
+    raise UnknownLogError(
+        f"no log '{name}' in these results", f"it was left out: {reason}" if reason else _near(name, logs)
+    )
+
+
+def _ends_in(log: str, wanted: tuple[str, ...]) -> bool:
+    return bool(wanted) and PurePath(log).parts[-len(wanted) :] == wanted
+
+
+def _near(name: str, logs: Sequence[str]) -> str:
+    if not logs:
+        return "they are empty"
     ends = [PurePath(log).name for log in logs]
     close = get_close_matches(PurePath(name).name, dict.fromkeys(ends), n=2, cutoff=0.5)
-    hint = f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(dict.fromkeys(ends))}"
-    raise UnknownLogError(f"no log '{name}' in these results", hint)
+    return f"did you mean {' or '.join(close)}?" if close else f"known: {', '.join(dict.fromkeys(ends))}"

@@ -15,6 +15,7 @@ from cdtool.near_attributes import NearAttributes
 from cdtool.notebook.presenting import described, presented
 from cdtool.plain_text import counted
 from cdtool.remote.remote_path import location
+from cdtool.same_values import equal_by_values
 from cdtool.tuning.tuned import TunedDetector
 from cdtool.workflows.tuning.tuning import Tuning
 from cdtool.workflows.tuning.tuning import tune as run_tune
@@ -35,6 +36,8 @@ class TuningResult(NearAttributes):
     """
 
     tuning: Tuning
+
+    __eq__ = equal_by_values
 
     @property
     def detectors(self) -> tuple[TunedDetector, ...]:

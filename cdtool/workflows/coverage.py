@@ -12,6 +12,7 @@ from cdtool.evaluation.coverage_map import CellKey, CoverageMap, MappedContact, 
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.traces.choice import MOST_SAMPLED, MOST_SLOW
 from cdtool.evaluation.traces.trace import Trace
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.workflows.benchmark.benchmark import benchmark
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, read_benchmark_file, with_detectors
@@ -42,6 +43,7 @@ class Coverage:
     inputs: tuple[Path, ...] = ()
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
 
 def coverage(

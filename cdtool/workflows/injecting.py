@@ -14,6 +14,7 @@ from cdtool.ingest.reading import read_as_logged
 from cdtool.log_names import log_stem
 from cdtool.log_section import LogSection
 from cdtool.remote.remote_path import location
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.tables import read_toml
 from cdtool.version import __version__
@@ -38,6 +39,7 @@ class Injected:
     copied: int
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     @property
     def skipped(self) -> tuple[Skipped, ...]:

@@ -54,6 +54,32 @@ def test_results_and_recordings_are_equal_after_pickling_and_copying(found):
     assert found == cdtool.detect(LOGS, MACHINE, detector="gm", limit=[400.0])
 
 
+def test_a_check_and_an_identification_are_compared_by_their_contents(tmp_path):
+    free = sorted((GATE / "free").iterdir())
+    cdtool.learn_signature(free, MACHINE, "gm").save(tmp_path / "gm.json")
+    values = (
+        cdtool.check_signature(tmp_path / "gm.json", free, MACHINE),
+        cdtool.identify(free, MACHINE, tmp_path / "identified.toml"),
+    )
+    for value in values:
+        assert pickle.loads(pickle.dumps(value)) == value == copy.deepcopy(value)
+    assert values[0] != replace(values[0], skipped=("one",))
+
+
+def test_a_log_that_was_left_out_is_answered_with_the_reason(tmp_path):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("a,b\n", encoding="utf-8")
+    found = cdtool.detect([LOG, broken], MACHINE, detector="gm", limit=[400.0])
+    with pytest.raises(KeyError, match=r"no log 'broken\.csv' in these results \(it was left out: .*broken\.csv"):
+        found["broken.csv"]
+    assert "broken.csv" not in found and found.skipped.recording.tolist() == [str(broken)]
+
+
+def test_a_name_in_results_without_a_log_is_answered_in_words(found):
+    with pytest.raises(KeyError, match=r"no log '03\.csv' in these results \(they are empty\)"):
+        found[:0]["03.csv"]
+
+
 def test_one_changed_sample_makes_two_channels_different():
     series = Series(np.arange(3.0), np.array([[1.0], [np.nan], [2.0]]), "m")
     assert series == Series(series.time.copy(), series.values.copy(), "m")
@@ -65,6 +91,9 @@ def test_one_changed_sample_makes_two_channels_different():
     ("first", "second", "same"),
     [
         (float("nan"), float("nan"), True),
+        (np.float32("nan"), np.float32("nan"), True),
+        (complex("nan"), complex("nan"), True),
+        (float("nan"), 1.0, False),
         ([1, 2], (1, 2), False),
         ({"a": [1]}, {"a": [1]}, True),
         ({"a": 1}, {"b": 1}, False),

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from dataclasses import replace
+
 import pytest
 
 import cdtool
@@ -18,6 +22,11 @@ def test_it_is_one_line_and_a_frame_with_a_row_per_detector_and_group(tuned):
     assert tuned.summary().group.tolist() == ["stiff", "soft"] and tuned.best.detector == "momentum"
     assert "<caption>Tuned at 1/2op" in tuned._repr_html_()
     assert tuned.skipped.columns.tolist() == ["recording", "reason"] and dict(tuned.unusable) == {}
+
+
+def test_it_is_equal_to_its_copies(tuned):
+    assert pickle.loads(pickle.dumps(tuned)) == tuned == copy.deepcopy(tuned)
+    assert tuned != replace(tuned, tuning=replace(tuned.tuning, skipped=("one",)))
 
 
 def test_its_figures_are_drawn_as_in_the_report(tuned):

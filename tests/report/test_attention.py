@@ -52,6 +52,14 @@ def test_a_slow_contact_is_listed_only_if_it_violates_a_limit(results):
     assert table.rows[0][2].text == "momentum: contact 1 is detected after 90 ms (gm.stiff.p95_ms: at most 50)"
 
 
+def test_of_recordings_that_are_only_slow_the_slowest_is_the_worst(results):
+    late = {"a": 60.0, "b": 70.0, "c": 90.0, "d": 65.0}
+    rows = tuple(contact("momentum", "stiff", latency, name=name) for name, latency in late.items())
+    slow = replace(results, contacts=rows, false_alarms=(), recordings=())
+    limit = LimitRule("gm.stiff.max_ms", "momentum", "stiff", "max_ms", largest=50.0)
+    assert names_of(evaluate(slow, [limit]).results) == ["c", "b", "d", "a"]
+
+
 def test_detectors_have_short_names_and_a_miss_by_all_is_one_word(results):
     rows = [contact(name, "stiff", None, "missed", "a") for name in results.detectors]
     rows.append(contact("friction_ekf", "stiff", None, "missed", "b"))

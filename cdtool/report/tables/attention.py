@@ -1,8 +1,8 @@
 """What needs attention: the recordings that violate a limit, are missed, raise false alarms or exceed a force limit.
 
 Conventions: the worst recording comes first: force limits exceeded, then the number of detectors that missed a contact,
-then the peak force, violated limits, false alarms. Recordings of changed conditions are listed only if they violate a
-limit: they count in nothing else.
+then the peak force, violated limits, false alarms, and the longest latency of a detector that violates a limit.
+Recordings of changed conditions are listed only if they violate a limit: they count in nothing else.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ class FailedRecording:
 
     `missed`, `false_alarms` and `violated`: by detector the number of contacts and alarms, and its part in violated
     limits. `force`: the contact with the highest peak of those above their limits. `peak_n`: of the missed contacts.
+    `latest_ms`: the longest latency of the detectors with a part in a violated limit.
     """
 
     log: Log
@@ -33,13 +34,15 @@ class FailedRecording:
     violated: dict[str, tuple[str, ...]] = field(default_factory=dict)
     force: ForceResult | None = None
     peak_n: float = 0.0
+    latest_ms: float = 0.0
 
     @property
-    def badness(self) -> tuple[bool, int, float, int, int]:
+    def badness(self) -> tuple[bool, int, float, int, int, float]:
         """What the recordings are ordered by; the worst has the largest."""
         peak = max(self.peak_n, self.force.peak_n or 0.0) if self.force else self.peak_n
         violations = sum(map(len, self.violated.values()))
-        return self.force is not None, len(self.missed), peak, violations, sum(self.false_alarms.values())
+        alarms = sum(self.false_alarms.values())
+        return self.force is not None, len(self.missed), peak, violations, alarms, self.latest_ms
 
 
 def failed_recordings(results: Results) -> list[FailedRecording]:
@@ -76,7 +79,10 @@ def failed_recordings(results: Results) -> list[FailedRecording]:
             failed.peak_n = max([failed.peak_n, *missed])
             for amounts, count in ((failed.missed, len(missed)), (failed.false_alarms, len(outcome.false_alarms))):
                 amounts.update({outcome.detector: count} if count else {})
-            failed.violated.update({outcome.detector: outcome.breaks} if outcome.breaks else {})
+            if outcome.breaks:
+                failed.violated[outcome.detector] = outcome.breaks
+                latencies = [contact.latency_ms or 0.0 for contact in outcome.contacts]
+                failed.latest_ms = max([failed.latest_ms, *latencies])
     return sorted(found.values(), key=lambda item: item.badness, reverse=True)
 
 

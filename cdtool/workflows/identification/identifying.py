@@ -31,6 +31,7 @@ from cdtool.machines.coupled import CoupledMachine
 from cdtool.plain_text import counted
 from cdtool.recording import Recording
 from cdtool.remote.remote_path import location
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.tables import read_toml
 from cdtool.workflows.execution.workers import Progress, Workers
@@ -192,6 +193,7 @@ class IdentifiedMachine:
     source: Path | None = None
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def files_for(self, target: Path) -> tuple[tuple[Path, str], ...]:
         """Return the files of an updated machine file `target`, and their texts; none if nothing changes.

@@ -20,6 +20,7 @@ from cdtool.evaluation.upkeep.season_model import SeasonRun
 from cdtool.operations import Operation
 from cdtool.pipeline import judge
 from cdtool.remote.remote_path import location, relative_name
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.signature_file import SignatureFile
 from cdtool.signature_store import read_signature
@@ -84,6 +85,7 @@ class Forecasted:
     findings: tuple[RecordingFinding, ...]
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
 
 def forecast_by(path: str | Path, options: ForecastOptions) -> Forecasted:

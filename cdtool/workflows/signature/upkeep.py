@@ -23,6 +23,7 @@ from cdtool.operations import Operation
 from cdtool.pipeline import detect_operation, run_detector
 from cdtool.plain_text import counted
 from cdtool.remote.remote_path import location
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.signature_file import SignatureFile, with_run
 from cdtool.signature_store import read_signature, update_signature
@@ -71,6 +72,7 @@ class Checked:
     findings: tuple[RecordingFinding, ...]
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ class Updated:
     findings: tuple[RecordingFinding, ...] = ()
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
 
 def signatures_in(file: SignatureFile) -> tuple[tuple[FittedSignature, FittedSignature], ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from cdtool.impact.sensor_ranking import Ranking, rank_sensors
 from cdtool.impact.waves import WaveCheck, check_waves
 from cdtool.machine_file import read_machine_file
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.workflows.study.study_file import read_study
 
@@ -28,6 +29,7 @@ class SensorStudy:
     assumptions: tuple[str, ...]
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
 
 def study_sensors(

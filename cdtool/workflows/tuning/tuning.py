@@ -20,6 +20,7 @@ from cdtool.kernel_warm_up import compile_loaded
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector, signal_of_log
+from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.base import FittedThreshold, Threshold
@@ -169,6 +170,7 @@ class Tuning:
     findings: tuple[RecordingFinding, ...]
 
     __repr__ = short_repr
+    __eq__ = equal_by_values
 
     def summary(self) -> pd.DataFrame:
         """Return a row per detector and group, the best detector first: what was achieved, and what the file has."""
