@@ -21,6 +21,8 @@ from cdtool.short_repr import short_repr
 
 # Number of consecutive equal readings at the maximum that show a load cell at its stop.
 _STUCK = 5
+# Before the rounded top of a smooth peak, the reading one step lower lasts this share of it or more: a parabola 0.2.
+_SLOW = 0.15
 # Readings that differ by less than this share of the largest are equal: files have six digits or more.
 _ROUNDING = 1e-6
 # Readings up to so many steps apart are multiples of the step, within this share of it.
@@ -69,14 +71,7 @@ class ForceTimeCurve:
     @cached_property
     def resolution(self) -> float:
         """Return the step in which the readings are written [N]; 0 if they are on no such grid, or too few show one."""
-        steps = np.diff(np.unique(self.force))
-        steps = steps[steps > _ROUNDING * float(np.max(np.abs(self.force)))]
-        if not len(steps):
-            return 0.0
-        smallest = float(steps.min())
-        near = steps[steps < _NEAR * smallest] / smallest
-        is_grid = len(near) > 1 and bool(np.all(np.abs(near - np.rint(near)) < _ON_GRID))
-        return smallest if is_grid else 0.0
+        return _resolution(self.force)
 
     @property
     def longest_step(self) -> float:
@@ -259,8 +254,23 @@ def _end(recording: Recording, contact: Contact, clock: CellClock) -> float:
     return recording.end if pressing and recording.end - last > _TAIL else last
 
 
+def _resolution(force: FloatArray) -> float:
+    """Return the step in which readings are written [N]; 0 if they are on no such grid, or too few show one."""
+    steps = np.diff(np.unique(force))
+    steps = steps[steps > _ROUNDING * float(np.max(np.abs(force)))]
+    if not len(steps):
+        return 0.0
+    smallest = float(steps.min())
+    near = steps[steps < _NEAR * smallest] / smallest
+    is_grid = len(near) > 1 and bool(np.all(np.abs(near - np.rint(near)) < _ON_GRID))
+    return smallest if is_grid else 0.0
+
+
 def _clipped(force: FloatArray) -> BoolArray:
-    """Return the samples at the largest reading, if it repeats more often than the cell usually repeats a reading."""
+    """Return the samples at the largest reading, if it repeats more often than the cell usually repeats a reading.
+
+    The rounded top of a smooth peak repeats, too: it is not at a stop.
+    """
     if np.count_nonzero(force == force.max()) < _STUCK:
         return np.zeros(len(force), dtype=bool)
     edges = np.flatnonzero(np.diff(force)) + 1
@@ -270,7 +280,23 @@ def _clipped(force: FloatArray) -> BoolArray:
     usual = 1.0 if highest.all() else float(np.median(lengths[~highest]))
     if lengths[highest].max() < _STUCK * usual:
         return np.zeros(len(force), dtype=bool)
+    long = highest & (lengths >= _STUCK * usual)
+    cell = _resolution(force)
+    if cell and all(
+        _is_rounded(force, start, count, cell) for start, count in zip(first[long], lengths[long], strict=True)
+    ):
+        return np.zeros(len(force), dtype=bool)
     return np.repeat(highest, lengths)
+
+
+def _is_rounded(force: FloatArray, start: int, count: int, cell: float) -> bool:
+    """Return whether `count` largest readings are the rounded top of a peak: the force was rising slowly before them.
+
+    If it goes on as it rose, it exceeds the reading by less than 1 / `_SLOW` steps of the cell before it falls.
+    """
+    lower = np.flatnonzero(force[:start] < force[start] - 1.5 * cell)
+    near = force[lower[-1] + 1 if len(lower) else 0 : start]
+    return bool(np.count_nonzero(near < force[start]) >= _SLOW * count)
 
 
 def _clipped_axis(series: Series, first: int, last: int) -> BoolArray | bool:

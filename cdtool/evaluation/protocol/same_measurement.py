@@ -21,6 +21,8 @@ from cdtool.recording import FloatArray
 # One measurement agrees in this share of its samples, apart from those at which exports round the time.
 _AGREEING = 0.9
 _OF_NOISE = 0.5
+# The standard deviation of rounding, in steps of the cell: with less noise most readings are repeated.
+_ROUNDING = 0.29
 # Resolutions, and sample rates, are the same within this share.
 _SAME = 0.02
 # Fewer samples at which a reading changes show nothing.
@@ -93,6 +95,9 @@ def hold_same_measurement(one: ForceTimeCurve, other: ForceTimeCurve) -> bool:
     by_number = _by_number(finer, coarser)
     if by_number and _agree(*by_number, max(least, (0.25 if is_same else 0.5) * cell)):
         return True
+    # Of one quiet cell at one rate, all rounded readings of one force agree after interpolation: it shows nothing.
+    if by_number and is_same and min(finer.noise, coarser.noise) < _ROUNDING * cell:
+        return False
     return any(_agree(*pair, max(least, 0.51 * cell)) for pair in _resampled(finer, coarser))
 
 

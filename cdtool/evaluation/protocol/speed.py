@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from cdtool.findings.channels import DerivedSpeed
 from cdtool.recording import Contact, Recording
 
 # The speed at the contact is that of a straight line through the samples of this time before it [s], or through the
@@ -17,6 +18,9 @@ from cdtool.recording import Contact, Recording
 _BEFORE, _FEWEST = 0.1, 3
 # The last sample may be this old, or so many periods of a slower log, which is at most _OLDEST [s].
 _RECENT, _PERIODS, _OLDEST = 0.05, 2.5, 0.25
+# A position that is logged more often than it is read stays for more than so many samples. Its derivative is a row of
+# pulses: in place of it counts the slope of a parabola through the readings of this time [s].
+_HELD, _PARABOLA, _READINGS = 2, 0.2, 5
 
 
 def speed_before(recording: Recording, contact: Contact) -> float | None:
@@ -38,7 +42,8 @@ def speed_before(recording: Recording, contact: Contact) -> float | None:
     Notes
     -----
     A least-squares line through the last 0.1 s, evaluated at the onset: a machine that brakes before the contact has
-    there the speed at which it touches. Later samples are not used: the contact brakes, too.
+    there the speed at which it touches. Later samples are not used: the contact brakes, too. If the speed was derived
+    from a position that the log repeats, it is the slope of a parabola through the readings of the last 0.2 s.
 
     Examples
     --------
@@ -54,6 +59,10 @@ def speed_before(recording: Recording, contact: Contact) -> float | None:
     series = recording["speed"]
     onset = contact.start - (contact.uncertainty if math.isfinite(contact.uncertainty) else 0.0)
     speeds = [_at(series.time, column, onset) for column in series.values.T]
+    if "position" in recording and any(isinstance(item.fact, DerivedSpeed) for item in recording.findings):
+        position = recording["position"]
+        slopes = [_slope_of_held(position.time, column, onset) for column in position.values.T]
+        speeds = [one if slope is None else slope for one, slope in zip(speeds, slopes, strict=True)]
     known = [abs(speed) for speed in speeds if math.isfinite(speed)]
     return max(known) if len(known) == len(speeds) else math.nan
 
@@ -71,3 +80,16 @@ def _at(time: np.ndarray, speed: np.ndarray, onset: float) -> float:
     if len(time) < _FEWEST:
         return float(speed[-1])
     return float(np.polyval(np.polyfit(time, speed, 1), 0.0))
+
+
+def _slope_of_held(time: np.ndarray, position: np.ndarray, onset: float) -> float | None:
+    """Return the speed of one joint at the onset from readings that the log repeats [m/s]; None if it does not."""
+    known = np.flatnonzero((time < onset) & np.isfinite(position))
+    changes = known[1:][np.diff(position[known]) != 0.0]
+    read = changes[time[changes] >= onset - _PARABOLA]
+    if len(read) < _READINGS or np.median(np.diff(read)) <= _HELD:
+        return None
+    since = time[read] - onset
+    if -since[-1] > max(_RECENT, _PERIODS * float(np.median(np.diff(since)))):
+        return None
+    return float(np.polyval(np.polyder(np.polyfit(since, position[read], 2)), 0.0))

@@ -34,6 +34,8 @@ _ENOUGH_IMPACTS = 3
 _FORCE_ONLY = "  # the logs have no channels of a machine: a protocol of the forces needs no detector"
 _NORMAL_MAD = 1.4826
 _NUMBER = re.compile(r"[\W_]*\d+.*$")
+# Other keys of a TOML file are quoted.
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True)
@@ -200,10 +202,15 @@ def _groups(impacts: Sequence[_Log], folder: Path) -> list[str]:
         safe = name if name != "holdout" else "holdout_impacts"
         lines += [
             "",
-            f"[impacts.{safe}]  # CHECK: one obstacle and one speed per group",
+            f"[impacts.{_key(safe)}]  # CHECK: one obstacle and one speed per group",
             f"logs = {_paths(members, folder)}",
         ]
     return lines
+
+
+def _key(name: str) -> str:
+    """Return a name as a key of a TOML file: with a letter such as "ü" it is quoted."""
+    return name if _BARE_KEY.fullmatch(name) else json.dumps(name, ensure_ascii=False)
 
 
 def _onset(known: Sequence[_Log], beside: Mapping[str, str]) -> list[str]:

@@ -173,6 +173,16 @@ def test_four_equal_readings_or_repeated_readings_are_not_a_stop():
     assert not force_time_curve(recording(held), CONTACT).saturated
 
 
+@pytest.mark.parametrize("peak", [300.0, 300.3, 300.49, 300.51, 300.8])
+def test_the_top_of_a_smooth_peak_in_whole_newtons_is_not_a_stop_but_a_stop_in_whole_newtons_is(peak):
+    random = np.random.default_rng(1)
+    since = np.maximum(TIME - ONSET, 0.0)
+    push = peak * np.sin(np.minimum(since / 0.3, 1.0) * np.pi) + random.normal(0.0, 0.1, len(TIME))
+    contact = Contact(ONSET, ONSET + 0.3, 5e-4)
+    assert not force_time_curve(recording(np.round(push)), contact).saturated
+    assert force_time_curve(recording(np.round(np.minimum(push, 280.0))), contact).saturated
+
+
 def test_the_curve_ends_at_the_next_contact():
     twice = half_sine(TIME) + half_sine(TIME - 3.0) * 2.0
     curve = force_time_curve(recording(twice), CONTACT, until=5.0)

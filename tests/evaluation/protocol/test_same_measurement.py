@@ -95,6 +95,14 @@ def test_two_measurements_with_noise_of_the_resolution_never_match(seed, rate, c
     assert not hold_same_measurement(one, two)
 
 
+@given(st.integers(0, 10**6), st.sampled_from([200.0, 1000.0]), st.sampled_from([1.0, CELL, 5.0]))
+def test_two_tests_of_a_machine_that_repeats_within_a_percent_never_match_on_a_quiet_coarse_cell(seed, rate, cell):
+    random = np.random.default_rng(seed)
+    one, two = (measured(number, rate=rate, cell=0.001, noise=0.1) for number in (seed, seed + 1))
+    weaker = curve(one.time, one.force * (0.99 - 0.01 * random.random()))
+    assert not hold_same_measurement(rounded(weaker, cell), rounded(two, cell))
+
+
 @given(st.integers(0, 10**6), st.floats(0.05, 2.0), st.sampled_from([500.0, 700.0, 2000.0]))
 def test_two_measurements_of_two_loggers_never_match(seed, noise, rate):
     other = measured(seed + 1, noise=noise, rate=rate)

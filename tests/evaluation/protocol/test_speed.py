@@ -9,10 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cdtool.clock import differentiate
 from cdtool.errors import UsageError
 from cdtool.evaluation.protocol.plan import MeasuringPoint
 from cdtool.evaluation.protocol.speed import speed_before
 from cdtool.evaluation.protocol.speed_reasons import speed_reasons
+from cdtool.findings import Finding
+from cdtool.findings.channels import DerivedSpeed
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 CONTACT = Contact(start=2.0, end=2.5, uncertainty=0.0)
@@ -35,6 +38,28 @@ def test_a_constant_deceleration_is_exact_on_any_jittered_clock(speed, decelerat
     time = np.arange(round(3.0 * rate)) / rate + jitter
     found = measured(time, np.where(time < 2.0, speed - deceleration * (time - 2.0), 7.0))
     assert found == pytest.approx(abs(speed), abs=1e-6)
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    hold=st.sampled_from([0.01, 0.02, 0.025]),
+    deceleration=st.sampled_from([0.0, 0.5, 1.0]),
+    cell=st.sampled_from([1e-4, 5e-4, 1e-3]),
+)
+def test_a_position_that_the_log_repeats_has_the_speed_of_its_readings(seed, hold, deceleration, cell):
+    time = np.arange(3000) * 1e-3
+    read = hold * np.floor(time / hold) - np.random.default_rng(seed).uniform(0.0, hold)
+    position = cell * np.round((0.2 * (read - 2.0) - 0.5 * deceleration * (read - 2.0) ** 2) / cell)
+    derived = differentiate(Series(time, position, "m"), 50.0, "m/s")
+    run = Recording(
+        "run",
+        "",
+        ("axis",),
+        {"position": Series(time, position, "m"), "speed": derived},
+        findings=(Finding(DerivedSpeed(50.0), "speed", "note"),),
+    )
+    # The readings are late by up to one period, and so is the deceleration.
+    assert speed_before(run, CONTACT) == pytest.approx(0.2, abs=deceleration * hold + 0.02)
 
 
 def test_the_earliest_possible_onset_is_the_end_of_what_counts():
