@@ -12,8 +12,6 @@ from dataclasses import dataclass, field
 from itertools import chain, islice
 from typing import Literal
 
-import numpy as np
-
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.force.quantities import dynamic_time, time_above
@@ -30,26 +28,21 @@ from cdtool.evaluation.protocol.pressure import PressureAssessment, PressureReco
 from cdtool.evaluation.protocol.pressure_reasons import pressure_reasons
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Value, Verdict
 from cdtool.evaluation.protocol.same_measurement import hold_same_measurement
+from cdtool.evaluation.protocol.sampling import above_between_samples, equal_readings_at_peak, sample_rate
 from cdtool.evaluation.protocol.speed_reasons import speed_reasons
-from cdtool.evaluation.truth.missing_samples import CellClock
 
 # Sample rates are alike within this share: a clock is not exact, and stamps jitter.
 _SAME_RATE = 0.02
 # A stated sample rate that differs by more than this share from the measured one is that of another instrument.
 _OTHER_RATE = 0.1
 _SAME_STIFFNESS = 0.02
-# A log repeats each reading of a slower cell. A steady force repeats, too: this share of the changes follows the one
-# before as soon as the cell can, and a curve with fewer changes shows nothing.
-_SOONEST = 0.1
-_ENOUGH_CHANGES = 20
 # So much of its last step is required [s] if a profile states no length of the record.
 LAST_STEP_S = 0.5
 # Equal readings from this share of the range on may be those of an amplifier at its stop.
 _NEAR_RANGE = 0.95
 # Below this share of a limit, the resolution of the cell is none that matters.
 _FINE = 0.005
-# Readings from this share of a peak on, before and after it, show its shape; a single one may be that of a spike.
-_SHAPE = 0.5
+# Beside a single high reading of the force, a spike may be so many times as high.
 _ALONE = 10.0
 
 
@@ -96,13 +89,8 @@ class Repetition:
 
     @property
     def sample_rate(self) -> float:
-        """Return the load cell's measured sample rate [Hz]; NaN below two samples.
-
-        It is the inverse of the median step, divided by how often the log repeats each reading.
-        """
-        clock = self.curve.clock
-        period = clock.period if clock else _median_step(self.curve)
-        return 1.0 / (period * _repeats(self.curve)) if period > 0.0 else math.nan
+        """Return the load cell's measured sample rate [Hz]; NaN below two samples."""
+        return sample_rate(self.curve)
 
     @property
     def largest_reading(self) -> float:
@@ -465,7 +453,7 @@ def _of_steps(
         if _decides(moved, step, of_all, verdict.tests):
             yield _reason(ReasonKind.DRIFT_DECIDES, point, **values, drift=item.drift)
         if not profile.sample_rate_at_least_hz and step.outcome != "not_assessable":
-            between = _between_samples(item, step)
+            between = above_between_samples(item.curve, step, _ALONE)
             if _decides(between, step, of_all, verdict.tests):
                 most, rate = step.peak + between, item.sample_rate
                 kind = ReasonKind.PEAK_BETWEEN_SAMPLES
@@ -479,43 +467,18 @@ def _decides(error: float, step: StepVerdict, of_all: PointStep, tests: int) -> 
     return step.outcome == "fail" and of_all.outcome == "pass" and of_all.force + error / tests > step.step.at_most_n
 
 
-def _between_samples(item: Repetition, step: StepVerdict) -> float:
-    """Return by how much a force between samples may exceed the peak of a step [N].
-
-    Three readings a, m, b of half a sine are t apart with cos t = (a + b) / 2 m, and its peak is the square root of
-    m^2 + ((b - a) / 2 sin t)^2. Beside a single reading that is twice as large as one beside it, ten times as much may
-    be missed.
-    """
-    curve = item.curve
-    highest, apart = int(np.searchsorted(curve.time, step.peak_at)), _repeats(curve)
-    before = float(curve.force[highest - apart]) if highest >= apart else 0.0
-    after = float(curve.force[min(highest + apart, len(curve.force) - 1)])
-    before, after = min(before, step.peak), min(after, step.peak)
-    if not min(before, after) >= _SHAPE * step.peak > 0.0:
-        return _ALONE * abs(step.peak)
-    sine = math.sin(math.acos((before + after) / (2.0 * step.peak)))
-    return math.hypot(step.peak, 0.5 * (after - before) / sine) - step.peak if after != before else 0.0
-
-
 def _of_instrument(point: MeasuringPoint, number: int, item: Repetition, instrument: Instrument) -> Iterator[Reason]:
     about, reading = _about(number, item), item.largest_reading
     if instrument.range_n and reading >= instrument.range_n:
         yield _reason(ReasonKind.BEYOND_RANGE, point, **about, reading=reading, range=instrument.range_n)
     elif instrument.range_n and reading >= _NEAR_RANGE * instrument.range_n:
-        equal = _equal_readings_at_peak(item.curve)
+        equal = equal_readings_at_peak(item.curve)
         if equal > 1 and not item.curve.saturated:
             values = {"reading": reading, "range": instrument.range_n, "equal": equal}
             yield _reason(ReasonKind.NEAR_RANGE, point, **about, **values)
     stated, rate = instrument.sample_rate_hz, item.sample_rate
     if stated and math.isfinite(rate) and abs(rate - stated) > _OTHER_RATE * stated:
         yield _reason(ReasonKind.RATE_DIFFERS, point, **about, rate=rate, stated=stated)
-
-
-def _equal_readings_at_peak(curve: ForceTimeCurve) -> int:
-    """Return how many readings in a row are the largest one; a log that repeats each reading counts it once."""
-    at_peak = np.concatenate(([False], curve.force == curve.peak, [False]))
-    edges = np.flatnonzero(np.diff(at_peak))
-    return int((edges[1::2] - edges[::2]).max()) // _repeats(curve)
 
 
 def _of_instruments(plan: TestPlan, profiles: Sequence[ForceProfile]) -> Iterator[Reason]:
@@ -543,15 +506,3 @@ def _of_pressure_instrument(plan: TestPlan, points: Sequence[PointAssessment]) -
     is_needed = any(p.profile and p.profile.pressures and not p.point.no_pressure_reason for p in points)
     if plan.pressure_instrument is None and (is_needed or any(item.is_judged for p in points for item in p.pressures)):
         yield Reason(ReasonKind.NO_PRESSURE_INSTRUMENT)
-
-
-def _median_step(curve: ForceTimeCurve) -> float:
-    return CellClock(curve.time).period
-
-
-def _repeats(curve: ForceTimeCurve) -> int:
-    """Return how many samples of the log in a row have one reading of the load cell, at least 1."""
-    changes = np.flatnonzero(np.diff(curve.force))
-    if len(changes) < _ENOUGH_CHANGES:
-        return 1
-    return int(np.quantile(np.diff(changes), _SOONEST, method="lower"))

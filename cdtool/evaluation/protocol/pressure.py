@@ -18,7 +18,8 @@ from cdtool.errors import RecordingError
 from cdtool.evaluation.force.curve import ForceTimeCurve, force_time_curve
 from cdtool.evaluation.force.limits import ForceProfile, ForceStep, PressureLimit
 from cdtool.evaluation.force.verdict import ForceVerdict, Outcome, assess_force
-from cdtool.evaluation.truth.missing_samples import CellClock, cell_samples
+from cdtool.evaluation.protocol.sampling import sample_rate
+from cdtool.evaluation.truth.missing_samples import cell_samples
 from cdtool.evaluation.truth.rest_level import RunningRest
 from cdtool.recording import CONTACT_PRESSURE, Contact, Recording, Series
 from cdtool.units import UNITS
@@ -63,8 +64,7 @@ class PressureRecord:
     @property
     def sample_rate(self) -> float:
         """Return the measured sample rate [Hz]; NaN below two samples."""
-        period = (self.curve.clock or CellClock(self.curve.time)).period
-        return 1.0 / period if period > 0.0 else math.nan
+        return sample_rate(self.curve)
 
     def peak_from(self, begin: float) -> float:
         """Return the largest pressure from a time [s after the onset] on; NaN without a sample there."""

@@ -8,6 +8,11 @@ from cdtool.evaluation.force.limits import ForceProfile
 from cdtool.evaluation.protocol.plan import Instrument, MeasuringPoint
 from cdtool.evaluation.protocol.pressure import PressureAssessment, PressureRecord
 from cdtool.evaluation.protocol.reasons import Reason, ReasonKind, Value
+from cdtool.evaluation.protocol.sampling import above_between_samples
+
+# Beside a single high reading the pressure may have been higher by so many times as much: tissue and films are soft,
+# and have no spikes as a force has.
+_ALONE = 1.0
 
 
 def pressure_reasons(
@@ -112,6 +117,7 @@ def _open(point: MeasuringPoint, item: PressureAssessment, about: dict[str, Valu
             reason = _reason(ReasonKind.PRESSURE_NOT_ASSESSABLE, point, {**about, "step": step.step.name})
             yield Reason(reason.kind, reason.values, step.cause, reason.due)
     yield from _rest_decides(point, item, item.record, about)
+    yield from _between_samples(point, item, item.record, about)
 
 
 def _rest_decides(
@@ -126,6 +132,19 @@ def _rest_decides(
         if step.outcome == "pass" and step.peak + may_be_more > step.step.at_most_n:
             values: dict[str, Value] = {"peak": step.peak, "limit": step.step.at_most_n, "error": may_be_more}
             yield _reason(ReasonKind.PRESSURE_REST_DECIDES, point, {**about, "step": step.step.name, **values})
+
+
+def _between_samples(
+    point: MeasuringPoint, item: PressureAssessment, record: PressureRecord, about: dict[str, Value]
+) -> Iterator[Reason]:
+    """Yield the steps whose limit the pressure may have exceeded between two samples: no profile states a rate."""
+    assert item.verdict is not None
+    for step in item.verdict.steps:
+        most = step.peak + above_between_samples(record.curve, step, _ALONE)
+        limit = step.step.at_most_n
+        if step.outcome == "pass" and most > limit:
+            values: dict[str, Value] = {"peak": step.peak, "limit": limit, "rate": record.sample_rate, "most": most}
+            yield _reason(ReasonKind.PRESSURE_BETWEEN_SAMPLES, point, {**about, "step": step.step.name, **values})
 
 
 def _beyond_range(

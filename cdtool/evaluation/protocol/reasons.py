@@ -57,6 +57,7 @@ class ReasonKind(Enum):
     PRESSURE_DOES_NOT_RISE = "pressure_does_not_rise"
     PRESSURE_TIME_UNKNOWN = "pressure_time_unknown"
     PRESSURE_REST_DECIDES = "pressure_rest_decides"
+    PRESSURE_BETWEEN_SAMPLES = "pressure_between_samples"
     PRESSURE_BEYOND_RANGE = "pressure_beyond_range"
     NO_PRESSURE_INSTRUMENT = "no_pressure_instrument"
     SPEED_DIFFERS = "speed_differs"

@@ -13,7 +13,7 @@ from cdtool.evaluation.force.limits import ForceProfile, PressureLimit, read_for
 from cdtool.evaluation.protocol.plan import Instrument, MeasuringPoint
 from cdtool.evaluation.protocol.pressure import PressureAssessment, PressureRecord, pressure_record
 from cdtool.evaluation.protocol.pressure_reasons import pressure_reasons
-from cdtool.evaluation.protocol.reasons import Verdict
+from cdtool.evaluation.protocol.reasons import ReasonKind, Verdict
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 CHEST = read_force_limits()["iso_ts_15066_chest"]
@@ -36,7 +36,9 @@ def steps(first: float, later: float, rest: float = 0.0) -> FloatArray:
 
 def outcome(found: PressureRecord | None, entered: float | None = None, profile: ForceProfile = CHEST) -> str:
     item = PressureAssessment.of(profile, "", found, entered)
-    verdict = Verdict(tuple(pressure_reasons(POINT, profile, ["1.csv"], [item], Instrument("pressure"))))
+    reasons = pressure_reasons(POINT, profile, ["1.csv"], [item], Instrument("pressure"))
+    # A rectangular pulse has no shape: what may be between samples has tests of its own.
+    verdict = Verdict(tuple(reason for reason in reasons if reason.kind is not ReasonKind.PRESSURE_BETWEEN_SAMPLES))
     # What a repetition shows in its line is what its reasons lead to, but for a rest that decides.
     if not any(reason.kind.value == "pressure_rest_decides" for reason in verdict.reasons):
         assert {"not_assessable": "incomplete"}.get(item.outcome, item.outcome) == verdict.outcome
@@ -133,3 +135,27 @@ def test_a_drift_before_the_contact_may_decide():
 def test_an_inverted_sensor_is_read_as_a_pressure():
     found = record(-steps(300.0, 10.0))
     assert found is not None and found.peak == pytest.approx(300.0) and outcome(found) == "fail"
+
+
+def between_samples(pulse: FloatArray, time: FloatArray) -> list[float]:
+    """Return, of the steps that pass with what was read, how much the pressure may have been between samples."""
+    item = PressureAssessment.of(CHEST, "", record(pulse, time), None)
+    found = pressure_reasons(POINT, CHEST, ["1.csv"], [item], Instrument("pressure"))
+    return [float(reason.values["most"]) for reason in found if reason.kind is ReasonKind.PRESSURE_BETWEEN_SAMPLES]
+
+
+@given(rate=st.floats(15.0, 200.0), phase=st.floats(0.0, 1.0), peak=st.floats(245.0, 400.0))
+def test_a_slow_sensor_never_hides_a_peak_above_the_limit(rate, phase, peak):
+    time = (np.arange(0.0, 4.0 * rate) + phase) / rate
+    pulse = np.where((time >= 2.0) & (time <= 2.3), peak * np.sin(np.pi * (time - 2.0) / 0.3), 0.0)
+    if pulse.max() <= 240.0:
+        assert between_samples(pulse, time)[0] > 240.0
+
+
+@pytest.mark.parametrize("rate", [50.0, 100.0, 1000.0])
+def test_a_pressure_far_below_the_limit_has_no_reason_at_an_ordinary_rate(rate):
+    time = np.arange(0.0, 4.0, 1.0 / rate)
+    pulse = np.where((time >= 2.0) & (time <= 2.3), 110.0 * np.sin(np.pi * (time - 2.0) / 0.3), 0.0)
+    assert not between_samples(pulse, time)
+    steep = np.where((time >= 2.0) & (time < 2.4), 55.0, 0.0)
+    assert not between_samples(steep, time)
