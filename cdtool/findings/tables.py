@@ -257,7 +257,7 @@ class WordsBelowRows(SkippedLines):
 class NulLines(SkippedLines):
     """Lines that contain NUL bytes."""
 
-    what = "damaged, they contain NUL bytes"
+    what = "damaged, with NUL bytes"
 
 
 @frozen

@@ -82,35 +82,7 @@ def _runs_matching(pattern: str, base: Path) -> list[Path]:
 
 
 def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: PlausibleRanges | None = None) -> Recording:
-    """Read a log through a machine file.
-
-    Parameters
-    ----------
-    log : str or Path
-        The log, in any format of `cdtool list formats`, or a folder with its parts.
-    machine : str, Path or MachineFile
-        The machine file, or what `cdtool.machine_file.read_machine_file` returned.
-    ranges : PlausibleRanges, optional
-        Plausible ranges of the channels, in SI units: values outside are masked and reported as a loss.
-
-    Returns
-    -------
-    Recording
-        Every mapped channel on the load side in SI units, at its own times; a missing sample is NaN. A force with
-        several columns has one column per axis.
-
-    Raises
-    ------
-    CdtoolError
-        The log or the machine file cannot be read, or no channel is mapped; the message names the file.
-
-    Examples
-    --------
-    >>> import cdtool
-    >>> recording = cdtool.read("sample_logs/gate/stiff/03.csv", "sample_logs/gate/machine.toml")
-    >>> recording["speed"].values.shape, recording["speed"].unit
-    ((7200, 1), 'm/s')
-    """
+    """Read a log through a machine file, as `cdtool.read` describes; raises CdtoolError."""
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     return _with_channels(location(log), read_recording(location(log), machine_file, ranges))
 

@@ -314,7 +314,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.HeaderLines((11,)), "line 11 skipped: the header again"),
     (tables.DrawnLines((2,)), "line 2 skipped: drawn lines"),
     (tables.WordsBelowRows((30,)), "line 30 skipped: words below the rows"),
-    (tables.NulLines((31,)), "line 31 skipped: damaged, they contain NUL bytes"),
+    (tables.NulLines((31,)), "line 31 skipped: damaged, with NUL bytes"),
     (tables.LastLineCut(99), "the last line (99) is cut off, dropped"),
     (tables.NulBytesAtEnd(512), "the file ends in 512 NUL bytes: was the power lost?"),
     (tables.LastLineKept(99, "0.5"), "the last line (99) has no line end: its last cell '0.5' is taken to be whole"),
