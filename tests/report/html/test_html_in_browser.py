@@ -273,7 +273,7 @@ def test_past_the_last_alarm_a_survival_curve_says_how_many_are_undetected(shown
     browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
     right = plot.size["width"] // 2 - 20
     ActionChains(browser, duration=20).move_to_element_with_offset(plot, right, 0).perform()
-    assert texts(browser, "#tooltip")[0].split("\n")[1].startswith("momentum: 0 %")
+    assert texts(browser, "#tooltip")[0].split("\n")[1].startswith("momentum: 0.0 % ")
 
 
 @pytest.mark.parametrize("width", [400, 1400])
