@@ -132,7 +132,7 @@ def _show_checked(checked: CheckedProtocol) -> None:
         typer.echo(f"{plain(name)}: {counted(count, 'recording')}")
     for due, title in (("before_test", "before the test"), ("test_day", "on the day of the test")):
         part = Verdict(tuple(item for item in checked.verdict.reasons if item.due == due))
-        sentences = words.reasons(part, "incomplete")
+        sentences = [*words.reasons(part, "fail"), *words.reasons(part, "incomplete")]
         if sentences:
             typer.echo(f"incomplete, {title}:")
         for sentence in sentences:
