@@ -34,7 +34,6 @@ CauseKind = Literal[
     "may_exceed",
     "onset_earlier",
     "saturated",
-    "not_permissible",
 ]
 _SENTENCES: Mapping[CauseKind, str] = {
     "above_limit": "{peak} N where {limit:g} N are allowed, exceeded {after_ms:.1f} ms after the onset",
@@ -51,7 +50,6 @@ _SENTENCES: Mapping[CauseKind, str] = {
     ),
     "onset_earlier": "the onset may be up to {earlier_ms:.0f} ms earlier, and {largest} N are then too high",
     "saturated": "the load cell was at its stop, {peak} N, below the limit of {limit:g} N",
-    "not_permissible": "contact with this region of the body is not permissible, whatever its force: {peak} N",
 }
 
 
@@ -198,7 +196,11 @@ def assess_force(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
     """
     steps = tuple(_judge_step(curve, step, profile.ends(i)) for i, step in enumerate(profile.steps))
     if not profile.permissible:
-        steps = tuple(_forbidden(item) if item.outcome == "pass" else item for item in steps)
+        reason = "contact with this region of the body is not permissible, whatever its force"
+        steps = tuple(
+            replace(item, outcome="fail", time_budget=0.0, reason=reason) if item.outcome == "pass" else item
+            for item in steps
+        )
     return ForceVerdict(profile.name, steps, curve.end)
 
 
@@ -264,11 +266,6 @@ def _judge_step(curve: ForceTimeCurve, step: ForceStep, ends: float) -> StepVerd
     return StepVerdict(step, "pass", peak, peak_at, float("inf"))
 
 
-def _forbidden(item: StepVerdict) -> StepVerdict:
-    cause = StepCause("not_permissible", {"peak": item.peak, "limit": item.step.at_most_n})
-    return replace(item, outcome="fail", time_budget=0.0, reason=cause.sentence(), cause=cause)
-
-
 def _unassessable(step: ForceStep, peak: float, peak_at: float, cause: StepCause) -> StepVerdict:
     return StepVerdict(step, "not_assessable", peak, peak_at, float("inf"), cause.sentence(), cause)
 
@@ -329,7 +326,7 @@ def _judge_point(step: ForceStep, tests: Sequence[StepVerdict], average_of: int)
         shown = f"{force:.{digits_beside(force, step.at_most_n)}g}"
         reason = f"{word} of {len(tests)} peaks {shown} N where {step.at_most_n:g} N are allowed"
         return PointStep(step, "fail", force, above, reason)
-    forbidden = next((test for test in tests if test.cause and test.cause.kind == "not_permissible"), None)
+    forbidden = next((test for test in tests if test.outcome == "fail" and not test.peak > step.at_most_n), None)
     if forbidden:
         return PointStep(step, "fail", force, above, forbidden.reason)
     unassessable = next((test for test in tests if test.outcome == "not_assessable"), None)

@@ -378,7 +378,7 @@ def _copies(point: MeasuringPoint, item: Repetition, earlier: Sequence[Repetitio
 
 def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:
     for step in verdict.steps:
-        if step.force > step.step.at_most_n:
+        if step.outcome == "fail" and step.force > step.step.at_most_n:
             yield _reason(ReasonKind.POINT_EXCEEDS, point, **_compared(step, verdict, profile))
 
 

@@ -47,6 +47,7 @@ METER = Instrument(
     sample_rate_hz=1000.0,
     filter="none",
 )
+FAILING = {ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS, ReasonKind.NOT_PERMISSIBLE}
 PLAN = TestPlan(
     machine=MachineParticulars("door", "A", "1", "hall", "1.0"),
     test=TestParticulars(tester="B", date=dt.date(2026, 3, 31), place="C", temperature_c=0.0),
@@ -299,7 +300,7 @@ def test_fail_beats_incomplete_and_incomplete_beats_pass_and_all_reasons_stay():
 def test_no_reason_is_ever_outvoted(kinds):
     verdict = Verdict(tuple(Reason(kind) for kind in kinds))
     assert (verdict.outcome == "pass") == (not kinds)
-    assert (verdict.outcome == "fail") == bool({ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS} & set(kinds))
+    assert (verdict.outcome == "fail") == bool(FAILING & set(kinds))
     assert len(verdict.of("fail")) + len(verdict.of("incomplete")) == len(kinds)
 
 
