@@ -19,7 +19,6 @@ from cdtool.pipeline import run_detector_on_each
 from cdtool.plain_text import counted
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.contract import checked_fit
-from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.signature.grouping import by_class
@@ -123,7 +122,7 @@ def fit_operations(
 ) -> Fitted:
     """Learn the rule from impact-free operations of a machine with a detector; raises SignatureError."""
     pairs, skipped = signals_of(operations, machine, detector, watched, unread)
-    fitted = fitting(for_machine(rule_for(detector, rule), machine))(pairs)
+    fitted = fitting(for_machine(rule, machine))(pairs)
     return replace(fitted, skipped=(*skipped, *fitted.skipped))
 
 

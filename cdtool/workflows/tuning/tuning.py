@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdtool.activation import DEBOUNCE_TIME, Activation
-from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, SignatureError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.frames import rows_as_frame
@@ -302,7 +301,7 @@ class _TuningOf:
         recordings, signals, skipped = self._usable()
         period = float(np.median([signal.period for _, signal in signals[0]]))
         debounces, activations = self._activations(period)
-        rule = for_machine(self.setup.rule_of(self.name), self.setup.machine_file.machine)
+        rule = for_machine(self.setup.rule, self.setup.machine_file.machine)
         default = Candidate.of(self._detector, rule)
         measuring = self._measuring(recordings, activations)
         measuring.remember(default, signals)
@@ -391,27 +390,15 @@ class _TuningOf:
         return [own, *others], (given, *(replace(given, debounce=count) for count in others))
 
     def _rules(self, default: Threshold, channels: set[str]) -> list[Threshold]:
-        """Return the rules to try: every registered one, the benchmark file's with its own settings.
-
-        A detector that has its own rule is judged by no other.
-        """
-        if hasattr(self._detector, "own_threshold"):
-            return rules_to_try([default], channels)
+        """Return the rules to try: every registered one, the benchmark file's with its own settings."""
         machine, setup = self.setup.machine_file.machine, self.setup
         signature = replace(setup.signature, adaptive_level=0.0, speed_range=False)
         rules: list[Threshold] = []
         for name in self.options.thresholds or THRESHOLDS.usable_names():
             rule = THRESHOLDS.load(name)
-            if name in self._own_rules:
-                continue
             made = setup.signature if name == "signature" else with_context(rule(), setup.signature.sides, signature)
             rules.append(default if name == default.name else for_machine(made, machine))
         return rules_to_try(rules, channels)
-
-    @property
-    def _own_rules(self) -> set[str]:
-        """Return the names of rules that belong to one detector."""
-        return {getattr(DETECTORS.load(name), "own_threshold", "") for name in DETECTORS.usable_names()}
 
     def _measuring(self, recordings: TuningRecordings, activations: tuple[Activation, ...]) -> Measuring:
         setup = self.setup
