@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import pytest
@@ -72,3 +73,31 @@ def test_an_uncut_log_of_two_strokes_gets_a_hint_how_to_cut_it(tmp_path, more):
         assert (told in done.err) == (not more)
         assert done.err.count("cut it with") <= 1
     assert ("1 not assessable" in scored.out) == (not more)
+
+
+@pytest.fixture(scope="module")
+def rebounding(tmp_path_factory) -> Path:
+    """Return the folder of a gate that rebounds after its impact, without reference channels."""
+    folder = tmp_path_factory.mktemp("gate") / "gate"
+    counts = ("--free", 8, "--holdout", 0, "--stiff", 1, "--soft", 0)
+    assert cdtool("simulate", "gate", *counts, "--no-reference", "-o", folder).status == 0
+    text = (folder / "benchmark.toml").read_text(encoding="utf-8")
+    text = re.sub("(?m)^detectors = .*", 'detectors = ["feekf", "pt"]', text)
+    (folder / "benchmark.toml").write_text(text, encoding="utf-8")
+    (folder / "cut.toml").write_text(f'operations = "motion"\n{text}', encoding="utf-8")
+    return folder
+
+
+def test_a_rebound_after_the_contact_is_no_warning(rebounding):
+    scored = cdtool("benchmark", rebounding / "benchmark.toml")
+    assert scored.status == 0 and "1 contact with 2 detectors: 2 detected" in scored.out
+    assert "strokes in one operation" not in scored.err
+
+
+def test_an_alarm_after_the_cut_at_a_rebound_is_scored_and_explained(rebounding):
+    """The contact is in the first stroke, the alarm of pure torque in the second one."""
+    scored = cdtool("benchmark", rebounding / "cut.toml")
+    assert scored.status == 0 and "1 contact with 2 detectors: 2 detected" in scored.out
+    explained = cdtool("explain", rebounding / "stiff" / "01.csv", "-b", rebounding / "cut.toml", "-d", "pt")
+    assert explained.status == 0
+    assert "of a contact in another operation" in explained.out and "false alarm at" not in explained.out
