@@ -6,6 +6,7 @@ import csv
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.command import cdtool
@@ -101,3 +102,21 @@ def test_an_alarm_after_the_cut_at_a_rebound_is_scored_and_explained(rebounding)
     explained = cdtool("explain", rebounding / "stiff" / "01.csv", "-b", rebounding / "cut.toml", "-d", "pt")
     assert explained.status == 0
     assert "of a contact in another operation" in explained.out and "false alarm at" not in explained.out
+
+
+def test_strokes_at_creep_speed_are_a_note_where_faster_ones_are_learned(tmp_path):
+    """The friction EKF is not applicable to half of them, and the others are too few to learn from."""
+    benchmark_of(tmp_path, rows_of("stiff/04.csv"))
+    logs = [tmp_path / f"{number}.csv" for number in range(10)]
+    for number, log in enumerate(logs):
+        rows = rows_of(f"free/{number % 8 + 3:02}.csv")
+        speed = 100.0 if number % 2 else 400.0
+        rows += [[0.0, 1.0 + 1e-3 * number, speed * (2000 < k < 5000), 0.0, 0.0, 0.0] for k in range(6000)]
+        angle = np.cumsum([row[2] for row in rows]) * 0.10472e-3
+        lines = [",".join(f"{v:.9g}" for v in (k, *rows[k][1:3], angle[k], rows[k][4], 0.0)) for k in range(len(rows))]
+        log.write_text("\n".join([",".join(COLUMNS), *lines]) + "\n", encoding="utf-8")
+    options = ("-m", tmp_path / "machine.toml", "-d", "feekf", "--operations", "motion")
+    learned = cdtool("learn-signature", *logs, *options, "-o", tmp_path / "signature.json")
+    assert learned.status == 0
+    told = "friction_ekf: 5 strokes at creep speed not learned, and not assessed: runs forward at"
+    assert learned.err.count(told) == 2
