@@ -773,6 +773,10 @@ SENTENCES: list[tuple[Fact, str]] = [
             "another speed"
         ),
     ),
+    (
+        scoring.CreepNotLearned(14, "runs forward at 0.01 m/s: too few"),
+        "14 strokes at creep speed not learned, and not assessed: runs forward at 0.01 m/s: too few",
+    ),
     (scoring.DetectorUnassessable("nothing is valid"), "not assessable: nothing is valid"),
     (
         scoring.NothingLearnedWithout("momentum", "9 impact-free runs of one class"),

@@ -56,7 +56,8 @@ from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import Runs
-from cdtool.workflows.signature.fitting import fitting, for_machine
+from cdtool.workflows.signature.calibration import kept
+from cdtool.workflows.signature.fitting import Fitted, fitting, for_machine
 from cdtool.workflows.store.digest import code_version, digest_of
 from cdtool.workflows.tuning.journal import Journal
 from cdtool.workflows.tuning.recordings_to_tune import ReadRecordings, read_recordings, to_check
@@ -355,16 +356,15 @@ class _TuningOf:
             reason = skipped[0].reason if skipped else "injected contacts cannot test it"
             raise UsageError(f"{self.name} cannot be used on these logs: {reason}", "check the logs with cdtool info")
         try:
-            stray = fitting(for_machine(setup.signature, machine))(pairs).skipped
+            fitted = fitting(for_machine(setup.signature, machine))(pairs)
         except SignatureError:  # other thresholds learn from fewer runs
-            stray = ()
-        names = {item.recording for item in stray}
-        skipped += stray
-        usable = [number for number, run in enumerate(free) if run.operation.name not in names]
-        made = replace(recordings, free=tuple(free[number] for number in usable), struck=tuple(struck))
-        kept = [pairs[number] for number in usable]
-        is_nested = made.is_nested and not made.why_not_nested(self.options.budget) and self._has_hours(made, kept)
-        return replace(made, is_nested=is_nested), (kept, signals), skipped
+            fitted = Fitted((), (), ())
+        skipped += fitted.skipped
+        usable = kept(pairs, fitted)
+        names = {operation.name for operation, _ in usable}
+        made = replace(recordings, free=tuple(run for run in free if run.operation.name in names), struck=tuple(struck))
+        is_nested = made.is_nested and not made.why_not_nested(self.options.budget) and self._has_hours(made, usable)
+        return replace(made, is_nested=is_nested), (usable, signals), skipped
 
     def _has_hours(self, recordings: TuningRecordings, pairs: Sequence[Pair]) -> bool:
         """Return whether the runs without any fold are monitored long enough for a budget per hour."""
