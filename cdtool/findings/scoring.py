@@ -126,8 +126,9 @@ class LimitsUnchecked(TemplateFact):
 
     count: int
     limits: int
+    detectors: str
 
-    words = "{count} of {limits} limits are set for detectors that were not run: not checked"
+    words = "{count} of {limits} limits are set for detectors that were not run ({detectors}): not checked"
 
 
 @frozen
