@@ -151,6 +151,18 @@ class SingleSpeed(TemplateFact):
 
 
 @frozen
+class CreepNotLearned(Fact):
+    """Strokes at creep speed were left out from learning; faster strokes of the same logs were learned."""
+
+    strokes: int
+    reason: str
+
+    def sentence(self) -> str:
+        """Return how many, and why."""
+        return f"{counted(self.strokes, 'stroke')} at creep speed not learned, and not assessed: {self.reason}"
+
+
+@frozen
 class DetectorUnassessable(TemplateFact):
     """A detector can assess none of the runs to learn from."""
 

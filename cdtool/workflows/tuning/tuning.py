@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdtool.activation import DEBOUNCE_TIME, Activation
-from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, SignatureError, UsageError, nearest
 from cdtool.evaluation.conclusion import Severity, Statement, worst_first
 from cdtool.evaluation.false_alarm_budget import Budget
@@ -59,7 +58,8 @@ from cdtool.workflows.benchmark.with_injected import with_injected
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
 from cdtool.workflows.keyword_options import by_keywords
 from cdtool.workflows.runs import Runs
-from cdtool.workflows.signature.fitting import fitting, for_machine
+from cdtool.workflows.signature.calibration import kept
+from cdtool.workflows.signature.fitting import Fitted, fitting, for_machine
 from cdtool.workflows.store.digest import code_version, digest_of
 from cdtool.workflows.tuning.journal import Journal
 from cdtool.workflows.tuning.recordings_to_tune import ReadRecordings, read_recordings, to_check
@@ -322,7 +322,7 @@ class _TuningOf:
         recordings, signals, skipped = self._usable()
         period = float(np.median([signal.period for _, signal in signals[0]]))
         debounces, activations = self._activations(period)
-        rule = for_machine(self.setup.rule_of(self.name), self.setup.machine_file.machine)
+        rule = for_machine(self.setup.rule, self.setup.machine_file.machine)
         default = Candidate.of(self._detector, rule)
         measuring = self._measuring(recordings, activations)
         measuring.remember(default, signals)
@@ -376,16 +376,15 @@ class _TuningOf:
             reason = skipped[0].reason if skipped else "injected contacts cannot test it"
             raise UsageError(f"{self.name} cannot be used on these logs: {reason}", "check the logs with cdtool info")
         try:
-            stray = fitting(for_machine(setup.signature, machine))(pairs).skipped
+            fitted = fitting(for_machine(setup.signature, machine))(pairs)
         except SignatureError:  # other thresholds learn from fewer runs
-            stray = ()
-        names = {item.recording for item in stray}
-        skipped += stray
-        usable = [number for number, run in enumerate(free) if run.operation.name not in names]
-        made = replace(recordings, free=tuple(free[number] for number in usable), struck=tuple(struck))
-        kept = [pairs[number] for number in usable]
-        is_nested = made.is_nested and not made.why_not_nested(self.options.budget) and self._has_hours(made, kept)
-        return replace(made, is_nested=is_nested), (kept, signals), skipped
+            fitted = Fitted((), (), ())
+        skipped += fitted.skipped
+        usable = kept(pairs, fitted)
+        names = {operation.name for operation, _ in usable}
+        made = replace(recordings, free=tuple(run for run in free if run.operation.name in names), struck=tuple(struck))
+        is_nested = made.is_nested and not made.why_not_nested(self.options.budget) and self._has_hours(made, usable)
+        return replace(made, is_nested=is_nested), (usable, signals), skipped
 
     def _has_hours(self, recordings: TuningRecordings, pairs: Sequence[Pair]) -> bool:
         """Return whether the runs without any fold are monitored long enough for a budget per hour."""
@@ -411,27 +410,15 @@ class _TuningOf:
         return [own, *others], (given, *(replace(given, debounce=count) for count in others))
 
     def _rules(self, default: Threshold, channels: set[str]) -> list[Threshold]:
-        """Return the rules to try: every registered one, the benchmark file's with its own settings.
-
-        A detector that has its own rule is judged by no other.
-        """
-        if hasattr(self._detector, "own_threshold"):
-            return rules_to_try([default], channels)
+        """Return the rules to try: every registered one, the benchmark file's with its own settings."""
         machine, setup = self.setup.machine_file.machine, self.setup
         signature = replace(setup.signature, adaptive_level=0.0, speed_range=False)
         rules: list[Threshold] = []
         for name in self.options.thresholds or THRESHOLDS.usable_names():
             rule = THRESHOLDS.load(name)
-            if name in self._own_rules:
-                continue
             made = setup.signature if name == "signature" else with_context(rule(), setup.signature.sides, signature)
             rules.append(default if name == default.name else for_machine(made, machine))
         return rules_to_try(rules, channels)
-
-    @property
-    def _own_rules(self) -> set[str]:
-        """Return the names of rules that belong to one detector."""
-        return {getattr(DETECTORS.load(name), "own_threshold", "") for name in DETECTORS.usable_names()}
 
     def _measuring(self, recordings: TuningRecordings, activations: tuple[Activation, ...]) -> Measuring:
         setup = self.setup
