@@ -16,10 +16,9 @@ from cdtool.exit_status import Fact, statuses_words
 from cdtool.plain_text import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from cdtool.evaluation.protocol.protocol import Protocol
-    from cdtool.evaluation.protocol.reasons import Outcome
     from cdtool.workflows.protocol.checking import CheckedProtocol
     from cdtool.workflows.protocol.protocol_file import ProtocolFile
 
@@ -28,7 +27,7 @@ protocol = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
-_FACTS = {"fail": (Fact.FORCE_VIOLATED,), "incomplete": (Fact.INCOMPLETE,), "pass": ()}
+_FACTS: Mapping[str, tuple[Fact, ...]] = {"fail": (Fact.FORCE_VIOLATED,), "incomplete": (Fact.INCOMPLETE,), "pass": ()}
 _SHOWN = 10
 
 
@@ -120,7 +119,7 @@ def write(
     made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
     write_outputs(ProtocolReport(made), output, force=force, inputs=(file,), subject="protocol")
     show_protocol(made, output)
-    leave(facts=facts_of(made.verdict.outcome))
+    leave(facts=_FACTS[made.verdict.outcome])
 
 
 def _show_checked(checked: CheckedProtocol) -> None:
@@ -168,11 +167,6 @@ def file_of_protocol(benchmark: Path, given: Path | None, targets: Sequence[Path
             f"draft one, cdtool protocol init {_quoted(benchmark)} -o protocol.toml, then -p protocol.toml",
         )
     return read_protocol_file(benchmark if given is None else given)
-
-
-def facts_of(outcome: Outcome) -> tuple[Fact, ...]:
-    """Return the facts of a protocol's verdict for the exit status."""
-    return _FACTS[outcome]
 
 
 def show_protocol(made: Protocol, written: Sequence[Path]) -> None:

@@ -21,10 +21,9 @@ EXPLAINED: Final = (
     "the 95 % interval of the mean of four contains the true mean in 49 of 100 tests. The median has an interval with "
     "6 or more contacts (docs/statistics.md)."
 )
-#: Below this number of contacts, slow cases cost the interval of a mean its coverage (docs/statistics.md).
-ENOUGH_FOR_SLOW: Final = 50
+# With five times as many, slow cases cost the interval of a mean little of its coverage (docs/statistics.md).
 SLOW: Final = (
-    f"Mean of fewer than {ENOUGH_FOR_SLOW} contacts: if 5 to 15 % of all contacts are slow, its 95 % interval contains "
+    f"Mean of fewer than {5 * FEWEST} contacts: if 5 to 15 % of all contacts are slow, its 95 % interval contains "
     "the true mean in 72 to 91 of 100 tests."
 )
 GROUPED: Final = (
@@ -78,6 +77,6 @@ def explained(rows: Iterable[Summary]) -> str:
     """Return why rows show no mean or no interval; empty if all rows show both."""
     hit = [item for item in rows if item.contacts > item.not_assessable]
     words = [EXPLAINED] if any(item.few for item in hit) else []
-    words += [SLOW] if any(not item.few and item.detected < ENOUGH_FOR_SLOW for item in hit) else []
+    words += [SLOW] if any(not item.few and item.detected < 5 * FEWEST for item in hit) else []
     words += [GROUPED] if any(not item.few and item.mean.reason for item in hit) else []
     return " ".join(words)

@@ -141,7 +141,7 @@ class Model:
     """The plain values of a report. Texts from files are unchanged: renderers escape them.
 
     `tone` of the headline is good, bad, unknown, or empty if nothing was required. `scope`: version, machine, number of
-    detectors and recordings. `left_out`: how much data was left out or lost, empty if none. `tables`: by name, those
+    detectors and recordings. `tables`: by name, those
     with rows; `groups`: the results of each group with its name; `failed`: the recordings that need attention, the
     worst first (of very many, those that are listed); `notes`: how to read each part.
     """
@@ -151,7 +151,6 @@ class Model:
     tone: str
     scope: tuple[str, ...]
     reasons: tuple[str, ...]
-    left_out: str
     tables: Mapping[str, Table]
     groups: tuple[tuple[str, Table], ...]
     provenance: tuple[Table, ...]
@@ -204,7 +203,6 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         *recordings.reasons_tables(results),
         calibration_table(results),
     )
-    lost = len(results.skipped) + len(results.losses)
     groups = {group: [item for item in summaries if item.group == group] for group in results.groups}
     return Model(
         headline=results.conclusion.headline,
@@ -212,7 +210,6 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         tone=results.conclusion.tone,
         scope=tuple(part for part in scope if part),
         reasons=results.conclusion.reasons,
-        left_out=f"{counted(lost, 'entry')} of data left out or lost" if lost else "",
         tables={table.name: table for table in tables if table.rows},
         groups=tuple((group, results_table(results, items, group)) for group, items in groups.items()),
         provenance=tuple(provenance_tables(results)),
