@@ -319,12 +319,12 @@ def _of_forces(checks: Sequence[ForceCheck]) -> Iterator[Statement]:
     if verdicts["fail"]:
         words = f"force profile violated by {verdicts['fail']} of {of}"
         yield Statement(Severity.VIOLATED, words, Fact.FORCE_VIOLATED, _force_reasons(checks, "fail", "violated by"))
-    words = [f"force profile not assessable for {unseen - len(groups)} of {of}"] if unseen > len(groups) else []
-    words += [f"force profile not assessable in {', '.join(groups)}, where no contact was scored"] if groups else []
-    if words:
+    parts = [f"force profile not assessable for {unseen - len(groups)} of {of}"] if unseen > len(groups) else []
+    parts += [f"force profile not assessable in {', '.join(groups)}, where no contact was scored"] if groups else []
+    if parts:
         fact = Fact.NOTHING_ASSESSABLE if unseen == len(checks) else Fact.INCOMPLETE
         reasons = _force_reasons(checks, "not_assessable", "not assessable for")
-        yield Statement(Severity.NOT_ASSESSABLE, "; ".join(words), fact, reasons)
+        yield Statement(Severity.NOT_ASSESSABLE, "; ".join(parts), fact, reasons)
     if checks and verdicts["pass"] == len(checks):
         yield Statement(Severity.MET, f"force profile met by {of}")
 
