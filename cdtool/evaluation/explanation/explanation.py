@@ -154,6 +154,8 @@ def explain_operation(
     found: list[Explanation] = [
         _as_role(role, explain_alarm(detection, alarm, activation, contact, inputs, margins, normals))
         for alarm in {*detection.verdict.alarms, *detecting}
+        # One that detects a contact of this operation may be in another one, which explains it.
+        if alarm in detection.verdict.crossings
         for contact, role in [_belonging(alarm, detection, matching)]
     ]
     found += [
@@ -347,6 +349,8 @@ def _belonging(alarm: Alarm, detection: Detection, matching: Matching) -> tuple[
     # Alarms of several joints at much the same time count as one false alarm.
     if alarm in matching.false_alarms or not earlier:
         recording = detection.operation.recording
+        if detection.operation.log and not any(item.time <= alarm.time for item in matching.false_alarms):
+            return None, "further alarm"
         known = bool(matching.matches) or any(channel in recording for channel in SHOWS_CONTACTS)
         return None, "false alarm" if known else "alarm"
     return max(earlier, key=lambda contact: contact.start), "further alarm"

@@ -88,9 +88,8 @@ def _headline(item: AlarmExplanation) -> str:
     if item.role == "in progress":
         return f"alarm at {at}, in a contact {IN_PROGRESS}: no latency"
     if item.contact is None:
-        known = "false alarm" if item.role == "false alarm" else "alarm"
-        why = "no contact belongs to it" if item.role == "false alarm" else "this log has no ground truth"
-        return f"{known} at {at}: {why}"
+        why = {"false alarm": "no contact belongs to it", "further alarm": "of a contact in another operation"}
+        return f"{item.role} at {at}: {why.get(item.role, 'this log has no ground truth')}"
     late = item.alarm.time - item.contact.start
     what = "alarm" if item.role == "detection" else "further alarm"
     onset = f"onset at {item.contact.start:.3f} s, {item.contact.found_by}{_unseen(item.contact)}"

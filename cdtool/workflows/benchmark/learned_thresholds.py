@@ -81,7 +81,7 @@ def learn_thresholds(
             continue
         skipped = [*of_detector.skipped, *of_detector.made.skipped]
         left_out.add(detector.name, skipped)
-        unused.append({item.recording for item in skipped})
+        unused.append({item.recording for item in (*skipped, *of_detector.made.creeping)})
         learned.calibration.extend(of_detector.made.calibration)
         learned.thresholds[detector.name] = of_detector.made.thresholds
         learned.findings.extend(of_detector.made.findings)
@@ -97,6 +97,7 @@ def learn_thresholds(
 class _Made:
     thresholds: tuple[FittedThreshold, ...]
     skipped: tuple[Skipped, ...]
+    creeping: tuple[Skipped, ...]
     findings: tuple[RecordingFinding, ...]
     calibration: tuple[CalibrationResult, ...] = ()
 
@@ -142,11 +143,11 @@ def _learn(setup: BenchmarkFile, detector: str, pairs: Sequence[Pair], left_out:
     fitted = with_left_out(fit, left_out)(pairs)
     findings = fitted.findings(setup.rule, detector)
     if not setup.budget:
-        return _Made(fitted.thresholds, fitted.skipped, findings)
-    made = calibrate(setup.budget, detector, kept(pairs, fitted.skipped), fit, setup.activation, setup.split)
+        return _Made(fitted.thresholds, fitted.skipped, fitted.creeping, findings)
+    made = calibrate(setup.budget, detector, kept(pairs, fitted), fit, setup.activation, setup.split)
     result = CalibrationResult(detector, str(setup.budget), made.factor, made.operations, made.hours, made.alarms)
     thresholds = tuple(item.with_safety_factor(made.factor) for item in fitted.thresholds)
-    return _Made(thresholds, fitted.skipped, findings, (result,))
+    return _Made(thresholds, fitted.skipped, fitted.creeping, findings, (result,))
 
 
 @dataclass(frozen=True)

@@ -202,7 +202,7 @@ def learned_from_runs(
     thresholds, origin = fitted.thresholds, FactorOrigin("hand" if set_by_hand(rule) else "default")
     if budget:
         made = calibrate(
-            budget, instance.name, in_fixed_order(kept(pairs, fitted.skipped)), fit, setting.activation, setting.split
+            budget, instance.name, in_fixed_order(kept(pairs, fitted)), fit, setting.activation, setting.split
         )
         thresholds = tuple(item.with_safety_factor(made.factor) for item in thresholds)
         origin = FactorOrigin("budget", str(budget), made.operations, made.alarms)
