@@ -87,22 +87,6 @@ def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: Plausib
     return _with_channels(location(log), read_recording(location(log), machine_file, ranges))
 
 
-def load_operations(
-    path: Path,
-    machine_file: MachineFile,
-    how: str,
-    base: Path | None = None,
-    ranges: PlausibleRanges | None = None,
-    onset: OnsetRule | None = None,
-) -> tuple[Recording, list[Operation]]:
-    """Return one log's recording, named by its path below `base`, and its operations; CdtoolError names the file.
-
-    A force with several axes is a magnitude, their rest levels removed by the `onset` rule.
-    """
-    recording = read_named(path, machine_file, base, ranges, onset)
-    return recording, operations_of(recording, how)
-
-
 def read_named(
     path: Path,
     machine_file: MachineFile,
