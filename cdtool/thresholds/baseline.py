@@ -197,7 +197,6 @@ def _speeds(recording: Recording, signal: Signal) -> list[FloatArray]:
 @kernel(
     f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {READ_ONLY}, float64, b1, "
     "float64[::1], float64[::1])",
-    rare=True,
 )
 def _first_seconds(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by one
     time: FloatArray,
