@@ -87,6 +87,7 @@ class FittedBaseline:
             column = np.empty((2, shape[0]))
             speed = np.abs(speeds[j])
             _first_seconds(signal.time, values, usable, speed, self.warm_up, self.widen, column[0], column[1])
+            column[1][column[1] <= 1e-12 * np.abs(column[0])] = 0.0  # rounding errors
             opposed[:, j] = _last_direction(speeds[j]) if signal.signed else 1.0
             centre[:, j], spread[:, j] = column
             status[usable & np.isnan(column[0]), j] = Status.START_UP
