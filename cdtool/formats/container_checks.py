@@ -12,7 +12,7 @@ from typing import Any
 import numpy.typing as npt
 
 from cdtool.columns import as_float64
-from cdtool.errors import CdtoolError, RecordingError
+from cdtool.errors import CdtoolError, RecordingError, installing
 from cdtool.findings import Finding
 from cdtool.findings.containers import ColumnLeftOut, RoundedColumn
 from cdtool.recording import FloatArray
@@ -29,9 +29,7 @@ def library(module: str, extra: str, path: Path) -> Any:
     try:
         return import_module(module)
     except ImportError as fault:
-        raise RecordingError(
-            f"{path}: {module.partition('.')[0]} is not installed", f"pip install 'cdtool[{extra}]'"
-        ) from fault
+        raise RecordingError(f"{path}: {module.partition('.')[0]} is not installed", installing(extra)) from fault
 
 
 def check_size(path: Path, values: int) -> None:

@@ -190,7 +190,7 @@ def test_without_typst_a_pdf_is_refused_before_the_benchmark_runs(rig, tmp_path,
     monkeypatch.setitem(__import__("sys").modules, "typst", None)
     made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "protocol.pdf")
     assert made.status == 2 and made.out == ""
-    assert "pip install 'cdtool[pdf]'" in made.err and len(made.err.splitlines()) == 1
+    assert "pip install '.[pdf]'" in made.err and len(made.err.splitlines()) == 1
 
 
 def test_a_pdf_has_every_number_of_the_results_that_the_protocol_shows(rig, tmp_path):

@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.bounded_loading import parse_json, parse_own_json, read_bytes
-from cdtool.errors import ConfigurationError, UsageError
+from cdtool.errors import ConfigurationError, UsageError, installing
 from cdtool.files import write_bytes, write_text
 from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.store.encoding import decoded, encoded
@@ -235,7 +235,7 @@ def require_pyarrow() -> None:
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError as fault:
-        raise UsageError("--store needs pyarrow", "install it: pip install 'cdtool[store]'") from fault
+        raise UsageError("--store needs pyarrow", f"install it: {installing('store')}") from fault
 
 
 def write_part(folder: Path, entries: Sequence[Entry]) -> Path:
