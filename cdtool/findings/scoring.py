@@ -77,7 +77,7 @@ class LogNotCut(Fact):
         which = f"stroke {number[0]} is" if len(number) == 1 else f"{len(number)} of them are"
         return (
             f"contains {counted(self.strokes, 'stroke')} in one operation, and {which} not assessable: cut it with "
-            'operations = "motion" in the benchmark file, or --operations motion'
+            'operations = "motion" in the benchmark file, or detect --operations motion'
         )
 
 
