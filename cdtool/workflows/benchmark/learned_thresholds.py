@@ -58,7 +58,8 @@ def learn_thresholds(
     runs. Raises SignatureError if nothing can be learned, UsageError if there are too few runs for the budget.
     """
     learned = LearnedThresholds({}, [], [], [], {}, set(), {})
-    of_run = [item for item in detectors if is_per_run(setup.rule_of(item.name))]
+    by_hand = setup.limits_by_hand and not setup.learn
+    of_run = [item for item in detectors if by_hand or is_per_run(setup.rule_of(item.name))]
     if of_run and not setup.budget:
         learned.thresholds.update((detector.name, (setup.rule_of(detector.name).fit([]),)) for detector in of_run)
         detectors = [item for item in detectors if item not in of_run]
