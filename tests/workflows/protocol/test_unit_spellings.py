@@ -139,7 +139,6 @@ def test_no_spelling_of_a_unit_passes_a_force_above_the_limit(tmp_path, spelling
     check(tmp_path, spelling, [368.0, 421.0], by_init)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("spelling", "by_init"), MATRIX, ids=name_of)
 def test_no_spelling_of_a_unit_passes_one_of_60_curves_above_the_limit(tmp_path, spelling, by_init):
     check(tmp_path, spelling, PEAKS, by_init)
