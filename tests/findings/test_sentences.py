@@ -774,7 +774,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (scoring.LearnedFromIt(), "the signature was learned from this log: the absence of alarms is no evidence"),
     (scoring.PlotsLeftOut(7), "7 more operations with a miss or a false alarm have no trigger plot"),
-    (scoring.LimitsUnchecked(1, 2), "1 of 2 limits are set for detectors that were not run: not checked"),
+    (scoring.LimitsUnchecked(1, 2, "gm"), "1 of 2 limits are set for detectors that were not run (gm): not checked"),
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
     (
         scoring.SingleSpeed("forward at 0.2 m/s"),
@@ -782,6 +782,10 @@ SENTENCES: list[tuple[Fact, str]] = [
             "speed_range has no effect: of this motion only one speed was learned, forward at 0.2 m/s; add runs at "
             "another speed"
         ),
+    ),
+    (
+        scoring.CreepNotLearned(14, "runs forward at 0.01 m/s: too few"),
+        "14 strokes at creep speed not learned, and not assessed: runs forward at 0.01 m/s: too few",
     ),
     (scoring.DetectorUnassessable("nothing is valid"), "not assessable: nothing is valid"),
     (
