@@ -317,8 +317,8 @@ def _of_forces(checks: Sequence[ForceCheck]) -> Iterator[Statement]:
     of, unseen = _things(checks), verdicts["not_assessable"]
     groups = [item.group for item in checks if not item.name]
     if verdicts["fail"]:
-        words = f"force profile violated by {verdicts['fail']} of {of}"
-        yield Statement(Severity.VIOLATED, words, Fact.FORCE_VIOLATED, _force_reasons(checks, "fail", "violated by"))
+        violated = f"force profile violated by {verdicts['fail']} of {of}"
+        yield Statement(Severity.VIOLATED, violated, Fact.FORCE_VIOLATED, _force_reasons(checks, "fail", "violated by"))
     words = [f"force profile not assessable for {unseen - len(groups)} of {of}"] if unseen > len(groups) else []
     words += [f"force profile not assessable in {', '.join(groups)}, where no contact was scored"] if groups else []
     if words:

@@ -780,9 +780,9 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         scoring.SpeedsPooled("limit", "forward at 0.2 m/s", "forward at 0.3 m/s"),
         (
-            "the threshold limit pools runs forward at 0.2 m/s and forward at 0.3 m/s: its limits are too wide for one of "
-            'them; learn and score each speed in a benchmark file of its own, or set threshold = "signature", which has '
-            "limits by speed"
+            "the threshold limit pools runs forward at 0.2 m/s and forward at 0.3 m/s: its limits are too wide for one "
+            'of them; learn and score each speed in a benchmark file of its own, or set threshold = "signature", which '
+            "has limits by speed"
         ),
     ),
     (

@@ -192,9 +192,9 @@ def _fit_classes(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
     creeping: list[Skipped] = []
     learned = sorted((item for of_class in used for item in of_class), key=lambda item: item.motion.nominal_speed)
     speeds = {id(item.whole): item.motion.nominal_speed for item in learned}  # the highest of each log
-    for fault, operations in refused:
+    for failure, operations in refused:
         is_creep = all(item.motion.nominal_speed < _CREEP * speeds.get(id(item.whole), 0.0) for item in operations)
-        reason = f"runs {operations[0].motion.described}: {fault.message}"
+        reason = f"runs {operations[0].motion.described}: {failure.message}"
         (creeping if is_creep else skipped).extend(Skipped(item.name, reason) for item in operations)
     return Fitted(tuple(fitted), tuple(used), tuple(skipped), tuple(creeping))
 
