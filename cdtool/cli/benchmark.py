@@ -54,7 +54,7 @@ def benchmark(
             "--protocol",
             "-p",
             parser=location,
-            help="Protocol file (TOML) for -o protocol.pdf or protocol.html. Default: [protocol] of FILE.",
+            help="Protocol file (TOML) for -o NAME.pdf or NAME.html, the protocol. Default: [protocol] of FILE.",
         ),
     ] = None,
     detectors: Annotated[
@@ -113,7 +113,7 @@ def benchmark(
     if dry_run:
         _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
         return
-    documents, targets = protocol_names(output or [])
+    documents, targets = protocol_names(output or [], protocol is not None)
     protocol_file = file_of_protocol(file, protocol, documents)
     check_outputs(targets, force=force)
     check_outputs(documents, force=force, subject="protocol")

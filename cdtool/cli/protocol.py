@@ -159,7 +159,7 @@ def file_of_protocol(benchmark: Path, given: Path | None, targets: Sequence[Path
 
     if not targets:
         if given is not None:
-            raise UsageError("-p: no protocol is written", "add -o protocol.pdf or -o protocol.html")
+            raise UsageError("-p: no output is the protocol", "add -o protocol.pdf or -o protocol.html")
         return None
     if given is None and not has_protocol(benchmark):
         raise UsageError(

@@ -13,12 +13,13 @@ from functools import cached_property
 from time import perf_counter
 from typing import Any
 
+from cdtool.bounded_loading import parse_own_json
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
 from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut
-from cdtool.kernel_warm_up import compile_loaded
+from cdtool.kernel_warm_up import compile_package
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.remote.remote_path import location
@@ -85,7 +86,7 @@ class Learned:
     def of_text(cls, text: str, rule: Threshold) -> Learned:
         """Return what `to_text` wrote; raises ValueError for anything else."""
         try:
-            values = json.loads(text)
+            values = parse_own_json(text)
             ranges = {name: PlausibleRanges.from_dict(item) for name, item in values["ranges_without"].items()}
             return cls(
                 decoded(values["about"], AboutLearning),
@@ -150,7 +151,7 @@ class Teaching:
     @cached_property
     def _read(self) -> tuple[Runs, float]:
         """Return the runs, and the time that it took to read them [s]."""
-        compile_loaded()
+        compile_package()
         begin = perf_counter()
         runs = load_runs(self.setup.learn, self.setup.machine_file, self.setup.run_reading(self.workers))
         return runs, perf_counter() - begin
