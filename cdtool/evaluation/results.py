@@ -267,6 +267,8 @@ class ConclusionResult:
         default=(),
     )
 
+    __repr__ = short_repr
+
 
 @frozen
 class Skipped:
