@@ -161,7 +161,7 @@ class StuckChannel(Fact):
 class UnitContradicted(Fact):
     """The header of a column, and of `more` others, states another unit than the machine file, or none that is known.
 
-    A loss: the channel is not assessable. A note, of a text that is no unit: a force is not compared with limits.
+    A loss: the channel is not assessable. A note, of a text that is not a unit: a force is not compared with limits.
     `stated` is what the machine file says, `ratio` the factor between both units (0: they measure different things).
     `advice`: what to write if the header is right, with "unit and scale" a scale in the unit `scale`.
     """

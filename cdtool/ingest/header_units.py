@@ -34,7 +34,7 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
     """Return a loss for each channel whose columns have units that contradict the machine file, in kind or factor.
 
     An explicit scale that converts the header's unit to the channel's is not a contradiction, and a unit that the
-    machine file confirms is none either. A text in the place of the unit that is no unit is a note; of a pressure a
+    machine file confirms is none either. A text in the place of the unit that is not a unit is a note; of a pressure a
     loss, as that is only compared with limits. The map's columns are resolved (resolve_columns).
     """
     findings = []

@@ -117,7 +117,7 @@ def test_a_header_with_a_matching_or_unknown_unit_is_not_reported(log, machine, 
         ("torque", "actual", "note"),
     ],
 )
-def test_a_text_that_is_no_unit_is_reported(log, machine, channel, header, severity):
+def test_a_text_that_is_not_a_unit_is_reported(log, machine, channel, header, severity):
     unit = {"force": "N", "torque": "N", "contact_pressure": "kPa"}[channel]
     (finding,) = findings_of_log(log, machine, LINEAR, channel, header, f'unit = "{unit}"')
     assert finding.fact == UnitContradicted(f"x [{header}]", header, 0, unit, 0.0, "no unit")

@@ -71,7 +71,7 @@ class Evidence:
         if quantity == "torque":
             return _of_torque(stream, accepted, self.channels.joints)
         largest = float(np.nanmax(np.abs(stream.values)))
-        why = f"the header says '{stream.unit}', which is no unit" if stream.unit else "the unit is not stated"
+        why = f"the header says '{stream.unit}', which is not a unit" if stream.unit else "the unit is not stated"
         return Logged(accepted[0], "", check=f"{why}; values reach {largest:.3g}: {others(accepted[0])}?")
 
     def _differs(self, channel: str) -> bool:

@@ -22,7 +22,7 @@ PEAKS, NOISE = [LIMIT * (0.9 + 0.2 * number / 59) for number in range(60)], 2.0
 
 @dataclass(frozen=True)
 class Spelling:
-    """A header of a force in newtons per `factor`, a row of units below it, and what comes of it.
+    """A header of a force in newtons per `factor`, a row of units below it, and its outcome.
 
     `drafted`: the protocol is as true as the curves with the machine file of `cdtool init`; `clear`: also with
     `unit = "N"`.
