@@ -238,7 +238,6 @@ def take_only_class(  # noqa: PLR0913  a kernel: one loop, arrays one by one
 @kernel(
     f"void({_MATRIX}, {_STATUS}, {_MATRIX}, {_MATRIX}, {_ROWS}, int64, "
     "float64[:,::1], uint8[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], uint8[:,::1])",
-    rare=True,
 )
 def merge_share(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     own_values: FloatArray,

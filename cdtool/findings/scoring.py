@@ -163,6 +163,20 @@ class CreepNotLearned(Fact):
 
 
 @frozen
+class SpeedsPooled(TemplateFact):
+    """A threshold that does not distinguish speeds was learned from runs at several speeds of one motion."""
+
+    threshold: str
+    slowest: str
+    fastest: str
+
+    words = (
+        "the threshold {threshold} pools runs {slowest} and {fastest}: its limits are too wide for one of them; learn "
+        'and score each speed in a benchmark file of its own, or set threshold = "signature", which has limits by speed'
+    )
+
+
+@frozen
 class DetectorUnassessable(TemplateFact):
     """A detector can assess none of the runs to learn from."""
 

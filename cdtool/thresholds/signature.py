@@ -187,8 +187,8 @@ class Signature:
         if runs < enough:
             many = "run" if runs == 1 else "runs"
             more = f"{enough - runs} more {'is' if enough - runs == 1 else 'are'} needed to have {enough}"
-            least = f"to learn from fewer, at least {LEAST_RUNS}"
-            fewer = f"{least}: force = true in [signature], or learn-signature --force"
+            how = "learn-signature --force, or force = true in [signature]"
+            fewer = f"to learn from fewer, but at least {LEAST_RUNS}: {how}"
             raise SignatureError(
                 f"{runs} impact-free {many} of one class: {more}", "add runs" if self.force else f"add runs; {fewer}"
             )

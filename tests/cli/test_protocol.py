@@ -138,7 +138,7 @@ def test_a_failed_protocol_is_the_first_sentence_everywhere_and_exits_with_1(tmp
     targets = [tmp_path / name for name in ("protocol.html", "report.html", "report.md", "junit.xml", "results.json")]
     options = [word for path in targets for word in ("-o", path)]
     made = cdtool("benchmark", benchmark, "-p", write_protocol(tmp_path), *options)
-    fail = "est protocol: fail: Limits exceeded at 1 of 1 measuring points"
+    fail = "est protocol: fail: 1 of 1 measuring points do not pass"
     assert made.status == 1 and made.out.startswith(f"t{fail}; all 2 limits are met")
     document, html, markdown, junit, results = (path.read_text(encoding="utf-8") for path in targets)
     assert fail.partition("fail: ")[2] in document

@@ -778,6 +778,14 @@ SENTENCES: list[tuple[Fact, str]] = [
     (scoring.LimitsUnchecked(1, 2, "gm"), "1 of 2 limits are set for detectors that were not run (gm): not checked"),
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
     (
+        scoring.SpeedsPooled("limit", "forward at 0.2 m/s", "forward at 0.3 m/s"),
+        (
+            "the threshold limit pools runs forward at 0.2 m/s and forward at 0.3 m/s: its limits are too wide for one "
+            'of them; learn and score each speed in a benchmark file of its own, or set threshold = "signature", which '
+            "has limits by speed"
+        ),
+    ),
+    (
         scoring.SingleSpeed("forward at 0.2 m/s"),
         (
             "speed_range has no effect: of this motion only one speed was learned, forward at 0.2 m/s; add runs at "

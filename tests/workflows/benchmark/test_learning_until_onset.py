@@ -353,3 +353,15 @@ def test_a_log_that_is_too_short_is_not_before_a_contact_at_infinity(gate):
     (skipped,) = load_runs(setup.learn, setup.machine_file, setup.run_reading()).skipped
     assert skipped.recording == "free/01.csv"
     assert skipped.reason.startswith("0.01 s to learn from: at least ")
+
+
+@pytest.mark.parametrize("threshold", ["signature", "cusum", "glr", "innovation"])
+@pytest.mark.parametrize("option", [[], ["--dry-run"]])
+def test_limits_by_location_learned_up_to_the_onset_only_are_refused(gate, threshold, option):
+    """Nothing is read: no run passes a contact without one. With impact-free runs in [learn] it is accepted."""
+    head = HEAD.replace('"limit"', f'"{threshold}"')
+    (gate / "place.toml").write_text("".join([head, LEARN, ONSET, GROUPS]), encoding="utf-8")
+    done = command("benchmark", gate / "place.toml", *option)
+    assert done.status == 2 and f"the threshold {threshold} would know no limit where" in one_line(done.err)
+    assert 'set threshold = "limit"' in one_line(done.err) and not done.out
+    setup_of(gate, head, LEARN.replace('["stiff', '["free/*.csv", "stiff'), ONSET, GROUPS)
