@@ -47,6 +47,12 @@ class MachineFile(StoresDerived):
         sources = [source for each in maps for source in (*each.sources, *each.beside)]
         return " or ".join(dict.fromkeys(item.reduction for item in sources if item.reduction))
 
+    def maps(self, channel: str) -> bool:
+        """Return whether a log has a column, a topic or a file beside it for a channel."""
+        return any(
+            item.channel == channel for each in (self.columns, self.topics) for item in (*each.sources, *each.beside)
+        )
+
     @property
     def label_kinds(self) -> tuple[str, ...]:
         """Return the kinds of contacts that a label channel distinguishes."""

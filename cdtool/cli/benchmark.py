@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.cli import completions
-from cdtool.cli.console import plain, print_json, print_skipped, progress
+from cdtool.cli.console import leave, plain, print_json, print_skipped, progress
 from cdtool.cli.options import (
     ClusterOption,
     ForceOption,
@@ -207,6 +207,7 @@ def _show_dry_run(
     found = dry_run(file, detectors=detectors, false_alarm_budget=false_alarm_budget, workers=workers, store=store)
     if as_json:
         print_json(asdict(found) | {"bytes": found.bytes})
+        leave(found.skipped)
         return
     for item in found.logs:
         typer.echo(f"{plain(item.recording)}: {', '.join(item.detectors)}, {decimal(item.bytes)}")
@@ -215,6 +216,8 @@ def _show_dry_run(
     typer.echo(f"{len(found.logs)} of {total} would be computed: {decimal(found.bytes)}{time}")
     if found.to_inject:
         typer.echo(f"{counted(found.to_inject, 'contact')} of [inject] would be made first, and computed too")
+    print_skipped(found.skipped)
+    leave(found.skipped)
 
 
 def _duration(seconds: float) -> str:

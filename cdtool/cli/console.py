@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from pathlib import PurePath
 from textwrap import fill
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -80,7 +82,11 @@ def _print_alike(word: str, every: Sequence[Skipped | RecordingFinding]) -> None
 
     items = alike([replace(item, reason=_bare(item)) for item in dict.fromkeys(every)])
     for item in items[:_SHOWN]:
-        typer.echo(one_line(f"{word}: {item.recording}: {item.reason}"), err=True)
+        reason = plain(item.reason)
+        # The name is shortened, not the reason.
+        room = LINE_LENGTH - len(f"{word}: : {reason}")
+        name = shorten(plain(item.recording), max(room, LINE_LENGTH // 4))
+        typer.echo(one_line(f"{word}: {name}: {reason}"), err=True)
     if len(items) > _SHOWN:
         typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
 
@@ -249,7 +255,7 @@ def progress(what: str, *, pulses: bool = False, quiet: bool = False) -> Iterato
 
 def _bare(item: Skipped | RecordingFinding) -> str:
     """Return a reason without the recording, which the line already names."""
-    return item.reason.removeprefix(f"{item.recording}: ")
+    return re.sub(rf"^[^:]*{re.escape(PurePath(item.recording).name)}: ", "", item.reason)
 
 
 @dataclass(frozen=True)

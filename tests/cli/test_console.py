@@ -11,6 +11,7 @@ import pytest
 from cdtool.cli import console
 from cdtool.errors import UsageError, nearest
 from cdtool.evaluation.force.limits import read_force_limits
+from cdtool.evaluation.results import Skipped
 from tests.command import cdtool
 
 
@@ -20,6 +21,16 @@ def test_ctrl_c_exits_with_130_and_one_line(gate_folder, place):
     with mock.patch(place, side_effect=KeyboardInterrupt):
         done = cdtool("detect", log, "-m", gate_folder / "machine.toml", "-d", "gm", "--limit", 400)
     assert (done.status, done.out, done.err) == (130, "", "interrupted\n")
+
+
+@pytest.mark.parametrize("folder", ["logs", "a/very/long/folder" * 20])
+def test_a_left_out_log_has_its_whole_reason_and_its_name_once(capsys, folder):
+    reason = "no column 'speed' (channel 'speed') (did you mean velocity? known: time, torque, velocity)"
+    console.print_skipped([Skipped(f"{folder}/x.csv", f"/data/{folder}/x.csv: {reason}")])
+    line = capsys.readouterr().err
+    assert line.endswith(f"x.csv: {reason}\n")
+    assert line.count("x.csv") == 1
+    assert len(line) <= 301
 
 
 def test_sentences_fit_100_columns_in_a_pipe_and_positions_have_a_unit(gate_folder, feekf_signature):

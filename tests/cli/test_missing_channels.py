@@ -51,6 +51,29 @@ def test_other_detectors_run_and_its_contacts_are_not_assessable(folder):
     assert "1 not assessable" in (folder / "r.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(
+    ("channel", "renamed", "named"),
+    [
+        (
+            "force",
+            'column = "cell"',
+            "stiff/01.csv: no ground truth: force: is not in this log: no column 'cell'",
+        ),
+        ("speed", 'column = "rpm"', "free/01.csv: no column 'rpm' (channel 'speed')"),
+    ],
+)
+def test_a_dry_run_names_the_column_that_a_log_does_not_have(folder, channel, renamed, named):
+    assert benchmark(folder, '["gm"]', "--dry-run").status == 0
+    text = (folder / "machine.toml").read_text(encoding="utf-8")
+    wrong = re.sub(rf'^({channel} = \{{ )column = "\w+"', rf"\g<1>{renamed}", text, count=1, flags=re.MULTILINE)
+    (folder / "machine.toml").write_text(wrong, encoding="utf-8")
+    done = benchmark(folder, '["gm"]', "--dry-run")
+    assert done.status == 3
+    assert f"left out: {named}" in done.err
+    assert "would be computed" in done.out
+    assert benchmark(folder, '["gm"]', "--dry-run", "--json").status == 3
+
+
 def test_a_limit_on_it_is_not_met(folder):
     limit = '[limits]\n"pi.stiff.missed" = { max = 0 }\n"gm.stiff.missed" = { max = 0 }\n'
     done = benchmark(folder, '["gm", "pi"]', limits=limit)

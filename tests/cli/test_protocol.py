@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -160,6 +161,24 @@ def test_a_protocol_and_other_reports_are_written_together_and_only_their_own_fi
     (tmp_path / "gate-protocol.html").write_text("written by hand", encoding="utf-8")
     refused = cdtool("benchmark", rig / "benchmark.toml", "-p", path, *targets)
     assert refused.status == 2 and "contains no test protocol of cdtool" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("file", "removed", "named"),
+    [
+        ("benchmark.toml", r"threshold = .*\n", "learn: is missing"),
+        ("machine.toml", r"force = .*\n", "Missing in machine.toml: channels.force"),
+    ],
+)
+def test_check_is_not_complete_where_the_next_command_fails(rig, tmp_path, file, removed, named):
+    rig = shutil.copytree(rig, tmp_path / "rig")
+    path = write_protocol(rig)
+    assert cdtool("protocol", "check", path).status == 0
+    text = (rig / file).read_text(encoding="utf-8")
+    (rig / file).write_text(re.sub(removed, "", text), encoding="utf-8")
+    checked = cdtool("protocol", "check", path)
+    assert checked.status == 4
+    assert named in " ".join(checked.out.split())
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,22 @@ def test_a_signature_is_learned_with_a_note_that_contacts_cannot_be_checked(bare
     assert len(told) == 1 and "3 logs" in told[0] and f"no column '{CELL}': assumed to be free of impacts" in told[0]
     checked = cdtool("signature", "check", tmp_path / "s.json", *logs, "-m", gate_folder / "machine.toml")
     assert checked.status == 0 and "3 logs" in checked.err
+
+
+def test_the_rule_of_the_load_cell_is_not_printed_without_one(bare, gate_folder, tmp_path):
+    shutil.copytree(bare, tmp_path, dirs_exist_ok=True)
+    lines = (gate_folder / "machine.toml").read_text(encoding="utf-8").splitlines()
+    machine = tmp_path / "machine.toml"
+    machine.write_text("\n".join(line for line in lines if not line.startswith("force")), encoding="utf-8")
+    (tmp_path / "contacts.csv").write_text(
+        "recording,start_s,end_s,kind,uncertainty_s\nstiff/01.csv,6.0,6.5,,0.001\n", encoding="utf-8"
+    )
+    file = benchmark_of(tmp_path, tmp_path, Path("stiff/01.csv"))
+    with file.open("a", encoding="utf-8") as more:
+        more.write('[onset]\nlabels = "contacts.csv"\n')
+    done = cdtool("benchmark", file)
+    assert "onset: as labelled; label file contacts.csv" in " ".join(done.out.split()), done.err
+    assert "load cell above" not in done.out
 
 
 def test_a_benchmark_learns_from_them_and_counts_false_alarms_in_them(bare, gate_folder):

@@ -128,7 +128,7 @@ class BenchmarkFile:
         """Return the settings that determine the results, for provenance; only results with equal settings compare."""
         reduction = self.machine_file.force_reduction
         return {
-            "onset": self.onset.described,
+            "onset": self.onset.described if self.machine_file.maps("force") else "as labelled",
             **({"force": reduction} if reduction else {}),
             "separation_s": self.onset.separation,
             "window_s": {name: self.impacts[name].window for name in self.groups_of_impacts},

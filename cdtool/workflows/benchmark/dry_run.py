@@ -6,15 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cdtool.evaluation.results import Skipped
+from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.benchmark.benchmark import BenchmarkWork, sweep_factors
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, with_only
 from cdtool.workflows.benchmark.learned import Teaching
 from cdtool.workflows.benchmark.measured_synchronisation import with_synchronisation
 from cdtool.workflows.benchmark.pieces import source_files
+from cdtool.workflows.benchmark.scoring import logs_to_score
 from cdtool.workflows.benchmark.stored_learned import StoreOfRun
 from cdtool.workflows.benchmark.with_injected import made_before, with_groups
 from cdtool.workflows.execution.workers import Workers
-from cdtool.workflows.runs import shown_path
+from cdtool.workflows.runs import load_runs, shown_path
 from cdtool.workflows.store.store import read_speed
 from cdtool.workflows.store.use import StoreUse
 
@@ -34,7 +37,8 @@ class DryRun:
     """The logs that would be computed, out of a `total`, and how long that takes [s]; None: nothing to estimate it by.
 
     `learned` is the number of impact-free runs, `to_inject` that of the contacts of [inject] that would be made before,
-    at least one recording each, and are not among the logs.
+    at least one recording each, and are not among the logs. `skipped`: logs that the run would leave out, as for a
+    column that they do not have; those at URLs are not read for it.
     """
 
     logs: tuple[PlannedLog, ...]
@@ -42,6 +46,7 @@ class DryRun:
     learned: int
     seconds: float | None
     to_inject: int = 0
+    skipped: tuple[Skipped, ...] = ()
 
     @property
     def bytes(self) -> int:
@@ -59,8 +64,8 @@ def dry_run(
 ) -> DryRun:
     """Return which logs of a benchmark `cdtool.benchmark` would compute with the same arguments; nothing is written.
 
-    If the store does not have what was learned from the impact-free runs, they are read: what they give decides about
-    all others. The time is estimated by that of the recordings in the store.
+    The logs that would be computed are read, so that one which cannot be used is named, and the impact-free runs unless
+    the store has what was learned from them. The time is estimated by that of the recordings in the store.
 
     Raises
     ------
@@ -88,7 +93,9 @@ def _dry_run(work: BenchmarkWork, workers: Workers, store: StoreUse | None) -> D
     if store is None or not store.exists:
         names = work.setup.detectors
         logs = [(group, path, names) for group, item in work.setup.impacts.items() for path in item.logs]
-        return _planned(work.setup, logs, len(logs), None)
+        learn = [path for path in work.setup.learn if not is_remote(path)]
+        runs = load_runs(learn, work.setup.machine_file, work.setup.run_reading(workers))
+        return _planned(work.setup, logs, len(logs), None, skipped=runs.skipped)
     with store.opened(writes=False) as folder:
         setup, _ = with_synchronisation(work.setup, workers)
         used = StoreOfRun(folder, store, workers)
@@ -100,7 +107,8 @@ def _dry_run(work: BenchmarkWork, workers: Workers, store: StoreUse | None) -> D
         missing = [
             (*log, outcomes.missing(planned)) for log, planned in zip(every, plan, strict=True) if not planned.is_known
         ]
-        return _planned(setup, missing, len(every), read_speed(folder.parts), workers.jobs)
+        speed = read_speed(folder.parts)
+        return _planned(setup, missing, len(every), speed, workers.jobs, learned.about.skipped)
 
 
 def _planned(
@@ -109,6 +117,7 @@ def _planned(
     total: int,
     speed: float | None,
     jobs: int = 1,
+    skipped: tuple[Skipped, ...] = (),
 ) -> DryRun:
     """Return the dry run of these logs; `speed` is that of one worker [bytes/s]."""
     planned = tuple(
@@ -116,7 +125,9 @@ def _planned(
     )
     size = sum(item.bytes for item in planned)
     seconds = None if speed is None else size / speed / jobs
-    return DryRun(planned, total, len(setup.learn), seconds if planned else 0.0)
+    read = [item for group, path, _ in logs if not is_remote(path) for item in logs_to_score(setup, group, path)]
+    skipped += tuple(item for item in read if isinstance(item, Skipped))
+    return DryRun(planned, total, len(setup.learn), seconds if planned else 0.0, skipped=skipped)
 
 
 def _size(setup: BenchmarkFile, path: Path) -> int:

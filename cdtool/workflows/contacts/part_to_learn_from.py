@@ -53,9 +53,9 @@ class PartToLearnFrom:
         part = recording.between(begin, end)
         if not part.channels or not part.duration >= _SHORTEST:
             left = digits(max(0.0, end - max(begin, recording.start)))
-            where = f"{digits(doubt)} s before the contact at {digits(first)} s"
+            where = f", {digits(doubt)} s before the contact at {digits(first)} s" if math.isfinite(first) else ""
             raise RecordingError(
-                f"{path}: {left} s to learn from, {where}: at least {digits(_SHORTEST)} s are needed",
+                f"{path}: {left} s to learn from{where}: at least {digits(_SHORTEST)} s are needed",
                 "reduce the guard ([learn] guard_s, learn-signature --guard), or leave the log out",
             )
         return part, ()

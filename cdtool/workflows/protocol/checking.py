@@ -61,14 +61,18 @@ def check_protocol(path: str | Path) -> CheckedProtocol:
     else:
         try:
             setup = read_benchmark_file(file.benchmark, learning=False, detectors=["all"])
+            if setup.detectors:  # the next command scores them
+                read_benchmark_file(file.benchmark)
         except CdtoolError as fault:
             more.append(Reason(ReasonKind.BENCHMARK_UNREADABLE, {"message": str(fault)}, due="test_day"))
     assignment = assign(file, setup) if setup else Assignment((), {})
     if setup is None:
         points = [check_point(point, file.profile_of(point), 0) for point in file.plan.points]
     else:
-        maps = setup.machine_file.columns, setup.machine_file.topics
-        logs_pressure = any(item.channel == CONTACT_PRESSURE for each in maps for item in (*each.sources, *each.beside))
+        if not setup.machine_file.maps("force"):
+            values = {"key": "channels.force", "file": setup.machine_file.path.name}
+            more.append(Reason(ReasonKind.NO_VALUE, values))
+        logs_pressure = setup.machine_file.maps(CONTACT_PRESSURE)
         points = [
             check_point(item.point, profiles_of(item, file, setup), len(item.logs), logs_pressure=logs_pressure)
             for item in assignment.points

@@ -347,6 +347,14 @@ def test_no_log_judges_itself_whatever_its_path_is_written(gate, how):
     assert own["momentum"] != learned.thresholds["momentum"]
 
 
+def test_a_log_that_is_too_short_is_not_before_a_contact_at_infinity(gate):
+    part = '[learn]\nuntil = "onset"\nlogs = [{ path = "free/01.csv", from = "2s", to = "2.01s" }, "stiff/01.csv"]\n'
+    setup = setup_of(gate, HEAD, part, ONSET, GROUPS)
+    (skipped,) = load_runs(setup.learn, setup.machine_file, setup.run_reading()).skipped
+    assert skipped.recording == "free/01.csv"
+    assert skipped.reason.startswith("0.01 s to learn from: at least ")
+
+
 @pytest.mark.parametrize("threshold", ["signature", "cusum", "glr", "innovation"])
 @pytest.mark.parametrize("option", [[], ["--dry-run"]])
 def test_limits_by_location_learned_up_to_the_onset_only_are_refused(gate, threshold, option):
