@@ -177,11 +177,10 @@ def facts_of(outcome: Outcome) -> tuple[Fact, ...]:
 
 def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
     """Print the verdict of a protocol, the first of its reasons, and the next step."""
-    from cdtool.report.protocol.words import words_of
+    from cdtool.report.protocol.document import protocol_statement
 
-    words = words_of("en")
-    typer.echo(f"protocol: {made.verdict.outcome}")
-    sentences = [*words.reasons(made.verdict, "fail"), *words.reasons(made.verdict, "incomplete")]
+    outcome, headline, *sentences = protocol_statement(made)
+    say(headline, tone={"pass": "good", "fail": "bad"}.get(outcome, "unknown"))
     for sentence in sentences[:_SHOWN]:
         say(f"- {sentence}", indent="  ")
     if len(sentences) > _SHOWN:

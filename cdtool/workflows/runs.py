@@ -13,7 +13,7 @@ from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
-from cdtool.findings.channels import AbsentTruth
+from cdtool.findings.channels import AbsentTruth, UnitContradicted
 from cdtool.ingest.reading import is_bag_folder, read_as_logged, read_recording
 from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
@@ -176,6 +176,8 @@ def _lost_run(path: Path, reason: str) -> _NotRead:
 
 def _with_channels(path: Path, recording: Recording) -> Recording:
     if not recording.channels:
+        for item in absent_truth(recording):
+            raise RecordingError(f"{path}: {item}")
         raise RecordingError(f"{path}: no channel is mapped", "add [channels] to the machine file")
     return recording
 
@@ -369,11 +371,13 @@ def lost(recording: Recording) -> list[RecordingFinding]:
 
 
 def absent_truth(recording: Recording) -> list[Finding]:
-    """Return the notes about ground truth of contacts that the machine file maps but the log does not contain."""
+    """Return the findings about ground truth of contacts that is mapped, but not in the log or in a doubtful unit."""
     return [
         item
         for item in recording.findings
-        if isinstance(item.fact, AbsentTruth) and item.channel in SHOWS_CONTACTS and item.channel not in recording
+        if isinstance(item.fact, AbsentTruth | UnitContradicted)
+        and item.channel in SHOWS_CONTACTS
+        and item.channel not in recording
     ]
 
 

@@ -128,12 +128,25 @@ def test_the_exit_status_is_that_of_the_verdict(flaws, status, word, rig, tmp_pa
     assert (made.status, f"protocol: {word}" in made.out) == (status, True), made.out + made.err
 
 
-def test_a_fail_exits_with_1(tmp_path):
+def test_a_failed_protocol_is_the_first_sentence_everywhere_and_exits_with_1(tmp_path):
     write_rig(tmp_path, [half_sine(peak) for peak in (700.0, 710.0, 720.0)])
-    made = cdtool(
-        "benchmark", tmp_path / "benchmark.toml", "-p", write_protocol(tmp_path), "-o", tmp_path / "protocol.html"
+    benchmark = tmp_path / "benchmark.toml"
+    limits = '\n[limits]\n"*.missed" = { max = 3 }\n"*.false_alarms" = { max = 9 }\n'
+    benchmark.write_text(benchmark.read_text(encoding="utf-8") + limits, encoding="utf-8")
+    targets = [tmp_path / name for name in ("protocol.html", "report.html", "report.md", "junit.xml", "results.json")]
+    options = [word for path in targets for word in ("-o", path)]
+    made = cdtool("benchmark", benchmark, "-p", write_protocol(tmp_path), *options)
+    fail = "est protocol: fail: Limits exceeded at 1 of 1 measuring points"
+    assert made.status == 1 and made.out.startswith(f"t{fail}; all 2 limits are met")
+    document, html, markdown, junit, results = (path.read_text(encoding="utf-8") for path in targets)
+    assert fail.partition("fail: ")[2] in document
+    assert f'<p class="verdict bad"><strong>T{fail}; all 2' in html
+    assert (
+        markdown.startswith(f"# Collision detection: t{fail}; all 2") and f'"failure" message="t{fail}; all 2' in junit
     )
-    assert made.status == 1 and "protocol: fail" in made.out
+    assert json.loads(results)["conclusion"]["headline"].startswith(f"t{fail}; all 2")
+    again = cdtool("report", targets[-1])
+    assert (again.status, again.out.splitlines()[0]) == (1, made.out.splitlines()[0])
 
 
 def test_a_protocol_and_other_reports_are_written_together_and_only_their_own_files_replaced(rig, tmp_path):

@@ -506,27 +506,37 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         channels.UnitContradicted("v [mm/s]", "mm/s", 0, "m/s", 1000.0, "unit"),
         (
-            "the header says 'v [mm/s]', the machine file m/s (a factor of 1000): write unit = \"mm/s\" if "
-            "the header is right"
+            "the header says 'v [mm/s]', the machine file m/s (a factor of 1000), not assessable: write "
+            'unit = "mm/s" if the header is right, else unit_confirmed = true'
         ),
     ),
     (
         channels.UnitContradicted("i [A]", "A", 2, "N m", 0.0, "unit and scale", "N m per A"),
         (
-            "the header says 'i [A]' and 2 more so, the machine file N m: write unit = \"A\" with a scale in "
-            "N m per A if the header is right"
+            "the header says 'i [A]' and 2 more so, the machine file N m, not assessable: write unit = \"A\" "
+            "with a scale in N m per A if the header is right, else unit_confirmed = true"
         ),
     ),
     (
         channels.UnitContradicted("M [N m]", "N m", 0, "A", 0.0, "unit without scale"),
         (
-            "the header says 'M [N m]', the machine file A: write unit = \"N m\" without that scale if the "
-            "header is right"
+            "the header says 'M [N m]', the machine file A, not assessable: write unit = \"N m\" without that "
+            "scale if the header is right, else unit_confirmed = true"
         ),
     ),
     (
-        channels.UnitContradicted("T [K]", "K", 0, "N m", 0.0, "other column"),
-        "the header says 'T [K]', the machine file N m: is it another column?",
+        channels.UnitContradicted("T [kN]", "kN", 0, "N m", 0.0, "other column"),
+        (
+            "the header says 'T [kN]', the machine file N m, not assessable: map another column, or write "
+            "unit_confirmed = true if it is this one"
+        ),
+    ),
+    (
+        channels.UnitContradicted("F (raw)", "raw", 0, "N", 0.0, "no unit"),
+        (
+            "the header says 'F (raw)', the machine file N, which the header does not confirm: write "
+            "unit_confirmed = true if that is right"
+        ),
     ),
     (
         channels.DerivedSpeed(50.0),
@@ -764,7 +774,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (scoring.LearnedFromIt(), "the signature was learned from this log: the absence of alarms is no evidence"),
     (scoring.PlotsLeftOut(7), "7 more operations with a miss or a false alarm have no trigger plot"),
-    (scoring.LimitsUnchecked(1, 2), "1 of 2 limits are set for detectors that were not run: not checked"),
+    (scoring.LimitsUnchecked(1, 2, "gm"), "1 of 2 limits are set for detectors that were not run (gm): not checked"),
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
     (
         scoring.SingleSpeed("forward at 0.2 m/s"),
@@ -772,6 +782,10 @@ SENTENCES: list[tuple[Fact, str]] = [
             "speed_range has no effect: of this motion only one speed was learned, forward at 0.2 m/s; add runs at "
             "another speed"
         ),
+    ),
+    (
+        scoring.CreepNotLearned(14, "runs forward at 0.01 m/s: too few"),
+        "14 strokes at creep speed not learned, and not assessed: runs forward at 0.01 m/s: too few",
     ),
     (scoring.DetectorUnassessable("nothing is valid"), "not assessable: nothing is valid"),
     (

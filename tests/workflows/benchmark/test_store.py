@@ -406,8 +406,8 @@ def test_what_was_learned_is_restored_without_loss(made, threshold, tmp_path):
         (tmp_path / name).symlink_to(made / name)
     setup = with_detectors(read_benchmark_file(write(tmp_path, threshold)), ["momentum", "friction_ekf"])
     learned = Teaching(setup, Workers()).learned
-    restored = Learned.of_text(learned.to_text(setup.rule_of), setup.rule_of)
-    assert replace(restored, seconds=learned.seconds).to_text(setup.rule_of) == learned.to_text(setup.rule_of)
+    restored = Learned.of_text(learned.to_text(setup.rule), setup.rule)
+    assert replace(restored, seconds=learned.seconds).to_text(setup.rule) == learned.to_text(setup.rule)
     assert restored.about == learned.about
 
 
