@@ -141,7 +141,8 @@ class TimeSource:
     """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks.
 
     With both a column and a rate, the column counts samples: a gap in it is a gap in time. `unit` is the column's.
-    `key` is the column by its name in the file, once this is known (resolve_columns).
+    `nanoseconds` is the column with the rest of each stamp within the second. `key` and `nanoseconds_key` are the
+    columns by their names in the file, once these are known (resolve_columns).
     """
 
     column: str | int | None = None
@@ -150,6 +151,8 @@ class TimeSource:
     rate: float | None = None
     clock: Literal["log", "publish", "header"] = "log"
     key: str = ""
+    nanoseconds: str | int | None = None
+    nanoseconds_key: str = ""
 
 
 @dataclass(frozen=True)
@@ -252,8 +255,9 @@ def _column_time(part: Table) -> TimeSource:
     found = unit(name, part.key("unit"))
     if found.si != "s":
         raise part.fault("unit", f"'{name}' is not a unit of time", "give s, ms, us, ns or min")
+    rest = _column(part, part.raw("nanoseconds"), "nanoseconds") if "nanoseconds" in part else None
     part.finish()
-    return TimeSource(column=column, factor=found.factor, unit=name)
+    return TimeSource(column=column, factor=found.factor, unit=name, nanoseconds=rest)
 
 
 def _source(

@@ -329,7 +329,9 @@ main()
 
 
 @posix_only
-@pytest.mark.parametrize("module", ["cdtool.cli.app", "logging", "typer", "cdtool.exit_status", "cdtool.cli.list_known"])
+@pytest.mark.parametrize(
+    "module", ["cdtool.cli.app", "logging", "typer", "cdtool.exit_status", "cdtool.cli.list_known"]
+)
 def test_ctrl_c_during_the_first_imports_shows_no_traceback(module):
     done = subprocess.run([sys.executable, "-c", STRUCK, module], cwd=ROOT, capture_output=True, text=True, check=False)
     # Ended by the signal itself, which a shell shows as 130, or by the command once it catches signals.

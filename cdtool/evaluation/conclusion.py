@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
+from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.limits import not_met
 from cdtool.evaluation.recording_outcomes import MISSES
@@ -216,9 +218,9 @@ def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult
     tone, headline, statements = worst_first(
         (
             *_of_protocol(results.conclusion.protocol),
+            *_of_limits(results),
             *_of_forces(checks),
             *_of_misses(results, summaries),
-            *_of_limits(results),
             *_of_false_alarms(results, summaries),
             *_of_unassessed(results, summaries),
             *_of_losses(results),
@@ -315,8 +317,8 @@ def _of_forces(checks: Sequence[ForceCheck]) -> Iterator[Statement]:
     of, unseen = _things(checks), verdicts["not_assessable"]
     groups = [item.group for item in checks if not item.name]
     if verdicts["fail"]:
-        words = f"force profile violated by {verdicts['fail']} of {of}"
-        yield Statement(Severity.VIOLATED, words, Fact.FORCE_VIOLATED, _force_reasons(checks, "fail", "violated by"))
+        violated = f"force profile violated by {verdicts['fail']} of {of}"
+        yield Statement(Severity.VIOLATED, violated, Fact.FORCE_VIOLATED, _force_reasons(checks, "fail", "violated by"))
     words = [f"force profile not assessable for {unseen - len(groups)} of {of}"] if unseen > len(groups) else []
     words += [f"force profile not assessable in {', '.join(groups)}, where no contact was scored"] if groups else []
     if words:
@@ -368,7 +370,10 @@ def _of_misses(results: Results, summaries: Sequence[Summary]) -> Iterator[State
 def _of_false_alarms(results: Results, summaries: Sequence[Summary]) -> Iterator[Statement]:
     """Yield false alarms without a limit, and those above the budget of a detector whose safety factor it set."""
     limited = {(item.detector, item.group) for item in results.limits if item.figure.startswith("false_alarms")}
-    budgets = {item.detector: Budget.parse(item.budget) for item in results.calibration}
+    budgets = {}
+    for each in results.calibration:
+        with suppress(UsageError):  # a results file may hold anything
+            budgets[each.detector] = Budget.parse(each.budget)
     alone, above = [], []
     for item in summaries:
         if (item.detector, item.group) in limited or not item.false_alarms:
@@ -378,7 +383,7 @@ def _of_false_alarms(results: Results, summaries: Sequence[Summary]) -> Iterator
         elif words := budgets[item.detector].excess(
             (item.alarming, item.judged_operations), (item.false_alarms, item.hours)
         ):
-            above.append(plain(f"{_pair(item)}: {words}"))
+            above.append((words, plain(f"{_pair(item)}: {words}")))
     if alone:
         reasons = [
             f"{_pair(item)}: {counted(item.false_alarms, 'false alarm')} in {item.alarming} of "
@@ -388,7 +393,8 @@ def _of_false_alarms(results: Results, summaries: Sequence[Summary]) -> Iterator
         words = f"{counted(sum(item.false_alarms for item in alone), 'false alarm')} without a limit"
         yield Statement(Severity.WITHOUT_LIMIT, words, None, tuple(map(plain, reasons)))
     if above:
-        yield Statement(Severity.OVER_BUDGET, f"more false alarms than the budget: {above[0]}", None, tuple(above))
+        words = f"more false alarms than the budget: {above[0][0]}"
+        yield Statement(Severity.OVER_BUDGET, words, None, tuple(line for _, line in above))
 
 
 def _pair(item: Summary) -> str:

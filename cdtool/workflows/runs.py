@@ -28,6 +28,8 @@ from cdtool.workflows.log_checks.log_findings import log_warnings
 
 # Folders of which every worker of a cluster must see a log, before it reads others.
 _FOLDERS = 50
+# Without these nothing is learned from a run: its motion and its load.
+_LEARNED_FROM = ("torque", "speed", "position")
 
 
 @dataclass(frozen=True)
@@ -85,22 +87,6 @@ def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: Plausib
     """Read a log through a machine file, as `cdtool.read` describes; raises CdtoolError."""
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     return _with_channels(location(log), read_recording(location(log), machine_file, ranges))
-
-
-def load_operations(
-    path: Path,
-    machine_file: MachineFile,
-    how: str,
-    base: Path | None = None,
-    ranges: PlausibleRanges | None = None,
-    onset: OnsetRule | None = None,
-) -> tuple[Recording, list[Operation]]:
-    """Return one log's recording, named by its path below `base`, and its operations; CdtoolError names the file.
-
-    A force with several axes is a magnitude, their rest levels removed by the `onset` rule.
-    """
-    recording = read_named(path, machine_file, base, ranges, onset)
-    return recording, operations_of(recording, how)
 
 
 def read_named(
@@ -223,9 +209,9 @@ def load_runs(
 ) -> Runs:
     """Return the operations of many impact-free logs; a log that cannot be read is left out and reported.
 
-    Also left out: a log that is given twice or has the content of another one, and an operation in which the load cell
-    shows a contact. Values that no sensor can measure are masked: those outside the plausible `ranges`, which are
-    learned from all these logs if none are given.
+    Also left out: a log that is given twice or has the content of another one, a log whose header contradicts the unit
+    of its motion or torque, and an operation in which the load cell shows a contact. Values that no sensor can measure
+    are masked: those outside the plausible `ranges`, which are learned from all these logs if none are given.
     """
     rule, base = reading.onset or OnsetRule(), reading.base
     paths, repeated = _each_once(paths)
@@ -256,6 +242,7 @@ def load_runs(
         try:
             if isinstance(item, CdtoolError):
                 raise item
+            _refuse_doubted(path, item.recording)
             recording = item.on_load_side(machine_file.machine, known.all, to_learn=True)
             recording = with_scalar_force(replace(recording, name=shown_path(path, base)), rule)
             contacts: Sequence[Contact] | None = None
@@ -379,6 +366,12 @@ def absent_truth(recording: Recording) -> list[Finding]:
         and item.channel in SHOWS_CONTACTS
         and item.channel not in recording
     ]
+
+
+def _refuse_doubted(path: Path, recording: Recording) -> None:
+    for item in recording.findings:
+        if isinstance(item.fact, UnitContradicted) and item.severity == "loss" and item.channel in _LEARNED_FROM:
+            raise RecordingError(f"{path}: {item}")
 
 
 def _glob(path: Path) -> Iterator[Path]:

@@ -205,7 +205,7 @@ WORST = {
     ),
     "false alarms above a budget": (
         replace(results([40.0] * 3, **FREE), calibration=SET), [], (), "unknown", 0,
-        "more false alarms than the budget: momentum, holdout: 24 of 40 runs alarm where 1/5op allows 8 "
+        "more false alarms than the budget: 24 of 40 runs alarm where 1/5op allows 8 "
         "(chance below 0.1 %); no limits are set",
     ),
     "limits of a detector that was not run": (

@@ -58,7 +58,8 @@ SENTENCES: list[tuple[Fact, str]] = [
         clocks.BackwardStamps(3, 20, (3, 4, 5), "line", clocks.ClockRestart()),
         (
             "3 time stamps run backward (line 3, 4, 5), dropped (15 % of the rows); the clock starts again "
-            "there, or has jumped ahead before: cut the log there (--operations clock-reset), or correct its stamps"
+            "there, or has jumped ahead before: cut the log there (operations "
+            '= "clock-reset" in the benchmark file, or detect --operations clock-reset), or correct its stamps'
         ),
     ),
     (
@@ -758,14 +759,14 @@ SENTENCES: list[tuple[Fact, str]] = [
         scoring.LogNotCut(4, (3,)),
         (
             "contains 4 strokes in one operation, and stroke 3 is not assessable: cut it with operations = "
-            '"motion" in the benchmark file, or --operations motion'
+            '"motion" in the benchmark file, or detect --operations motion'
         ),
     ),
     (
         scoring.LogNotCut(4, (2, 3)),
         (
             "contains 4 strokes in one operation, and 2 of them are not assessable: cut it with operations = "
-            '"motion" in the benchmark file, or --operations motion'
+            '"motion" in the benchmark file, or detect --operations motion'
         ),
     ),
     (
@@ -776,6 +777,14 @@ SENTENCES: list[tuple[Fact, str]] = [
     (scoring.PlotsLeftOut(7), "7 more operations with a miss or a false alarm have no trigger plot"),
     (scoring.LimitsUnchecked(1, 2, "gm"), "1 of 2 limits are set for detectors that were not run (gm): not checked"),
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
+    (
+        scoring.SpeedsPooled("limit", "forward at 0.2 m/s", "forward at 0.3 m/s"),
+        (
+            "the threshold limit pools runs forward at 0.2 m/s and forward at 0.3 m/s: its limits are too wide for one "
+            'of them; learn and score each speed in a benchmark file of its own, or set threshold = "signature", which '
+            "has limits by speed"
+        ),
+    ),
     (
         scoring.SingleSpeed("forward at 0.2 m/s"),
         (

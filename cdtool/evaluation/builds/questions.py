@@ -18,9 +18,8 @@ from typing import Literal
 import numpy as np
 
 from cdtool.evaluation.results import ContactResult
-from cdtool.evaluation.statistics.bootstrap import RESAMPLES
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.paired import fisher_p, mcnemar_p, paired_difference, unpaired_difference
+from cdtool.evaluation.statistics.paired import RESAMPLES, fisher_p, mcnemar_p, paired_difference, unpaired_difference
 from cdtool.evaluation.statistics.rates import (
     binomial_at_most,
     binomial_increase_at_most,

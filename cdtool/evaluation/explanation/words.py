@@ -18,11 +18,11 @@ from cdtool.recording import REFERENCES, Contact
 _ABSENT = {
     Absence.BY_HAND: (
         "limits set by hand are not learned from runs",
-        "learn a signature with cdtool learn-signature and give it with --signature",
+        "learn a signature with cdtool learn-signature and give it to cdtool detect --signature",
     ),
     Absence.PER_RUN: (
         "the limits are those of the run's own first seconds, and nothing was learned",
-        "learn a signature with cdtool learn-signature and give it with --signature",
+        "learn a signature with cdtool learn-signature and give it to cdtool detect --signature",
     ),
     Absence.OLDER_FILE: (
         "the signature file has no normal motion",

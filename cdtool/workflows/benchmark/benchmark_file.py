@@ -277,7 +277,8 @@ def read_benchmark_file(
     if found.runs and (machine_file.columns.beside or machine_file.topics.beside):
         hint = "write each run to a log of its own, or map a channel of the log"
         raise root.fault("operations", "cannot divide a channel that is in a file of its own into runs", hint)
-    needs_runs = learning and not is_per_run(rule)
+    by_hand = bool(getattr(rule, "limits", ()))
+    needs_runs = learning and not by_hand and not is_per_run(rule)
     learn_table = root.table("learn", required=needs_runs)
     guard = _guard(learn_table)
     split = Split(learn_table.choice("split", [item.value for item in Split], Split.RECORDING.value))
@@ -337,6 +338,8 @@ def read_benchmark_file(
         raise root.fault("points", "there is no force profile to check them against", "set [force] profile")
     refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
+    if learning:
+        _refuse_unknown_locations(benchmark)
     return benchmark
 
 
@@ -584,6 +587,17 @@ def _refuse_overlap(benchmark: BenchmarkFile) -> None:
                 f"{benchmark.path}: {path} is scored {where}", "list a recording in one group only, under one path"
             )
         scored[true] = name
+
+
+def _refuse_unknown_locations(benchmark: BenchmarkFile) -> None:
+    """Raise ConfigurationError if limits by location are learned only up to the contacts, where none is learned."""
+    rule, scored = benchmark.rule, set(resolve_all(_scored(benchmark.impacts)))
+    if benchmark.guard is None or "position" not in rule.needs or not scored.issuperset(resolve_all(benchmark.learn)):
+        return
+    raise ConfigurationError(
+        f"{benchmark.path}: learn.until is onset: the threshold {rule.name} would know no limit where the contacts are",
+        'add impact-free logs to [learn], or set threshold = "limit"',
+    )
 
 
 def _ends_early(benchmark: BenchmarkFile, log: Path) -> bool:

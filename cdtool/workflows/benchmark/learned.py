@@ -13,6 +13,7 @@ from functools import cached_property
 from time import perf_counter
 from typing import Any
 
+from cdtool.bounded_loading import parse_own_json
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
@@ -85,7 +86,7 @@ class Learned:
     def of_text(cls, text: str, rule: Threshold) -> Learned:
         """Return what `to_text` wrote; raises ValueError for anything else."""
         try:
-            values = json.loads(text)
+            values = parse_own_json(text)
             ranges = {name: PlausibleRanges.from_dict(item) for name, item in values["ranges_without"].items()}
             return cls(
                 decoded(values["about"], AboutLearning),

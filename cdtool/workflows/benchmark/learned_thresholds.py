@@ -58,11 +58,12 @@ def learn_thresholds(
     runs. Raises SignatureError if nothing can be learned, UsageError if there are too few runs for the budget.
     """
     learned = LearnedThresholds({}, [], [], [], {}, set(), {})
-    if is_per_run(setup.rule) and not setup.budget:
+    of_run = is_per_run(setup.rule) or (setup.limits_by_hand and not setup.learn)
+    if of_run and not setup.budget:
         learned.thresholds.update((detector.name, (setup.rule.fit([]),)) for detector in detectors)
         learned.unused.update(operation.name for operation in operations)
         return learned
-    if is_per_run(setup.rule) and not setup.learn:
+    if of_run and not setup.learn:
         raise UsageError(f"a false-alarm budget of {setup.budget} is set on runs", "add impact-free logs: [learn] logs")
     left_out = LeftOut()
     unused: list[set[str]] = []

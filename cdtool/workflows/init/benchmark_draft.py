@@ -231,8 +231,8 @@ def _comments(unknown: Sequence[_Log], folder: Path) -> list[str]:
 
 
 def _label_file(logs: Sequence[_Log], folder: Path) -> str:
-    rows = [f"{relative_name(log.path, folder)},," for log in logs]
-    return "\n".join(["recording,start_s,end_s", *rows]) + "\n"
+    rows = [f"{relative_name(log.path, folder)},,," for log in logs]
+    return "\n".join(["recording,start_s,end_s,uncertainty_s", *rows]) + "\n"
 
 
 def _paths(logs: Sequence[_Log], folder: Path) -> str:

@@ -454,18 +454,17 @@ class _TuningOf:
     def _result(
         self, found: Searched, objective: Objective, measure: _MeasuresAll, debounces: list[int], words: list[str]
     ) -> TunedDetector:
-        seed = self.options.seed
         gains = movable_gains(self._detector, found.default)
         default = found.subsets[0].default
         default_reason = found.measured[found.default.key].reason
         default_nested = None
         if len(found.subsets) > 1 and not default_reason:
             by_default = measure.pooled([default] * (len(found.subsets) - 1), corrects=False)
-            default_nested = held_out_results(objective, by_default, seed)
-        best, chosen, made, rejected = _checked_choice(found, objective, measure, default_nested, seed)
-        nested, correction = held_out_results(objective, made, seed), made.multiplier if made else 1.0
+            default_nested = held_out_results(objective, by_default)
+        best, chosen, made, rejected = _checked_choice(found, objective, measure, default_nested)
+        nested, correction = held_out_results(objective, made), made.multiplier if made else 1.0
         why = "" if nested else self._why_not_nested(objective.recordings, measure.held_out(chosen))
-        apparent = apparent_results(objective, found, best, seed)
+        apparent = apparent_results(objective, found, best)
         assert apparent is not None, "the best candidate can be used"
         measured = found.measured[best.candidate.key]
         unusable: dict[str, str] = {}
@@ -483,7 +482,7 @@ class _TuningOf:
             correction=correction,
             apparent=apparent,
             nested=nested,
-            default_apparent=None if default_reason else apparent_results(objective, found, default, seed),
+            default_apparent=None if default_reason else apparent_results(objective, found, default),
             default_nested=default_nested,
             default_reason=default_reason,
             sensitivities=sensitivities_of(found, best, debounces, gains),
@@ -499,7 +498,7 @@ class _TuningOf:
 
 
 def _checked_choice(
-    found: Searched, objective: Objective, measure: _MeasuresAll, default: ChoiceResults | None, seed: int
+    found: Searched, objective: Objective, measure: _MeasuresAll, default: ChoiceResults | None
 ) -> tuple[Scored, list[Scored], Pooled | None, list[Rejection]]:
     """Return the choice, those without each fold, what these give on it, and the kinds of rules that were rejected.
 
@@ -516,7 +515,7 @@ def _checked_choice(
         if default is None or nested is None or best.candidate.key == found.default.key:
             return best, chosen, nested, rejected
         of_choice = measure.pooled([best] * len(chosen), corrects=True)
-        results = [held_out_results(objective, made, seed) for made in (nested, of_choice)]
+        results = [held_out_results(objective, made) for made in (nested, of_choice)]
         checked = [item for item in results if item is not None]
         ratios = np.max([item.costs / default.costs for item in checked], axis=0)
         if all(objective.is_acceptable(item.costs, default.costs) for item in checked):

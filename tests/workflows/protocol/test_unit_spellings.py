@@ -11,6 +11,8 @@ import pytest
 import cdtool
 from cdtool.evaluation.protocol.assessment import PointAssessment
 from cdtool.workflows.init.drafting import init
+from tests.command import cdtool as command
+from tests.synthetic.force_rig import half_sine, write_protocol, write_rig
 
 LIMIT, RATE, SECONDS = 400.0, 500.0, 2.5
 GRAVITY, POUND = 9.80665, 4.4482216152605
@@ -137,7 +139,50 @@ def test_no_spelling_of_a_unit_passes_a_force_above_the_limit(tmp_path, spelling
     check(tmp_path, spelling, [368.0, 421.0], by_init)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("spelling", "by_init"), MATRIX, ids=name_of)
 def test_no_spelling_of_a_unit_passes_one_of_60_curves_above_the_limit(tmp_path, spelling, by_init):
     check(tmp_path, spelling, PEAKS, by_init)
+
+
+RIG_BENCHMARK = """
+[force]
+profile = "en_12453_reducing_gap"
+[limits]
+"*.edge.force_failed" = { max = 0 }
+"""
+
+
+@pytest.mark.parametrize(
+    ("header", "confirmed", "outcome", "status"),
+    [
+        ("load_cell [N]", "", "met", 0),
+        ("load_cell [kN]", "", "not_assessable", 4),
+        ("load_cell [filtered]", "", "not_assessable", 4),
+        ("load_cell [A]", "", "not_assessable", 4),
+        ("load_cell [kN]", ", unit_confirmed = true", "met", 0),
+        ("load_cell [filtered]", ", unit_confirmed = true", "met", 0),
+    ],
+)
+def test_a_force_in_a_doubtful_unit_meets_no_limit(tmp_path, header, confirmed, outcome, status):
+    write_rig(tmp_path, [half_sine(300.0), half_sine(320.0), half_sine(340.0)])
+    write_protocol(tmp_path)
+    for path, old, new in [
+        ("machine.toml", '"load_cell", unit = "N"', f'"load_cell", unit = "N"{confirmed}'),
+        ("benchmark.toml", "[onset]", f"{RIG_BENCHMARK}[onset]"),
+        *((f"edge/0{number}.csv", "load_cell", header) for number in (1, 2, 3)),
+    ]:
+        text = (tmp_path / path).read_text(encoding="utf-8")
+        (tmp_path / path).write_text(text.replace(old, new, 1), encoding="utf-8")
+    done = cdtool.benchmark(tmp_path / "benchmark.toml")
+    assert [item.outcome for item in done.results.limits] == [outcome]
+    assert command("protocol", "write", tmp_path / "protocol.toml", "-o", tmp_path / "protocol.html").status == status
+
+
+def test_a_run_whose_torque_is_in_a_doubtful_unit_is_not_learned_from(tmp_path):
+    write_rig(tmp_path, [half_sine(300.0)])
+    log = tmp_path / "edge" / "01.csv"
+    log.write_text(log.read_text(encoding="utf-8").replace("force_drive", "force_drive [kN]"), encoding="utf-8")
+    done = command(
+        "learn-signature", log, "-d", "gm", "-m", tmp_path / "machine.toml", "-o", tmp_path / "signature.json"
+    )
+    assert done.status == 2 and "torque: the header says 'force_drive [kN]', the machine file N" in done.err
