@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the wheel, installs it alone with the lower bound of each dependency on Python 3.11, and runs the main job: --help,
-# learn-signature, detect, benchmark. Skipped, by name, where there is no Python 3.11.
+# Builds the wheel, installs it alone with the lower bound of each dependency on Python 3.11, and runs --help and every
+# command of the README. Skipped, by name, where there is no Python 3.11.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 python=$(command -v python3.11 || true)
@@ -20,12 +20,9 @@ rm -r "$folder/source"
 echo "+ pip install ${pins[*]} cdtool-*.whl"
 "$folder/venv/bin/pip" install --quiet "${pins[@]}" "$folder"/cdtool-*.whl
 cdtool="$folder/venv/bin/cdtool"
-gate=$PWD/sample_logs/gate
+readme_commands=$PWD/.ci/readme_commands.py
 cd "$folder" # the installed package is run, not this folder's
 "$cdtool" --version
 "$cdtool" --help > help.txt
 "$cdtool" benchmark --help >> help.txt
-"$cdtool" learn-signature "$gate"/free/* -m "$gate/machine.toml" -d feekf --force -o gate.feekf.json > learned.txt
-"$cdtool" detect "$gate"/stiff/* -m "$gate/machine.toml" -s gate.feekf.json --plot plots > detected.txt
-"$cdtool" benchmark "$gate/benchmark.toml" -o report > benchmark.txt
-tail -n 2 benchmark.txt
+"$python" "$readme_commands" "$folder/venv"

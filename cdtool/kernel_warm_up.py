@@ -23,8 +23,6 @@ from cdtool.kernels import Kernel, entries, loaded, named
 _ANY_KERNEL = 150
 _START = 1000
 _WORTH_A_PROCESS = 4000
-# How often the cache is looked at while other processes compile [s].
-_LOOK_S = 0.2
 
 _CHILD = """
 import json, sys
@@ -54,7 +52,7 @@ def compile_package() -> int:
             _ = item.compiled
             _report(absent, begin)
         while any(child.poll() is None for child in children):
-            time.sleep(_LOOK_S)
+            time.sleep(0.2)
             _report(absent, begin)
     finally:
         report_progress("")

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.project.pages import script_at
+
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / ".ci" / "lowest_versions.py"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -94,6 +96,8 @@ def test_ci_installs_the_lower_bounds_and_runs_the_main_job():
     run = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     assert ".ci/lowest_versions.sh" in run
     job = (ROOT / ".ci" / "lowest_versions.sh").read_text(encoding="utf-8")
-    for part in ("lowest_versions.py", "python3.11", "--help", "learn-signature", "detect", "benchmark"):
+    for part in ("lowest_versions.py", "python3.11", "--help", "readme_commands.py"):
         assert part in job
+    readme = script_at(ROOT / ".ci" / "readme_commands.py").commands()
+    assert {"learn-signature", "detect", "benchmark"} <= {command.split()[1] for command in readme}
     assert "://" not in job  # the source of packages is configured on the machine
