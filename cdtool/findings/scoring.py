@@ -158,8 +158,8 @@ class SpeedsPooled(TemplateFact):
     fastest: str
 
     words = (
-        "the threshold {threshold} pools runs {slowest} and {fastest}: its limits are too wide for one of them; learn and "
-        'score each speed in a benchmark file of its own, or set threshold = "signature", which has limits by speed'
+        "the threshold {threshold} pools runs {slowest} and {fastest}: its limits are too wide for one of them; learn "
+        'and score each speed in a benchmark file of its own, or set threshold = "signature", which has limits by speed'
     )
 
 

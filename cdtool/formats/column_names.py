@@ -57,7 +57,11 @@ def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[st
     other column is missing.
     """
     resolved, _ = _resolved(path, wanted, names)
-    keys = {resolved.time.key, resolved.time.nanoseconds_key, *(key for source in resolved.sources for key in source.keys)} - {""}
+    keys = {
+        resolved.time.key,
+        resolved.time.nanoseconds_key,
+        *(key for source in resolved.sources for key in source.keys),
+    } - {""}
     return [name for name in names if name in keys]
 
 

@@ -769,9 +769,9 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         scoring.SpeedsPooled("limit", "forward at 0.2 m/s", "forward at 0.3 m/s"),
         (
-            "the threshold limit pools runs forward at 0.2 m/s and forward at 0.3 m/s: its limits are too wide for one of "
-            "them; learn and score each speed in a benchmark file of its own, or set threshold = \"signature\", which has "
-            "limits by speed"
+            "the threshold limit pools runs forward at 0.2 m/s and forward at 0.3 m/s: its limits are too wide for "
+            "one of them; learn and score each speed in a benchmark file of its own, or set threshold = "
+            '"signature", which has limits by speed'
         ),
     ),
     (
@@ -822,6 +822,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         truth.LabelsWithoutZone(),
         "the dates have no zone: read as UTC, like dates without a zone in a log. If the logs state a zone, set "
         "labels_zone, e.g. '+02:00'",
+    ),
+    (
+        truth.RowsNotScored("free/99.csv (line 3)", "stiff/01.csv"),
+        "rows about logs that are not scored are not used: free/99.csv (line 3); a scored log is named as stiff/01.csv",
     ),
     (truth.KindsExcluded(1, ("wave",)), "1 label of kind wave is not a contact: an alarm there is a false alarm"),
     (

@@ -106,7 +106,7 @@ def test_all_collisions_of_a_jittering_arm_are_found(tmp_path, stated):
     kept = rows if stated else [row.rpartition(",")[0] for row in rows]
     (tmp_path / "labels.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
     (tmp_path / "machine.toml").write_text(
-        '''
+        """
 [machine]
 type = "rotary_axis"
 name = "base of a UR arm"
@@ -117,7 +117,7 @@ load_inertia = 0.0
 time = { column = 0, unit = "ms" }
 position = { column = 1, unit = "deg" }
 torque = { column = 13, unit = "A", scale = 1.0 }
-''',
+""",
         encoding="utf-8",
     )
     logs = f'from = "0.5s"\nlogs = ["{folder.as_posix()}/Drift*.csv"]'
