@@ -81,15 +81,16 @@ def read_cells(path: Path, what: str) -> list[tuple[int, list[str]]]:
     """Return the rows that are not empty with their lines, the header first; raises ConfigurationError."""
     content = read_bytes(path, ConfigurationError)
     try:
-        text = ""
-        if content.strip():
+        try:
             found, stream = detect_text(path, content, content=content)
             text = found.decode(stream)
+        except RecordingError:  # empty, or names with characters that no log has
+            text = content.decode("utf-8-sig")
         separator = max(",;\t", key=text.partition("\n")[0].count)
         reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
         header = [name.strip() for name in next(reader, [])]
         return [(1, header), *((reader.line_num, cells) for cells in reader if cells)]
-    except RecordingError as fault:
+    except UnicodeDecodeError as fault:
         raise ConfigurationError(f"{path}: not a {what} file: not text", "give a CSV file") from fault
     except csv.Error as fault:
         raise ConfigurationError(
