@@ -70,8 +70,8 @@ class ChannelSource:
     """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
-    `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns). `words`: the
-    column may contain texts, which are read as categories.
+    `most`. `confirmed`: the unit is `stated`, whatever the header says. `keys` are the columns by their names in the
+    file, once these are known (resolve_columns). `words`: the column may contain texts, which are read as categories.
 
     A force may be a vector: `columns`, or `fields`, each of one of the `topics`, are then its axes. `direction` (axes,)
     is a unit vector: the force is the component along it; without one it is the magnitude. It may be in a file of its
@@ -97,6 +97,7 @@ class ChannelSource:
     own_file: OwnFile | None = None
     kinds: tuple[tuple[float, str], ...] = ()
     words: bool = False
+    confirmed: bool = False
 
     __repr__ = short_repr
 
@@ -300,6 +301,7 @@ def _source(
         direction=_direction(table, count) if channel == "force" and "direction" in table else (),
         own_file=own_file,
         kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
+        confirmed=channel not in UNITLESS and table.flag("unit_confirmed", False),
     )
     table.finish()
     return source

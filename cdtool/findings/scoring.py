@@ -77,7 +77,7 @@ class LogNotCut(Fact):
         which = f"stroke {number[0]} is" if len(number) == 1 else f"{len(number)} of them are"
         return (
             f"contains {counted(self.strokes, 'stroke')} in one operation, and {which} not assessable: cut it with "
-            'operations = "motion" in the benchmark file, or --operations motion'
+            'operations = "motion" in the benchmark file, or detect --operations motion'
         )
 
 
@@ -126,8 +126,9 @@ class LimitsUnchecked(TemplateFact):
 
     count: int
     limits: int
+    detectors: str
 
-    words = "{count} of {limits} limits are set for detectors that were not run: not checked"
+    words = "{count} of {limits} limits are set for detectors that were not run ({detectors}): not checked"
 
 
 @frozen
@@ -147,6 +148,18 @@ class SingleSpeed(TemplateFact):
 
     subject_field = "motion"
     words = "speed_range has no effect: of this motion only one speed was learned, {motion}; add runs at another speed"
+
+
+@frozen
+class CreepNotLearned(Fact):
+    """Strokes at creep speed were left out from learning; faster strokes of the same logs were learned."""
+
+    strokes: int
+    reason: str
+
+    def sentence(self) -> str:
+        """Return how many, and why."""
+        return f"{counted(self.strokes, 'stroke')} at creep speed not learned, and not assessed: {self.reason}"
 
 
 @frozen

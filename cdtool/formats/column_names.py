@@ -57,12 +57,8 @@ def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[st
     other column is missing.
     """
     resolved, _ = _resolved(path, wanted, names)
-    keys = {
-        resolved.time.key,
-        resolved.time.nanoseconds_key,
-        *(key for source in resolved.sources for key in source.keys),
-    } - {""}
-    return [name for name in names if name in keys]
+    keys = {resolved.time.key, resolved.time.nanoseconds_key}.union(*(source.keys for source in resolved.sources))
+    return [name for name in names if name and name in keys]
 
 
 def requested_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.command import cdtool
@@ -68,7 +70,53 @@ def test_an_uncut_log_of_two_strokes_gets_a_hint_how_to_cut_it(tmp_path, more):
     file, log = benchmark_of(tmp_path, two_strokes(), more)
     scored, detected = cdtool("benchmark", file), cdtool("detect", log, "-b", file)
     for done in (scored, detected):
-        told = 'not assessable: cut it with operations = "motion" in the benchmark file, or --operations motion'
+        told = 'not assessable: cut it with operations = "motion" in the benchmark file, or detect --operations motion'
         assert (told in done.err) == (not more)
         assert done.err.count("cut it with") <= 1
     assert ("1 not assessable" in scored.out) == (not more)
+
+
+@pytest.fixture(scope="module")
+def rebounding(tmp_path_factory) -> Path:
+    """Return the folder of a gate that rebounds after its impact, without reference channels."""
+    folder = tmp_path_factory.mktemp("gate") / "gate"
+    counts = ("--free", 8, "--holdout", 0, "--stiff", 1, "--soft", 0)
+    assert cdtool("simulate", "gate", *counts, "--no-reference", "-o", folder).status == 0
+    text = (folder / "benchmark.toml").read_text(encoding="utf-8")
+    text = re.sub("(?m)^detectors = .*", 'detectors = ["feekf", "pt"]', text)
+    (folder / "benchmark.toml").write_text(text, encoding="utf-8")
+    (folder / "cut.toml").write_text(f'operations = "motion"\n{text}', encoding="utf-8")
+    return folder
+
+
+def test_a_rebound_after_the_contact_is_no_warning(rebounding):
+    scored = cdtool("benchmark", rebounding / "benchmark.toml")
+    assert scored.status == 0 and "1 contact with 2 detectors: 2 detected" in scored.out
+    assert "strokes in one operation" not in scored.err
+
+
+def test_an_alarm_after_the_cut_at_a_rebound_is_scored_and_explained(rebounding):
+    """The contact is in the first stroke, the alarm of pure torque in the second one."""
+    scored = cdtool("benchmark", rebounding / "cut.toml")
+    assert scored.status == 0 and "1 contact with 2 detectors: 2 detected" in scored.out
+    explained = cdtool("explain", rebounding / "stiff" / "01.csv", "-b", rebounding / "cut.toml", "-d", "pt")
+    assert explained.status == 0
+    assert "of a contact in another operation" in explained.out and "false alarm at" not in explained.out
+
+
+def test_strokes_at_creep_speed_are_a_note_where_faster_ones_are_learned(tmp_path):
+    """The friction EKF is not applicable to half of them, and the others are too few to learn from."""
+    benchmark_of(tmp_path, rows_of("stiff/04.csv"))
+    logs = [tmp_path / f"{number}.csv" for number in range(10)]
+    for number, log in enumerate(logs):
+        rows = rows_of(f"free/{number % 8 + 3:02}.csv")
+        speed = 100.0 if number % 2 else 400.0
+        rows += [[0.0, 1.0 + 1e-3 * number, speed * (2000 < k < 5000), 0.0, 0.0, 0.0] for k in range(6000)]
+        angle = np.cumsum([row[2] for row in rows]) * 0.10472e-3
+        lines = [",".join(f"{v:.9g}" for v in (k, *rows[k][1:3], angle[k], rows[k][4], 0.0)) for k in range(len(rows))]
+        log.write_text("\n".join([",".join(COLUMNS), *lines]) + "\n", encoding="utf-8")
+    options = ("-m", tmp_path / "machine.toml", "-d", "feekf", "--operations", "motion")
+    learned = cdtool("learn-signature", *logs, *options, "-o", tmp_path / "signature.json")
+    assert learned.status == 0
+    told = "friction_ekf: 5 strokes at creep speed not learned, and not assessed: runs forward at"
+    assert learned.err.count(told) == 2

@@ -30,7 +30,6 @@ from cdtool.plain_text import counted, digits
 from cdtool.remote.remote_path import joined, location
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.base import Threshold, is_per_run
-from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -118,10 +117,6 @@ class BenchmarkFile:
     inject: InjectSection | None = None
     not_injected: tuple[Skipped, ...] = ()
     force_limits: Path | None = None
-
-    def rule_of(self, detector: str) -> Threshold:
-        """Return the rule that a detector's signal is judged by: `rule`, unless the detector has its own."""
-        return rule_for(DETECTORS.load(detector), self.rule)
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -283,8 +278,7 @@ def read_benchmark_file(
         hint = "write each run to a log of its own, or map a channel of the log"
         raise root.fault("operations", "cannot divide a channel that is in a file of its own into runs", hint)
     by_hand = bool(getattr(rule, "limits", ()))
-    needs_runs = learning and not by_hand
-    needs_runs = needs_runs and not all(is_per_run(rule_for(DETECTORS.load(name), rule)) for name in names)
+    needs_runs = learning and not by_hand and not is_per_run(rule)
     learn_table = root.table("learn", required=needs_runs)
     guard = _guard(learn_table)
     split = Split(learn_table.choice("split", [item.value for item in Split], Split.RECORDING.value))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from cdtool.evaluation.force.curve import ForceTimeCurve, force_time_curve
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import match
 from cdtool.findings import Finding
+from cdtool.findings.channels import UnitContradicted
 from cdtool.findings.scoring import LogNotCut, NoForce, OnsetUnseen, PeakUnseen
 from cdtool.findings.truth import InProgress
 from cdtool.operations import Operation, motion_spans
@@ -53,9 +54,10 @@ class MatchedLog:
 
 @dataclass(frozen=True)
 class UncutStrokes:
-    """The strokes of a log that is one operation: their number, and by detector those that it cannot assess.
+    """The strokes of a log that is one operation: their number, and by detector those that hide a contact from it.
 
-    The first stroke is never among these: a detector that cannot assess it has other reasons.
+    The first stroke is never among these: a detector that cannot assess it has other reasons. Nor is a stroke without
+    a contact in a log with contacts: the rebound after an impact.
     """
 
     recording: str
@@ -116,7 +118,7 @@ def match_log(log: DetectedLog, group: str, rules: ScoringRules, rearm: float) -
         curves,
         tuple(_not_scored(recording, contacts, inside, log.cut_by)),
         (*warned, *(RecordingFinding.of(recording.name, item) for item in findings)),
-        _uncut_strokes(recording, found, log.cut_by),
+        _uncut_strokes(log),
     )
 
 
@@ -188,11 +190,17 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
 def force_curves(
     recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
 ) -> tuple[dict[int, ForceTimeCurve], list[Finding]]:
-    """Return the force over each contact that has an onset, by its number; a contact without a force is reported."""
+    """Return the force over each contact that has an onset, by its number; a contact without a force is reported.
+
+    If the header does not confirm the unit of the force, no contact has one.
+    """
     found: dict[int, ForceTimeCurve] = {}
     missing: list[Finding] = []
     if "force" not in recording:
         return found, missing
+    for item in recording.findings:
+        if item.channel == "force" and isinstance(item.fact, UnitContradicted):
+            return found, [replace(item, severity="warning")]
     ends = [*(contact.start for contact in contacts[1:]), float("inf")]
     for number, (contact, until) in enumerate(zip(contacts, ends, strict=False), 1):
         if contact.in_progress:
@@ -204,19 +212,20 @@ def force_curves(
     return found, missing
 
 
-def _uncut_strokes(recording: Recording, found: Sequence[Sequence[Detection]], cut_by: str) -> UncutStrokes:
-    """Return by detector the strokes of an uncut log that are not assessable although the first one is.
-
-    `found` are the detections of its operations, `cut_by` how the log is divided into them.
-    """
-    detections = [item for of_operation in found for item in of_operation if not np.all(item.statistic.valid)]
-    if cut_by != "whole" or not detections:
+def _uncut_strokes(log: DetectedLog) -> UncutStrokes:
+    """Return by detector the strokes of an uncut log that are not assessable although the first one is."""
+    recording, contacts = log.recording, log.contacts
+    detections = [item for found in log.detections for item in found if not np.all(item.statistic.valid)]
+    if log.cut_by != "whole" or not detections:
         return UncutStrokes(recording.name)
     strokes = _strokes(recording)
+    relevant = [
+        (number, stroke)
+        for number, stroke in enumerate(strokes[1:], 2)
+        if not contacts or any(stroke[0] <= contact.start <= stroke[1] for contact in contacts)
+    ]
     unassessable = {
-        item.detector: tuple(
-            number for number, stroke in enumerate(strokes[1:], 2) if not _mostly_judged(item, *stroke)
-        )
+        item.detector: tuple(number for number, stroke in relevant if not _mostly_judged(item, *stroke))
         for item in detections
         if strokes and _mostly_judged(item, *strokes[0])
     }

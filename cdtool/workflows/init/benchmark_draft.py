@@ -116,7 +116,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
     known = [replace(log, contacts=0) if log in named_free else log for log in known]
     impacts = [log for log in known if log.contacts]
     free = [log for log in known if log.contacts == 0]
-    usable, others = _detectors(first, machine_file, len(free) >= ENOUGH_RUNS)
+    usable, others = _detectors(first, machine_file)
     unknown = [log for log in known if log.contacts is None]
     beside: dict[str, str] = {}
     if not impacts and unknown:
@@ -156,18 +156,13 @@ def _noise(recording: Recording) -> float:
     return _NORMAL_MAD * float(np.median(np.abs(steps))) / math.sqrt(2.0) if len(steps) else math.nan
 
 
-def _detectors(recording: Recording, machine_file: MachineFile, has_runs: bool) -> tuple[list[str], list[str]]:
-    """Return the detectors that run on a log, and those that have their channels but not the machine's parameters.
-
-    One with its own threshold needs impact-free runs and a position to learn from.
-    """
+def _detectors(recording: Recording, machine_file: MachineFile) -> tuple[list[str], list[str]]:
+    """Return the detectors that run on a log, and those that have their channels but not the machine's parameters."""
     usable, others = [], []
     (operation,) = operations_of(recording, "whole")
     for name in DETECTORS.names():
         detector = machine_file.detector(name)
         if not set(detector.needs) <= set(recording.channels):
-            continue
-        if hasattr(detector, "own_threshold") and not (has_runs and "position" in recording):
             continue
         try:
             run_detector(operation, machine_file.machine, detector)

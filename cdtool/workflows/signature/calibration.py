@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from cdtool.activation import Activation
 from cdtool.errors import SignatureError, UsageError
 from cdtool.evaluation.false_alarm_budget import Budget, Calibrated, set_factor
-from cdtool.evaluation.results import Skipped
 from cdtool.pipeline import Detection, judge
 from cdtool.workflows.log_groups import Split, split_names
-from cdtool.workflows.signature.fitting import Fit, Pair
+from cdtool.workflows.signature.fitting import Fit, Fitted, Pair
 
 # Runs are tested with thresholds learned from the other nine tenths.
 FOLDS = 10
@@ -21,9 +20,9 @@ def in_fixed_order(pairs: Sequence[Pair]) -> list[Pair]:
     return sorted(pairs, key=lambda pair: (pair[0].recording.digest, pair[0].number, pair[0].name))
 
 
-def kept(pairs: Sequence[Pair], skipped: Sequence[Skipped]) -> list[Pair]:
+def kept(pairs: Sequence[Pair], fitted: Fitted) -> list[Pair]:
     """Return the runs that were not left out."""
-    names = {item.recording for item in skipped}
+    names = {item.recording for item in (*fitted.skipped, *fitted.creeping)}
     return [pair for pair in pairs if pair[0].name not in names]
 
 

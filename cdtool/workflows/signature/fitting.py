@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -12,7 +13,7 @@ from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.findings.finding import Finding
-from cdtool.findings.scoring import SingleSpeed, SpeedsPooled
+from cdtool.findings.scoring import CreepNotLearned, SingleSpeed, SpeedsPooled
 from cdtool.motion import MotionClass
 from cdtool.motion.speed_range import in_ranges
 from cdtool.operations import Operation
@@ -21,12 +22,15 @@ from cdtool.plain_text import counted
 from cdtool.thresholds.base import FittedThreshold, Threshold, is_per_run
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.contract import checked_fit
-from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.signature.grouping import by_class
 
 Pair = tuple[Operation, Signal]
+
+#: A stroke is at creep speed below this share of the speed of another one in its log: end positions are approached at
+#: a tenth to a third of the nominal speed, and opening and closing differ by less than a factor of two.
+_CREEP = 0.5
 
 
 class NoUsableRunError(SignatureError):
@@ -40,23 +44,32 @@ class NoUsableRunError(SignatureError):
 
 @dataclass(frozen=True)
 class Fitted:
-    """Fitted thresholds with the operations that each was learned from, and the operations left out."""
+    """Fitted thresholds with the operations that each was learned from, and the operations left out.
+
+    `creeping` are left out too: slow strokes in logs of which a faster one was learned.
+    """
 
     thresholds: tuple[FittedThreshold, ...]
     learned_from: tuple[tuple[Operation, ...], ...]
     skipped: tuple[Skipped, ...]
+    creeping: tuple[Skipped, ...] = ()
 
     def findings(self, rule: Threshold, detector: str) -> tuple[RecordingFinding, ...]:
-        """Return the speeds that a rule without classes of motion pools.
+        """Return the creeping strokes, and the speeds that a rule without classes of motion pools.
 
         With `speed_range`, each motion that it cannot serve, as it was learned at a single speed.
         """
+        reasons = Counter(item.reason for item in self.creeping)
+        creeping = tuple(
+            RecordingFinding.of(detector, Finding(CreepNotLearned(count, reason), severity="note"))
+            for reason, count in reasons.items()
+        )
         if not getattr(rule, "speed_range", False):
             pooled = () if getattr(rule, "by_class", False) or is_per_run(rule) else _pooled(rule, self.used)
-            return tuple(RecordingFinding.of(detector, Finding(fact)) for fact in pooled)
+            return (*creeping, *(RecordingFinding.of(detector, Finding(fact)) for fact in pooled))
         motions = [motion for item in self.thresholds if (motion := getattr(item, "motion", None))]
         single = [motions[numbers[0]].described for numbers in in_ranges(motions) if len(numbers) == 1]
-        return tuple(RecordingFinding.of(detector, Finding(SingleSpeed(motion))) for motion in single)
+        return (*creeping, *(RecordingFinding.of(detector, Finding(SingleSpeed(motion))) for motion in single))
 
     @property
     def used(self) -> tuple[Operation, ...]:
@@ -142,7 +155,7 @@ def fit_operations(
 ) -> Fitted:
     """Learn the rule from impact-free operations of a machine with a detector; raises SignatureError."""
     pairs, skipped = signals_of(operations, machine, detector, watched, unread)
-    fitted = fitting(for_machine(rule_for(detector, rule), machine))(pairs)
+    fitted = fitting(for_machine(rule, machine))(pairs)
     return replace(fitted, skipped=(*skipped, *fitted.skipped))
 
 
@@ -160,7 +173,7 @@ def _fit_classes(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
     fitted: list[FittedThreshold] = []
     used: list[tuple[Operation, ...]] = []
     skipped: list[Skipped] = []
-    refused: list[CdtoolError] = []
+    refused: list[tuple[CdtoolError, list[Operation]]] = []
     classes, odd = by_class([operation for operation, _ in pairs])
     skipped += odd
     signals = {id(operation): signal for operation, signal in pairs}
@@ -171,14 +184,19 @@ def _fit_classes(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
             used.append(tuple(operation for operation, _ in members))
         except SignatureError as fault:
             # A stray run of another class does not stop the others; without a class to learn it is an error.
-            refused.append(fault)
-            motion = members[0][0].motion.described
-            skipped += [Skipped(item.name, f"runs {motion}: {fault.message}") for item, _ in members]
+            refused.append((fault, operations))
     if not fitted and not refused:
         raise SignatureError("no impact-free run to learn from", "add runs")
     if not fitted:
-        raise refused[0]
-    return Fitted(tuple(fitted), tuple(used), tuple(skipped))
+        raise refused[0][0]
+    creeping: list[Skipped] = []
+    learned = sorted((item for of_class in used for item in of_class), key=lambda item: item.motion.nominal_speed)
+    speeds = {id(item.whole): item.motion.nominal_speed for item in learned}  # the highest of each log
+    for failure, operations in refused:
+        is_creep = all(item.motion.nominal_speed < _CREEP * speeds.get(id(item.whole), 0.0) for item in operations)
+        reason = f"runs {operations[0].motion.described}: {failure.message}"
+        (creeping if is_creep else skipped).extend(Skipped(item.name, reason) for item in operations)
+    return Fitted(tuple(fitted), tuple(used), tuple(skipped), tuple(creeping))
 
 
 def _fit(rule: Threshold, pairs: Sequence[Pair]) -> FittedThreshold:
