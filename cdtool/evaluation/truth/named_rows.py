@@ -32,18 +32,13 @@ class NamedRow:
         """Return a cell without the blanks around it; empty if the column is missing."""
         return self.cells.get(name, "").strip()
 
-<<<<<<< HEAD
     def decimal(self, name: str) -> str:
         """Return a cell with a decimal point, also if it has a comma."""
         text = self.text(name)
         return text if "." in text else text.replace(",", ".")
 
-    def number(self, name: str, unit: str) -> float | None:
-        """Return a finite number, None if the cell is empty; raises ConfigurationError. `unit`: in words."""
-=======
     def seconds(self, name: str) -> float | None:
         """Return a finite number of seconds, None if the cell is empty; raises ConfigurationError."""
->>>>>>> main
         text = self.text(name)
         if not text:
             return None
@@ -62,12 +57,6 @@ class NamedRow:
 
 def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[NamedRow]:
     """Return the rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
-<<<<<<< HEAD
-    return [_named(row) for row in read_table_rows(path, required, optional, what)]
-
-
-def read_table_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[TableRow]:
-    """Return the rows of a file that is not about recordings; otherwise as `read_named_rows`."""
     (_, header), *rows = read_cells(path, what)
     _check_header(path, header, required, [*required, *optional])
     return [_row(path, line, header, cells) for line, cells in rows]
@@ -75,8 +64,6 @@ def read_table_rows(path: Path, required: Sequence[str], optional: Sequence[str]
 
 def read_cells(path: Path, what: str) -> list[tuple[int, list[str]]]:
     """Return the rows that are not empty with their lines, the header first; raises ConfigurationError."""
-=======
->>>>>>> main
     content = read_bytes(path, ConfigurationError)
     try:
         try:
