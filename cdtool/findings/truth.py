@@ -121,6 +121,16 @@ class LabelsWithoutZone(TemplateFact):
 
 
 @frozen
+class RowsNotScored(TemplateFact):
+    """Rows of a label or trigger file about logs that the benchmark file does not score."""
+
+    names: str
+    scored: str
+
+    words = "rows about logs that are not scored are not used: {names}; a scored log is named as {scored}"
+
+
+@frozen
 class KindsExcluded(Fact):
     """Labels that are no contacts, because of their `kinds`."""
 

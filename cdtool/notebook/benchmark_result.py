@@ -17,7 +17,7 @@ from cdtool.evaluation.traces.trace import Trace
 from cdtool.html_table import html_table
 from cdtool.near_attributes import NearAttributes
 from cdtool.notebook.presenting import described, presented
-from cdtool.plain_text import counted, shorten
+from cdtool.plain_text import counted, first_of, shorten
 from cdtool.remote.remote_path import location
 from cdtool.same_values import equal_by_values
 from cdtool.workflows.benchmark.benchmark import Benchmark
@@ -265,7 +265,8 @@ class BenchmarkPlots(NearAttributes):
         Parameters
         ----------
         recording : str, optional
-            A recording, as `contacts.recording` names it, whose curves were kept; by default the one that shows most.
+            A recording whose curves were kept, as `contacts.recording` names it or by any ending of this name that no
+            other has, such as "03.csv"; by default the one that shows most.
         group : str, optional
             Of one group only.
 
@@ -284,8 +285,13 @@ class BenchmarkPlots(NearAttributes):
         found = [
             trace
             for trace in self.result.traces
-            if recording in (None, trace.recording) and group in (None, trace.group)
+            if group in (None, trace.group)
+            and (recording is None or any(f"/{name}".endswith(f"/{recording}") for name in _names_of(trace)))
         ]
+        found = [trace for trace in found if recording in _names_of(trace)] or found
+        several = dict.fromkeys(_names_of(trace)[-1] for trace in found)
+        if recording is not None and len(several) > 1:
+            raise UsageError(f"'{recording}' fits {first_of(list(several))}", "give more of its path")
         if not found:
             asked = recording or group or ""
             known = dict.fromkeys(trace.recording if recording else trace.group for trace in self.result.traces)
@@ -293,6 +299,11 @@ class BenchmarkPlots(NearAttributes):
             raise UsageError(f"no curves of '{asked}' were kept" if asked else "no curves were kept", hint)
         trace = most_informative(found)
         return described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
+
+
+def _names_of(trace: Trace) -> tuple[str, str]:
+    """Return the name of an operation, and that of its log."""
+    return trace.recording, trace.recording.partition("#")[0]
 
 
 benchmark = presented(

@@ -11,12 +11,13 @@ import numpy as np
 from cdtool.activation import Activation
 from cdtool.detection import Signal, Status
 from cdtool.dynamics import Machine
-from cdtool.errors import CdtoolError
+from cdtool.errors import CdtoolError, SignatureError
 from cdtool.evaluation.false_alarm_budget import Budget, MonitoredRun, factor_for
 from cdtool.evaluation.force.curve import ForceTimeCurve, force_at
 from cdtool.evaluation.sweep import sweep
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection, judge, judge_log, run_detector, signal_of_log
+from cdtool.plain_text import counted
 from cdtool.recording import Contact, FloatArray
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.tuning.candidate import Candidate, Measured
@@ -165,7 +166,12 @@ class Measuring:
 
     def _learned(self, rule: Threshold, free: Sequence[Pair], without: Sequence[int]) -> tuple[FittedThreshold, ...]:
         runs = zip(self.recordings.free, free, strict=True)
-        return self.learn(rule, [pair for run, pair in runs if run.fold not in without])
+        try:
+            return self.learn(rule, [pair for run, pair in runs if run.fold not in without])
+        except SignatureError as fault:
+            parts = f"{len(without)} of {self.recordings.folds} parts"
+            which = f"of {counted(len(free), 'impact-free run')}, those outside {parts}"
+            raise SignatureError(f"{fault.message} ({which})", fault.hint) from fault
 
     def _signals_of(self, candidate: Candidate) -> tuple[list[Pair], list[Signal]]:
         """Return the signals of the impact-free operations, and of the logs with contacts."""

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.truth.labels import CLOCKS, Labels, read_labels
 from cdtool.evaluation.truth.named_rows import by_recording
+from cdtool.findings import Finding
+from cdtool.findings.truth import RowsNotScored
 from cdtool.ingest.run_reading import split_run
 from cdtool.log_section import MARK_HINT, LogSection, Mark
 from cdtool.machine_file import MachineFile
+from cdtool.plain_text import first_of
 from cdtool.remote.remote_path import joined
 from cdtool.tables import Table
 from cdtool.value_words import value_in_words
@@ -111,12 +114,14 @@ def named_logs(table: Table, found_logs: LogsOf, scored: Sequence[Path]) -> dict
 
 
 def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Sequence[Path] = ()) -> Labels | None:
-    """Return the label file, whose rows must all be about one of the `scored` logs; None without a file.
+    """Return the label file, whose rows are about the `scored` logs; None without a file.
+
+    Rows about other logs are a note.
 
     Rows about a log `learned` from have its whole path: a file's name alone is that of a scored log.
 
-    If logs are cut into runs, each row is about a run of a log, LOG#ID. Raises ConfigurationError for a row that
-    matches no log, or for a file name that matches several.
+    If logs are cut into runs, each row is about a run of a log, LOG#ID. Raises ConfigurationError for a file
+    name that matches several.
     """
     settings = {"clock": onset.choice("labels_clock", CLOCKS, "recording"), "zone": onset.text("labels_zone", "")}
     not_contacts = onset.texts("not_contacts", ())
@@ -134,14 +139,19 @@ def labels_of(onset: Table, logs: LogsOf, scored: Sequence[Path], learned: Seque
     )
     labelled = {name.partition("#")[0] if runs else name for name in labels.contacts}
     recordings += [name for name in others if name in labelled and name not in recordings]
+    strangers: list[str] = []
     for name, recording in by_recording(path, labels.contacts, set(recordings), runs=runs).items():
         if runs and recording in recordings:
             raise ConfigurationError(
                 f"{labels.lines[name][0]}: '{name}' is cut into runs", f"name the run, as {recording}#1"
             )
-        if recording is None:
-            raise ConfigurationError(
-                f"{labels.lines[name][0]}: '{name}' is not a scored recording",
-                f"give a path relative to the benchmark file, such as {recordings[0]}, or remove the row",
-            )
-    return labels
+        strangers += [] if recording else [f"{name} (line {labels.lines[name][0].rpartition(' ')[2]})"]
+    if not strangers:
+        return labels
+    if len(strangers) == len(labels.contacts):
+        raise ConfigurationError(
+            f"{path}: no row is about a scored recording: {first_of(strangers)}",
+            f"give paths relative to the benchmark file, such as {recordings[0]}",
+        )
+    note = Finding(RowsNotScored(first_of(strangers), recordings[0]), severity="note")
+    return replace(labels, findings=(*labels.findings, note))

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cdtool.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
+from cdtool.errors import ConfigurationError
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.limits import ALL, unchecked
@@ -19,10 +20,11 @@ from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.trigger_file import Triggered, TriggerFile, read_triggers
 from cdtool.findings import Finding
 from cdtool.findings.scoring import RecordingsWithoutRow
+from cdtool.findings.truth import RowsNotScored
 from cdtool.ingest.run_reading import split_run
 from cdtool.operations import Operation
 from cdtool.pipeline import Detection
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, first_of
 from cdtool.registry import plugin_packages
 from cdtool.remote.remote_path import location
 from cdtool.short_repr import short_repr
@@ -38,7 +40,6 @@ from cdtool.workflows.runs import shown_path, to_be_seen
 # A trigger is treated as held for this long [s]; another one within it is the same alarm.
 _HELD = 0.5
 _CLOCK_RATE = 1000.0
-_STRANGER = "not scored by the benchmark file: its rows are left out"
 _CUT_LOG = "is cut into runs: its rows are left out (name a run, as {name}#1)"
 _NO_RUN = "no such run is scored: its rows are left out"
 
@@ -126,7 +127,14 @@ def _run(
     known = {shown_path(split_run(path)[0] if runs else path, base) for _, path in work}
     said, strangers = given.assigned(known, runs)
     gathered = Gathering(setup, names, {}, {})
-    gathered.skipped += [Skipped(name, _STRANGER) for name in strangers]
+    if strangers and not any(said.values()):
+        raise ConfigurationError(
+            f"{given.path}: no row is about a scored recording: {first_of(strangers)}",
+            f"give paths relative to the benchmark file, such as {min(known)}",
+        )
+    if strangers:
+        note = Finding(RowsNotScored(first_of(strangers), min(known)), severity="note")
+        gathered.findings.append(RecordingFinding.of(str(given.path), note))
     gathered.findings += measured
     if not runs:
         gathered.findings += _unlisted(given.path, said, known, listed_only)

@@ -35,10 +35,13 @@ def read(gate_folder: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize("row", ["stiff/1.csv,5.0,5.2\n", "free/99.csv,,\n"])
-def test_a_label_that_fits_no_scored_recording_is_refused_with_its_line(read, row):
+def test_a_label_that_fits_no_scored_recording_is_a_note_with_its_line(read, row):
+    """A file without any label of a scored recording is refused."""
     name = row.split(",")[0]
-    with pytest.raises(ConfigurationError, match=rf"labels\.csv line 3: '{name}' is not a scored recording"):
-        read(LEARN, STIFF, ONSET, labels=f"02.csv,5.0,5.2\n{row}")
+    (note,) = read(LEARN, STIFF, ONSET, labels=f"02.csv,5.0,5.2\n{row}").labels.findings
+    assert note.severity == "note" and f"not used: {name} (line 3)" in str(note)
+    with pytest.raises(ConfigurationError, match=rf"labels\.csv: no row is about a scored recording: {name}"):
+        read(LEARN, STIFF, ONSET, labels=row)
 
 
 def test_a_label_may_be_about_a_log_that_is_learned_from_by_its_whole_path(read):

@@ -91,9 +91,27 @@ def test_without_ground_truth_it_writes_a_label_file_to_fill_in(gate, tmp_path):
     assert rows[0] == "recording,start_s,end_s,uncertainty_s" and len(rows) == 1 + len(logs)
     found = api.detect(logs, gate / "machine.toml", detector="gm", limit=[400])
     contacts = {log.name: each.detected.contacts[0] for log, each in zip(logs, found, strict=True)}
-    filled = [rows[0], *(f"{row[:-2]},{contacts[row[:-2].rpartition('/')[2]].start},6.9" for row in rows[1:])]
+    filled = [rows[0], *(f"{row[:-3]},{contacts[row[:-3].rpartition('/')[2]].start},6.9," for row in rows[1:])]
     (tmp_path / "study" / "labels.csv").write_text("\n".join(filled), encoding="utf-8")
     assert cdtool("benchmark", tmp_path / "study" / "benchmark.toml", "--detectors", "gm").status == 0
+
+
+@pytest.mark.parametrize(("free", "folders"), [("Frei", 1), ("ohne_kontakt", 5), ("run-free", 5), ("no_contact", 1)])
+def test_logs_named_free_are_learned_from_and_folders_of_one_log_are_one_group(gate, tmp_path, free, folders):
+    """Without ground truth; each of the others in a folder of its own, or all in one."""
+    text = (gate / "machine.toml").read_text(encoding="utf-8")
+    (gate / "blind.toml").write_text("\n".join(line for line in text.splitlines() if "force =" not in line))
+    log = csv_logs(gate, "stiff")[0]
+    logs = [tmp_path / free / f"{i}.csv" for i in range(10)]
+    logs += [tmp_path / (f"trial_{i}" if folders > 1 else "trial") / f"{i}.csv" for i in range(5)]
+    for path in logs:
+        path.parent.mkdir(exist_ok=True)
+        shutil.copy(log, path)
+    api.init_study(logs, tmp_path / "study", machine=gate / "blind.toml")
+    made = drafted(tmp_path / "study")
+    assert made["learn"]["logs"] == [f"../{free}/*.csv"] and "until" not in made["learn"]
+    assert list(made["impacts"]) == ["trial"]
+    assert "# CHECK: 10 logs impact-free by their names" in (tmp_path / "study" / "benchmark.toml").read_text()
 
 
 def test_a_log_that_cannot_be_read_is_named_and_the_others_are_drafted(gate, tmp_path):

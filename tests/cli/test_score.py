@@ -10,7 +10,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.command import Outcome, cdtool
+from cdtool.evaluation.truth.trigger_file import read_triggers
+from tests.command import Outcome, cdtool, one_line
 from tests.report.hostile import HOSTILE
 
 ROOT = Path(__file__).parents[2]
@@ -174,11 +175,29 @@ def test_triggers_on_the_source_clock_are_converted_and_a_wrong_clock_is_reporte
     assert [item["recording"] for item in wrong["skipped"]] == ["stiff/01.csv", "soft/01.csv"]
 
 
-def test_rows_of_recordings_that_are_not_scored_are_named_and_the_status_is_3(logs, measured):
+def test_rows_of_recordings_that_are_not_scored_are_a_note(logs, measured):
+    """Without a row about a scored recording, all of them would count as monitored without an alarm."""
     done = score(logs, after(measured, 0.05) + "stiff/99.csv,1.0,plc,\nfree/01.csv,2.0,plc,\n")
-    assert done.status == 3
-    assert "left out: stiff/99.csv: not scored by the benchmark file" in done.err
-    assert "left out: free/01.csv" in done.err and "2 items were left out" in done.err
+    assert done.status == 0, done.err
+    assert "not scored are not used: free/01.csv, stiff/99.csv" in one_line(done.err) and "left out" not in done.err
+    done = score(logs, "stiff/99.csv,1.0,plc,\n")
+    assert done.status == 2 and "no row is about a scored recording: stiff/99.csv" in one_line(done.err)
+
+
+@pytest.mark.parametrize(
+    ("separator", "mark", "encoding"),
+    [(";", ",", "utf-8"), (";", ",", "utf-8-sig"), ("\t", ",", "utf-16"), ("\t", ".", "utf-8"), (";", ".", "cp1252")],
+)
+def test_a_trigger_file_may_be_written_like_a_log(logs, measured, separator, mark, encoding):
+    """As an office program in German or French saves it, compared with commas and points."""
+    usual = "recording,time_s,detector,blind_until_s\n" + after(measured, 0.05)
+    (logs / "usual.csv").write_text(usual, encoding="utf-8")
+    cells = [
+        [cell.replace(".", mark) if i == 1 else cell for i, cell in enumerate(row.split(","))]
+        for row in usual.split("\n")
+    ]
+    (logs / "saved.csv").write_text("\r\n".join(map(separator.join, cells)), encoding=encoding, newline="")
+    assert read_triggers(logs / "saved.csv").rows == read_triggers(logs / "usual.csv").rows
 
 
 def test_a_file_name_that_fits_two_recordings_is_refused(logs, measured):
@@ -193,6 +212,7 @@ def test_a_file_name_that_fits_two_recordings_is_refused(logs, measured):
         ("recording,time\n", "stiff/01.csv,1\n", ("triggers.csv line 1", "'time'", "time_s")),
         ("recording,time_s\n", "stiff/01.csv,6,05\n", ("triggers.csv line 2", "3 cells")),
         ("recording,time_s\n", "stiff/01.csv,late\n", ("triggers.csv line 2", "'late'")),
+        ("log,time,joint\n", "a,1,x\n", ("line 1", "'log', 'time', 'joint'", "needed: recording, time_s")),
         ("recording,time_s\n", "", ("triggers.csv", "contains no row")),
     ],
 )
@@ -204,7 +224,9 @@ def test_a_wrong_file_is_one_line_and_status_2(logs, header, rows, words):
 
 def test_nothing_to_score_never_exits_with_0(logs, tmp_path):
     done = score(logs, "stiff/99.csv,1.0,plc,\n", "--listed-only")
-    assert done.status == 2 and "no recording could be scored" in done.err and "stiff/99.csv" in done.err
+    assert (
+        done.status == 2 and "no row is about a scored recording" in one_line(done.err) and "stiff/99.csv" in done.err
+    )
     missing = cdtool("score", tmp_path / "none.csv", "-b", logs / "benchmark.toml")
     assert missing.status == 2 and "none.csv" in missing.err
 
@@ -257,7 +279,7 @@ def test_hostile_names_stay_text_in_the_terminal_and_in_every_report(logs, measu
     targets = [tmp_path / f"r.{suffix}" for suffix in ("json", "csv", "xml", "html", "md")]
     outputs = [word for target in targets for word in ("-o", target)]
     done = cdtool("score", path, "-b", logs / "benchmark.toml", *outputs)
-    assert done.status == 3 and "Traceback" not in done.err, done.err
+    assert done.status == 0 and "Traceback" not in done.err, done.err
     assert not set(done.out + done.err) & set("\x1b\x00\u202e\u2067\r")
     assert json.loads(targets[0].read_text(encoding="utf-8"))["detectors"] == [name]
     ElementTree.parse(targets[2])

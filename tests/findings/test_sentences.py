@@ -838,6 +838,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         "the dates have no zone: read as UTC, like dates without a zone in a log. If the logs state a zone, set "
         "labels_zone, e.g. '+02:00'",
     ),
+    (
+        truth.RowsNotScored("free/99.csv (line 3)", "stiff/01.csv"),
+        "rows about logs that are not scored are not used: free/99.csv (line 3); a scored log is named as stiff/01.csv",
+    ),
     (truth.KindsExcluded(1, ("wave",)), "1 label of kind wave is not a contact: an alarm there is a false alarm"),
     (
         truth.KindsExcluded(3, ("wave", "push")),

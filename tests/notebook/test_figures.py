@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -61,6 +62,19 @@ def test_the_triggers_of_a_recording_or_group_are_chosen(result):
     without = cdtool.BenchmarkResult(result.evaluated)
     with pytest.raises(UsageError, match="no curves were kept"):
         without.plot.triggers()
+
+
+def test_the_triggers_of_a_recording_are_found_by_any_ending_of_one(result):
+    (trace, *_) = result.traces
+    traces = tuple(replace(trace, recording=name) for name in ("a/01.csv#1", "a/01.csv#2", "b/01.csv", "b/21.csv"))
+    of_two = replace(result, traces=traces)
+    assert "a/01.csv#" in of_two.plot.triggers("a/01.csv").description
+    assert "a/01.csv#2" in of_two.plot.triggers("01.csv#2").description
+    assert "b/21.csv" in of_two.plot.triggers("21.csv").description
+    with pytest.raises(UsageError, match=r"'01\.csv' fits a/01\.csv, b/01\.csv"):
+        of_two.plot.triggers("01.csv")
+    with pytest.raises(UsageError, match=r"no curves of '1\.csv' were kept"):
+        of_two.plot.triggers("1.csv")
 
 
 def test_a_detection_is_drawn_as_by_the_command():

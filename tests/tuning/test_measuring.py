@@ -104,7 +104,9 @@ def test_a_rule_that_cannot_learn_is_unusable_with_its_reason(recordings, gate):
         raise SignatureError("nothing can be learned", "hint")
 
     made = measuring(recordings, gate, rule_learned=fails)
-    assert made(CANDIDATE).reason == made(Choice(CANDIDATE, 0, 1)).reason == "nothing can be learned"
+    of_all = "nothing can be learned (of 20 impact-free runs, those outside {} of 5 parts)"
+    assert made(CANDIDATE).reason == of_all.format(1)
+    assert made(Choice(CANDIDATE, 0, 1)).reason == of_all.format(2)
 
 
 def test_a_budget_that_the_subsets_cannot_support_is_a_reason(recordings, gate):
@@ -116,3 +118,11 @@ def test_a_budget_that_the_subsets_cannot_support_is_a_reason(recordings, gate):
 def test_a_rule_without_classes_is_measured_too(recordings, gate):
     made = measuring(recordings, gate)(Candidate.of(Momentum(bandwidth=20.0), Limit()))
     assert made.latency.shape == (2, 6, 10)
+
+
+def test_too_few_runs_outside_a_part_are_reported_with_all_of_them(recordings, gate):
+    """As many runs as the benchmark learns from: 12, of which 9 are outside the largest of five parts."""
+    few = replace(recordings, free=recordings.free[:12])
+    made = measuring(few, gate)(CANDIDATE)
+    assert made.reason.startswith("9 impact-free runs of one class: 1 more is needed to have 10")
+    assert made.reason.endswith("(of 12 impact-free runs, those outside 1 of 5 parts)")

@@ -9,20 +9,17 @@ always on the source's. A recording that is named without a time has no contact.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta, timezone
 from decimal import Decimal
 from pathlib import Path, PurePosixPath
 from typing import Literal, get_args
 
-from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, RecordingError, nearest
-from cdtool.evaluation.truth.named_rows import NamedRow, read_named_rows
+from cdtool.evaluation.truth.named_rows import NamedRow, read_cells, read_named_rows
 from cdtool.findings import Finding
 from cdtool.findings.truth import KindsExcluded, LabelsWithoutZone
 from cdtool.recording import MEASURED, Contact, Recording
@@ -154,7 +151,7 @@ def read_labels(
     >>> read_labels(Path("labels.csv")).contacts["stiff/01.mcap"][0].start
     5.94
     """
-    form = _form(path)
+    form = _form(read_cells(path, "label")[0][1])
     columns = (f"start_{form}", f"end_{form}")
     offset = _offset(path, zone) if zone else None
     first: dict[str, str] = {}
@@ -188,20 +185,14 @@ def read_labels(
     )
 
 
-def _form(path: Path) -> str:
+def _form(header: Sequence[str]) -> str:
     """Return what the columns of start and end contain, by the first of them in the header; "s" without one."""
-    text = read_bytes(path, ConfigurationError).decode("utf-8-sig", "replace")
-    try:
-        header = next(csv.reader(io.StringIO(text, newline="")), [])
-    except csv.Error:  # the caller reports it with its line
-        return "s"
-    names = [name.strip() for name in header]
-    return next((form for name in names for form in _FORMS if name in (f"start_{form}", f"end_{form}")), "s")
+    return next((form for name in header for form in _FORMS if name in (f"start_{form}", f"end_{form}")), "s")
 
 
 def _moment(row: NamedRow, column: str, form: str, offset: timezone | None, zoned: dict[bool, str]) -> float | None:
     """Return a time [s] or the number of a row; None if the cell is empty. `zoned`: the first date with and without."""
-    text = row.text(column)
+    text = row.text(column) if form == "time" else row.decimal(column)
     if not text:
         return None
     if form == "time":
@@ -248,7 +239,7 @@ def _contact(row: NamedRow, start: float, end: float, form: str) -> Contact:
     """Return a label as a contact; of one that states no uncertainty, `resolution` is its last printed digit [s]."""
     uncertainty = row.seconds("uncertainty_s")
     if uncertainty is None:
-        uncertainty, digit = math.nan, _last_digit(row.text(f"start_{form}"), form)
+        uncertainty, digit = math.nan, _last_digit(row.decimal(f"start_{form}"), form)
     else:
         digit = math.nan
     if end < start or uncertainty < 0.0:

@@ -1,7 +1,8 @@
 """A small CSV that a person or a program writes about recordings, as a label or trigger file: checked line by line.
 
-Conventions: UTF-8, separated by commas, one header line. `recording` is the path below the benchmark file, or the
-file's name alone where that is unique. Every row has as many cells as the header, so that a decimal comma is noticed.
+Conventions: one header line, separated by commas, semicolons or tabs, in any encoding that a log may have. A number has
+a decimal point or comma. `recording` is the path below the benchmark file, or the file's name alone where that is
+unique. Every row has as many cells as the header, so that a decimal comma between commas is noticed.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from cdtool.bounded_loading import read_bytes
-from cdtool.errors import ConfigurationError, nearest
+from cdtool.errors import ConfigurationError, RecordingError, nearest
+from cdtool.formats.csv.encoding import detect_text
 from cdtool.plain_text import counted, first_of
 
 
@@ -30,13 +32,18 @@ class NamedRow:
         """Return a cell without the blanks around it; empty if the column is missing."""
         return self.cells.get(name, "").strip()
 
+    def decimal(self, name: str) -> str:
+        """Return a cell with a decimal point, also if it has a comma."""
+        text = self.text(name)
+        return text if "." in text else text.replace(",", ".")
+
     def seconds(self, name: str) -> float | None:
         """Return a finite number of seconds, None if the cell is empty; raises ConfigurationError."""
         text = self.text(name)
         if not text:
             return None
         try:
-            value = float(text)
+            value = float(self.decimal(name))
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
@@ -50,15 +57,26 @@ class NamedRow:
 
 def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[NamedRow]:
     """Return the rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
+    (_, header), *rows = read_cells(path, what)
+    _check_header(path, header, required, [*required, *optional])
+    return [_row(path, line, header, cells) for line, cells in rows]
+
+
+def read_cells(path: Path, what: str) -> list[tuple[int, list[str]]]:
+    """Return the rows that are not empty with their lines, the header first; raises ConfigurationError."""
     content = read_bytes(path, ConfigurationError)
     try:
-        text = content.decode("utf-8-sig")
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        try:
+            found, stream = detect_text(path, content, content=content)
+            text = found.decode(stream)
+        except RecordingError:  # empty, or names with characters that no log has
+            text = content.decode("utf-8-sig")
+        separator = max(",;\t", key=text.partition("\n")[0].count)
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
         header = [name.strip() for name in next(reader, [])]
-        _check_header(path, header, required, [*required, *optional])
-        return [_row(path, reader.line_num, header, cells) for cells in reader if cells]
+        return [(1, header), *((reader.line_num, cells) for cells in reader if cells)]
     except UnicodeDecodeError as fault:
-        raise ConfigurationError(f"{path}: not a {what} file: not UTF-8 text", "give a UTF-8 CSV file") from fault
+        raise ConfigurationError(f"{path}: not a {what} file: not text", "give a CSV file") from fault
     except csv.Error as fault:
         raise ConfigurationError(
             f"{path}: not a {what} file: damaged at line {reader.line_num}", "give a CSV file with paired quotes"
@@ -126,9 +144,13 @@ def _meant_runs(name: str, recordings: Collection[str]) -> list[str]:
 
 
 def _check_header(path: Path, header: Sequence[str], required: Sequence[str], known: Sequence[str]) -> None:
+    unknown = [name for name in header if name not in known]
+    if unknown:
+        which = ", ".join(f"'{name}'" for name in unknown)
+        missing = [name for name in required if name not in header]
+        hint = f"{nearest(unknown[0], known)}; needed: {', '.join(missing or required)}"
+        raise ConfigurationError(f"{path} line 1: unknown column{'s' * (len(unknown) > 1)} {which}", hint)
     for name in header:
-        if name not in known:
-            raise ConfigurationError(f"{path} line 1: unknown column '{name}'", nearest(name, known))
         if header.count(name) > 1:
             raise ConfigurationError(f"{path} line 1: column '{name}' is repeated", "name each column once")
     for name in required:

@@ -117,7 +117,7 @@ def false_alarm_rows(judged: Judged) -> list[FalseAlarmResult]:
     """Return a row for each alarm without a contact."""
     return [
         FalseAlarmResult(
-            recording=judged.operation.name,
+            recording=judged.operation.whole.name,
             group=judged.group,
             detector=detection.detector,
             joint=alarm.joint,

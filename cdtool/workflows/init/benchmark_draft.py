@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,11 @@ _HOLDOUT = 4
 _ENOUGH_IMPACTS = 3
 _FORCE_ONLY = "  # the logs have no channels of a machine: a protocol of the forces needs no detector"
 _NORMAL_MAD = 1.4826
+# Words, between anything but letters, in the names of logs without an impact.
+_FREE = re.compile(
+    r"(?<![^\W\d_])(free|frei|ohne|without|normal|sans|libre|no[_-]?(contact|impact|collision)s?)(?![^\W\d_])",
+    re.IGNORECASE,
+)
 _NUMBER = re.compile(r"[\W_]*\d+.*$")
 # Other keys of a TOML file are quoted.
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -106,6 +111,9 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
     if first is None:
         reason = f"; first reason: {skipped[0].reason}" if skipped else ""
         raise RecordingError(f"none of {counted(len(logs), 'log')} can be read{reason}", "check with cdtool info")
+    # Without ground truth, its name is what shows that a log has no impact.
+    named_free = [log for log in known if log.contacts is None and _is_named_free(log.path)]
+    known = [replace(log, contacts=0) if log in named_free else log for log in known]
     impacts = [log for log in known if log.contacts]
     free = [log for log in known if log.contacts == 0]
     usable, others = _detectors(first, machine_file)
@@ -113,7 +121,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
     beside: dict[str, str] = {}
     if not impacts and unknown:
         impacts, unknown = unknown, []
-        beside["labels.csv"] = _label_file(impacts, folder)
+        beside["labels.csv"] = _label_file([*impacts, *named_free], folder)
     lines = [
         f"# Draft by cdtool init from {counted(len(known), 'log')}: check each line marked CHECK.",
         f"machine = {json.dumps(relative_name(machine_file.path, folder), ensure_ascii=False)}",
@@ -123,8 +131,14 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         *_groups(impacts, folder),
         *_onset(known, beside),
         *_comments(unknown, folder),
+        *(["", f"# CHECK: {counted(len(named_free), 'log')} impact-free by their names"] if named_free else []),
     ]
     return BenchmarkDraft("\n".join(lines) + "\n", beside, tuple(skipped), bool(usable))
+
+
+def _is_named_free(log: Path) -> bool:
+    """Return whether the name of a log or of its folder says that it has no impact, as ohne_kontakt."""
+    return any(_FREE.search(name) for name in (log_stem(log), log.resolve().parent.name))
 
 
 def _contacts(recording: Recording) -> int | None:
@@ -186,10 +200,15 @@ def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_po
 
 def _groups(impacts: Sequence[_Log], folder: Path) -> list[str]:
     """Return the groups of impacts: by folder, or in a single folder by the names of the files."""
-    by_folder = len({log.path.parent for log in impacts}) > 1
+    folders = {log.path.parent for log in impacts}
+    by_folder = 1 < len(folders) < len(impacts)
     groups: dict[str, list[_Log]] = {}
     for log in impacts:
         place = log.path.resolve().parent.name
+        if len(folders) == len(impacts) > 1:  # a folder for each log: their names, or else the folder around them
+            place = _NUMBER.sub("", place) or log.path.resolve().parent.parent.name
+            groups.setdefault(re.sub(r"\W+", "_", place).strip("_") or "impacts", []).append(log)
+            continue
         name = place if by_folder else _NUMBER.sub("", log_stem(log.path)) or place
         groups.setdefault(re.sub(r"\W+", "_", name).strip("_") or "impacts", []).append(log)
     lines = []

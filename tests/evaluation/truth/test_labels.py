@@ -48,6 +48,7 @@ def test_a_byte_order_mark_and_spaces_in_the_header_do_not_matter(tmp_path):
     [
         ("recording,start_s\na.csv,1\n", "line 1: column 'end_s' is missing"),
         ("recording,start_s,end_s,knid\n", "unknown column 'knid'.*kind"),
+        ("log,start_s,begin,stop\n", "unknown columns 'log', 'begin', 'stop'.*needed: recording, end_s"),
         ("recording,start_s,end_s\na.csv,one,2\n", "line 2: start_s is 'one'"),
         ("recording,start_s,end_s\na.csv,2,1\n", "line 2: start 2 s, end 1 s"),
         ("recording,start_s,end_s\n,2,3\n", "line 2: no recording"),
@@ -65,6 +66,22 @@ def test_a_wrong_file_is_one_line_that_names_the_line(tmp_path, text, said):
 def log(origin: float = 0.0, rows: TableRows | None = None) -> Recording:
     time = np.arange(1000) * 0.01
     return Recording("soft/01.csv", "", ("axis",), {"speed": Series(time, time, "m/s")}, origin=origin, rows=rows)
+
+
+@pytest.mark.parametrize(
+    ("separator", "mark", "encoding"), [(";", ",", "utf-8-sig"), ("\t", ",", "utf-16"), (";", ".", "cp1252")]
+)
+def test_a_label_file_may_be_written_like_a_log(tmp_path, separator, mark, encoding):
+    rows = [
+        ["recording", "start_s", "end_s", "kind"],
+        ["a.csv", f"1{mark}25", f"1{mark}5", "stoß"],
+        ["b.csv", "", "", ""],
+    ]
+    path = tmp_path / "labels.csv"
+    path.write_text("\r\n".join(map(separator.join, rows)), encoding=encoding, newline="")
+    (contact,) = (labels := read_labels(path)).contacts["a.csv"]
+    assert (contact.start, contact.end, contact.kind, contact.resolution) == (1.25, 1.5, "stoß", 0.01)
+    assert labels.contacts["b.csv"] == ()
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_a_file_name_that_fits_several_recordings_is_refused(tmp_path):
         ("", "line 1: column 'recording' is missing"),
         ("recording\na.csv\n", "line 1: column 'time_s' is missing"),
         ("recording,time_s,detecter\n", "line 1: unknown column 'detecter'"),
-        ("recording;time_s\na.csv;1\n", "line 1: unknown column 'recording;time_s'"),
+        ("recording:time_s\na.csv:1\n", "line 1: unknown column 'recording:time_s'"),
         ("recording,time_s,time_s\na.csv,1,2\n", "line 1: column 'time_s' is repeated"),
         ("recording,time_s\n", "contains no row"),
         ("recording,time_s\na.csv,1\n\n,2\n", "line 4: no recording is named"),
@@ -69,7 +69,7 @@ def test_a_file_name_that_fits_several_recordings_is_refused(tmp_path):
         (HEADER + "a.csv,2,gm,1\n", "line 2: blind from 2 until 1"),
         (HEADER + "a.csv,,gm,1\n", "line 2: blind_until_s is 1, time_s is missing"),
         ('recording,time_s\n"a.csv,1\n', "not a trigger file: damaged at line 2"),
-        (b"recording,time_s\n\xff\xfe,1\n", "not a trigger file: not UTF-8 text"),
+        (b"\x00\xff\xfe\x01\x02", "not a trigger file: not text"),
         (b"\x89PNG\r\n\x1a\n\x00\x00", "not a trigger file"),
     ],
 )

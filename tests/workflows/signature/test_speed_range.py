@@ -116,3 +116,14 @@ def test_a_check_says_that_a_run_lies_between_the_learned_speeds(door, learned):
     skipped = cdtool.check_signature(door / "checked.json", logs, door / "machine.toml").skipped
     beyond = [item.reason for item in skipped if "beyond" in item.recording]
     assert beyond and all("no signature for its class" in reason for reason in beyond)
+
+
+def test_contacts_and_false_alarms_of_a_log_cut_into_strokes_have_its_name(door):
+    file = door / "names.toml"
+    file.write_text(
+        'machine = "machine.toml"\ndetectors = ["gm"]\noperations = "motion"\n'
+        'threshold = { name = "limit", limits = 0.001 }\n[impacts.push]\nlogs = ["slow_hits.csv"]\n',
+        encoding="utf-8",
+    )
+    result = cdtool.benchmark(file)
+    assert len(result.false_alarms) and set(result.false_alarms.recording) == set(result.contacts.recording)
