@@ -23,19 +23,16 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 from timing import environment, table
 
-from cdtool.evaluation.statistics.bootstrap import bca, bca_bounds, resampled_mean
-from cdtool.evaluation.statistics.clusters import clusters_of
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.kaplan_meier import latency_quantile
 from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
 from cdtool.evaluation.statistics.small_sample import FEWEST, median_of, p95_of
+from cdtool.evaluation.statistics.spread import mean_interval
 
 REPETITIONS = 1000
-# Enough for coverage; the intervals that cdtool prints use 9999.
-RESAMPLES = 1999
-STATISTICS = ("mean", "median", "std")
 NOMINAL = 0.95
-LEAST_BCA = 0.9
+# Of the mean of 50 contacts, and of 10 normal ones.
+LEAST_MEAN = 0.9
 
 Floats = NDArray[np.float64]
 
@@ -77,6 +74,12 @@ LATENCIES = {
     "80 % at 38, 20 % at 80 ms": Latencies(((0.8, stats.norm(38, 4)), (0.2, stats.norm(80, 8)))),
     "50 % at 38, 50 % at 80 ms": Latencies(((0.5, stats.norm(38, 4)), (0.5, stats.norm(80, 8)))),
 }
+# A few slow cases: no interval of ten or twenty contacts covers.
+SLOW = {
+    "95 % at 40, 5 % slow at 90 ms": Latencies(((0.95, stats.norm(40, 4)), (0.05, stats.norm(90, 8)))),
+    "85 % at 40, 15 % slow at 90 ms": Latencies(((0.85, stats.norm(40, 4)), (0.15, stats.norm(90, 8)))),
+}
+SIZES = (10, 20, 50)
 # Few contacts show median and range; the mixture with 15 % slow cases is the hardest one.
 FEW = (4, 5, 6, 7, 8, 9)
 FEW_LATENCIES = {
@@ -97,7 +100,7 @@ def main(repetitions: int, few_only: bool) -> int:
     held = print_exact()
     error = 100 * math.sqrt(NOMINAL * (1 - NOMINAL) / repetitions)
     print(f"\nsimulated: {repetitions} tests each, standard error of a figure about {error:.1f}", flush=True)
-    samples = [(name, n) for n in (30, 10) for name in LATENCIES]
+    samples = [(name, n) for name in LATENCIES | SLOW for n in SIZES]
     cut = [(name, n, missed) for name in CENSORED for n in (30, 100) for missed in MISSED]
     few = [(name, n) for name in FEW_LATENCIES for n in FEW]
     with ProcessPoolExecutor() as pool:
@@ -105,10 +108,10 @@ def main(repetitions: int, few_only: bool) -> int:
         held &= print_few(few, shown, repetitions)
         if few_only:
             return 0 if held else 1
-        independent = [Row(pool, bootstrap_hits, sample, repetitions) for sample in samples]
+        independent = [Row(pool, mean_hits, sample, repetitions) for sample in samples]
         recordings = [Row(pool, recording_hits, numbers, repetitions) for numbers in RECORDINGS]
         quantiles = [Row(pool, quantile_hits, sample, repetitions) for sample in cut]
-        held &= print_bootstrap(samples, independent)
+        held &= print_means(samples, independent)
         print_recordings(recordings)
         print_quantiles(cut, quantiles)
     return 0 if held else 1
@@ -164,49 +167,44 @@ def least_coverage(bounds: Floats, probabilities: Callable[[float], Floats], hig
     return min(float(probabilities(value)[(bounds[:, 0] <= value) & (value <= bounds[:, 1])].sum()) for value in true)
 
 
-def bootstrap_hits(name: str, n: int, repetitions: int, seed: int) -> Floats:
-    """Return the share of the tests whose BCa interval contains the true mean, median and standard deviation."""
-    rng, latencies = np.random.default_rng((seed, n)), LATENCIES[name]
-    true = [latencies.figure(statistic) for statistic in STATISTICS]
-    hits = np.zeros(len(STATISTICS))
-    for _ in range(repetitions):
-        sample = latencies.draw(rng, n)
-        hits += [holds(bca(sample, range(n), s, resamples=RESAMPLES), t) for s, t in zip(STATISTICS, true, strict=True)]
-    return hits / repetitions
+def mean_hits(name: str, n: int, repetitions: int, seed: int) -> Floats:
+    """Return the share of the tests whose interval contains the true mean."""
+    rng, latencies = np.random.default_rng((seed, n)), (LATENCIES | SLOW)[name]
+    true = latencies.figure("mean")
+    return np.array(
+        [np.mean([holds(mean_interval(latencies.draw(rng, n), range(n)), true) for _ in range(repetitions)])]
+    )
 
 
 def few_hits(name: str, n: int, repetitions: int, seed: int) -> Floats:
     """Share of the tests that show an interval of mean, median and P95, and of those whose interval holds it.
 
-    Last: the share of the tests in which the bootstrap interval of the mean, which is not shown, would have held it.
+    Last: the share of the tests in which Student's interval of the mean, which is not shown, would have held it.
     """
     rng, latencies = np.random.default_rng((seed, n)), FEW_LATENCIES[name]
     mean, median, p95 = latencies.figure("mean"), latencies.quantile(0.5), latencies.quantile(0.95)
     hits = np.zeros(7)
     for _ in range(repetitions):
         sample, seen = latencies.draw(rng, n), np.zeros(n, dtype=bool)
-        shown = (bca(sample, range(n), "mean"), median_of(sample, seen, range(n)), p95_of(sample, seen, range(n)))
+        shown = (mean_interval(sample, range(n)), median_of(sample, seen, range(n)), p95_of(sample, seen, range(n)))
         hits[:3] += [not math.isnan(interval.low) for interval in shown]
         hits[3:6] += [holds(interval, true) for interval, true in zip(shown, (mean, median, p95), strict=True)]
-        low, high = bca_bounds((n,), resampled_mean(clusters_of(sample, range(n))), n, NOMINAL, RESAMPLES, 0)
-        hits[6] += low <= mean <= high
+        bounds = stats.ttest_1samp(sample, 0.0).confidence_interval(NOMINAL)
+        hits[6] += bounds.low <= mean <= bounds.high
     return hits / repetitions
 
 
 def recording_hits(recordings: int, contacts: int, repetitions: int, seed: int) -> Floats:
-    """The same, resampled by recording (three figures) and, wrongly, by contact (three more)."""
+    """Return the same by recording and, wrongly, by contact."""
     rng = np.random.default_rng((seed, recordings))
     recording = np.repeat(np.arange(recordings), contacts)
     mean, std = RECORDED.figure("mean"), RECORDED.figure("std")
-    hits = np.zeros((2, len(STATISTICS)))
+    hits = np.zeros(2)
     for _ in range(repetitions):
         between = rng.normal(size=recordings)[recording]
         sample = mean + std * math.sqrt(0.5) * (between + rng.normal(size=len(recording)))
-        for row, clusters in enumerate((recording, range(len(recording)))):
-            for column, statistic in enumerate(STATISTICS):
-                interval = bca(sample, clusters, statistic, resamples=RESAMPLES)
-                hits[row, column] += holds(interval, RECORDED.figure(statistic))
-    return hits.ravel() / repetitions
+        hits += [holds(mean_interval(sample, clusters), mean) for clusters in (recording, range(len(recording)))]
+    return hits / repetitions
 
 
 def quantile_hits(name: str, n: int, missed: float, repetitions: int, seed: int) -> Floats:
@@ -229,13 +227,15 @@ def holds(interval: Interval, true: float) -> bool:
     return interval.low <= true <= interval.high
 
 
-def print_bootstrap(samples: Sequence[tuple[str, int]], rows: Sequence[Row]) -> bool:
-    """BCa on independent contacts; whether mean and median cover 90 % with 30 of them."""
-    found = {sample: row.shares() for sample, row in zip(samples, rows, strict=True)}
-    print("\nBCa, independent contacts")
-    table(("", *STATISTICS), [(f"{name}, n = {n}", *map(percent, shares)) for (name, n), shares in found.items()])
-    least = min(float(shares[:2].min()) for (_, n), shares in found.items() if n == 30)
-    return said(f"mean and median, n = 30: at least {percent(LEAST_BCA)}", least >= LEAST_BCA)
+def print_means(samples: Sequence[tuple[str, int]], rows: Sequence[Row]) -> bool:
+    """Print the coverage of the mean by number of contacts; return whether 50 suffice, and 10 normal ones."""
+    found = {sample: float(row.shares()[0]) for sample, row in zip(samples, rows, strict=True)}
+    print("\nmean, independent contacts: Student's interval")
+    head = ("", *(f"n = {n}" for n in SIZES))
+    table(head, [(name, *(percent(found[name, n]) for n in SIZES)) for name in LATENCIES | SLOW])
+    least = min(found[name, SIZES[-1]] for name in LATENCIES)
+    text = f"mean of {SIZES[-1]}, and of 10 normal ones: at least {percent(LEAST_MEAN)}"
+    return said(text, min(least, found["normal, 40 +- 6 ms", 10]) >= LEAST_MEAN)
 
 
 def print_few(few: Sequence[tuple[str, int]], rows: Sequence[Row], repetitions: int) -> bool:
@@ -248,7 +248,7 @@ def print_few(few: Sequence[tuple[str, int]], rows: Sequence[Row], repetitions: 
         lines.append((f"{name}, n = {n}", *cells, percent(shares[6])))
         sound &= not shares[0] and not shares[2] and bool(shares[1]) == (n >= 6)
         least = min(least, float(shares[4] / shares[1])) if shares[1] else least
-    print(f"\nbelow {FEWEST} contacts: what is shown (- no interval), and the bootstrap of the mean, which is not")
+    print(f"\nbelow {FEWEST} contacts: what is shown (- no interval), and Student's interval of the mean, which is not")
     table(("", "mean", "median", "P95", "mean, not shown"), lines)
     error = math.sqrt(NOMINAL * (1.0 - NOMINAL) / repetitions)
     text = f"only the median has one, with 6 contacts or more; it holds in {percent(NOMINAL)} (least {percent(least)})"
@@ -256,13 +256,10 @@ def print_few(few: Sequence[tuple[str, int]], rows: Sequence[Row], repetitions: 
 
 
 def print_recordings(rows: Sequence[Row]) -> None:
-    lines = []
-    for (recordings, contacts), row in zip(RECORDINGS, rows, strict=True):
-        shares = list(map(percent, row.shares()))
-        lines.append((f"{recordings} recordings of {contacts}, resampled by recording", *shares[:3]))
-        lines.append((f"{recordings} recordings of {contacts}, wrongly by contact", *shares[3:]))
-    print("\nBCa, contacts of a recording alike (half of the variance between recordings)")
-    table(("", *STATISTICS), lines)
+    titles = [f"{recordings} recordings of {contacts}" for recordings, contacts in RECORDINGS]
+    print("\nmean, contacts of a recording alike (half of the variance between recordings)")
+    head = ("", "by recording", "wrongly by contact")
+    table(head, [(title, *map(percent, row.shares())) for title, row in zip(titles, rows, strict=True)])
 
 
 def print_quantiles(cut: Sequence[tuple[str, int, float]], rows: Sequence[Row]) -> None:

@@ -15,20 +15,31 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
 from statistics import fmean
+from typing import Any
 
-import fused
 import numpy as np
-from fused import Cell, Run
 from timing import environment, table
 
 from cdtool.activation import Activation
-from cdtool.detection import Status
-from cdtool.pipeline import judge
+from cdtool.detection import Signal, Status
+from cdtool.evaluation.truth.onset import find_contacts
+from cdtool.evaluation.truth.onset_rule import OnsetRule
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.motion import motion_class
+from cdtool.operations import Operation
+from cdtool.pipeline import judge, run_detector
+from cdtool.recording import Recording
+from cdtool.simulation import arm_recordings, gate_recordings
+from cdtool.simulation.arm_model import simulate_arm_run
+from cdtool.simulation.arm_parameters import ArmParameters
 from cdtool.simulation.changed_machine import ChangedMachine
-from cdtool.simulation.gate_model import GateParameters
+from cdtool.simulation.gate_model import GateParameters, simulate_gate_run
 from cdtool.thresholds.base import FittedThreshold
 from cdtool.thresholds.signature import Signature
 
@@ -38,10 +49,77 @@ SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 0.7, 1.3)
 MACHINES = ("gate", "T1", "T2")
 DETECTORS = ("momentum", "friction_ekf", "inertial_momentum", "pure_inertia", "pure_torque")
 GROUPS = ("stiff", "soft")
+# No run of a group has a random number in common with one of another.
+STREAMS = ("free", "fresh", *GROUPS)
+# Alarms count at most this long after the onset of a contact [s].
+WINDOW = 1.0
 RUNS = 14
 # Of runs within the range: the most that may alarm, and the most that the latency may be above that of a signature of
 # the same speed, at the learned speeds.
 MOST_ALARMS, MOST_SLOWER = 0.05, 0.05
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated operation with the detector's signal; `onset` [s] on the load cell, NaN without a contact."""
+
+    operation: Operation
+    signal: Signal
+    onset: float
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A simulated machine, "gate", or the arm in trial "T1" or "T2", one seed and one detector."""
+
+    name: str
+    seed: int
+    detector: str
+    gate: GateParameters
+
+    @property
+    def onset(self) -> OnsetRule:
+        """Return the rule for the onset on the load cell."""
+        return OnsetRule(20.0, 8.0) if self.name == "gate" else OnsetRule(0.5, 0.25)
+
+    @cached_property
+    def machine_file(self) -> MachineFile:
+        """Return the machine file of the unchanged machine, as `cdtool simulate` writes it."""
+        from cdtool import simulate_arm, simulate_gate
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "one"
+            if self.name == "gate":
+                simulate_gate(path, {"free": 1}, seed=1)
+            else:
+                simulate_arm(path, {"free": 1}, seed=1, trial=int(self.name[1]))  # type: ignore[arg-type]
+            return read_machine_file(path / "machine.toml")
+
+    def recording(self, group: str, number: int, changed: ChangedMachine) -> Recording:
+        """Return a recording on the load side."""
+        rng = np.random.default_rng([self.seed, STREAMS.index(group), number])
+        kind: Any = group if group in GROUPS else "none"
+        if self.name == "gate":
+            run = changed.logged_gate(simulate_gate_run(changed.gate(self.gate), rng, kind), 0.56)
+            return gate_recordings.as_recording(run, f"{group} {number}", self.gate)
+        arm, trial = ArmParameters(), int(self.name[1])
+        moved = simulate_arm_run(changed.arm(arm), rng, trial, kind)  # type: ignore[arg-type]
+        logged = arm_recordings.as_recording(changed.logged_arm(moved, arm.torque_constant), f"{group} {number}")
+        return self.machine_file.machine.referred_to_load(logged)
+
+    def runs(self, group: str, count: int, changed: ChangedMachine) -> Iterator[Run]:
+        """Yield the runs of a group."""
+        machine = self.machine_file.machine
+        detector = self.machine_file.detector(self.detector)
+        for number in range(count):
+            recording = self.recording(group, number, changed)
+            onset = find_contacts(recording, self.onset)[0].start if group in GROUPS else math.nan
+            seen = recording.without_ground_truth()
+            operation = Operation(seen, motion_class(seen))
+            signal = run_detector(operation, machine, detector)
+            # What nothing reads any more would fill the memory.
+            channels = {name: seen.channels[name] for name in ("speed", "position")}
+            yield Run(replace(operation, recording=replace(seen, channels=channels)), signal, onset)
 
 
 @dataclass
@@ -63,7 +141,7 @@ class Tally:
         detection = judge(run.operation, "it", run.signal, thresholds, Activation())
         times = [alarm.time for alarm in detection.verdict.alarms]
         if group in GROUPS:
-            after = [time for time in times if run.onset <= time <= run.onset + fused.WINDOW]
+            after = [time for time in times if run.onset <= time <= run.onset + WINDOW]
             self.missed += not after
             self.latencies[group] += [1e3 * (after[0] - run.onset)] if after else []
             return
@@ -93,10 +171,11 @@ def learned(cell: Cell, speed: float) -> FittedThreshold:
 
 def measure(name: str, detector: str, options: argparse.Namespace) -> list[str]:
     """Print a table of a detector on a machine, and return what misses the targets."""
+    gate = GateParameters(stribeck_speed=options.stribeck_speed)
     tallies = {speed: (Tally(), Tally()) for speed in options.speeds}
     counts = {"fresh": options.runs, **dict.fromkeys(GROUPS, options.impacts)}
     for seed in range(FIRST_SEED, FIRST_SEED + options.seeds):
-        cell = Cell(name, seed, detector)
+        cell = Cell(name, seed, detector, gate)
         ends = [learned(cell, speed) for speed in options.learned]
         for speed, (own, between) in tallies.items():
             same = dict(zip(options.learned, ends, strict=True)).get(speed) or learned(cell, speed)
@@ -137,8 +216,6 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--detectors", nargs="+", default=list(DETECTORS), help="full names")
     parser.add_argument("--stribeck-speed", type=float, default=GateParameters.stribeck_speed)
     options = parser.parse_args(arguments)
-    gate = replace(GateParameters(), stribeck_speed=options.stribeck_speed)
-    fused.GATES.update(dict.fromkeys(("free", "fresh", *GROUPS), gate))
     print(environment())
     found = [
         fault

@@ -49,7 +49,7 @@ for item in pkgutil.walk_packages(cdtool.__path__, "cdtool."):
     importlib.import_module(item.name)
 import numba
 begin = perf_counter()
-cdtool.kernel_warm_up.compile_loaded()
+cdtool.kernel_warm_up.compile_package()
 for item in cdtool.kernels.entries():
     item.compiled
 print(len(cdtool.kernels.loaded()), perf_counter() - begin)

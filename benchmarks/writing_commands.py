@@ -35,7 +35,6 @@ def prepare(folder: Path, run: Run) -> None:
         '[learn]\nlogs = ["gate/free/*.csv"]\n[impacts.stiff]\nlogs = ["gate/stiff/*.csv"]\n',
         encoding="utf-8",
     )
-    run(["simulate", "season", "--runs", "33", "--runs-per-day", "3", "-o", str(folder / "season")])
     free = [str(gate / "free" / f"0{number}.csv") for number in (1, 2, 3)]
     machine = ("-m", str(gate / "machine.toml"))
     for name, logs in (("a", free[:2]), ("b", free)):
@@ -78,8 +77,6 @@ def cases(inputs: Path) -> list[Case]:
     free = [f"{gate}/free/0{number}.csv" for number in (1, 2, 3, 4)]
     stiff = [f"{gate}/stiff/0{number}.csv" for number in (1, 2)]
     a, b = f"{inputs}/a.json", f"{inputs}/b.json"
-    season = [f"{inputs}/season/free/{number:02d}.csv" for number in range(1, 34)]
-    weather = ("--ambient", f"{inputs}/season/ambient.csv", "--false-alarm-budget", "1/100op")
     every = [
         word
         for suffix in ("json", "html", "md", "xml", "csv", "png", "svg", "pdf")
@@ -105,11 +102,6 @@ def cases(inputs: Path) -> list[Case]:
             "signature check",
             _plot("signature", "check", a, *free, *machine),
             _plot("signature", "check", a, *free[:3], *machine),
-        ),
-        Case(
-            "signature forecast",
-            _plot("signature", "forecast", a, *season, *machine, *weather, "--temperatures", "10:25"),
-            _plot("signature", "forecast", a, *season, *machine, *weather, "--temperatures", "15:20"),
         ),
         Case("benchmark", (*benchmark, "gm", *every), (*benchmark, "pt", *every)),
         Case("benchmark, protocol", _protocol(inputs, "b"), _protocol(inputs, "a")),
@@ -156,7 +148,7 @@ def cases(inputs: Path) -> list[Case]:
         Case(
             "inject",
             ("inject", f"{inputs}/inject_b.toml", "-o", "{out}/injected"),
-            ("simulate", "season", "--runs", "1", "-o", "{out}/logs"),
+            ("simulate", "gate", "--free", "1", "--holdout", "0", "--stiff", "0", "--soft", "0", "-o", "{out}/logs"),
         ),
         Case("tune", _tune(f"{inputs}/benchmark.toml", "trend"), _tune(f"{inputs}/benchmark.toml", "limit")),
         Case("coverage", _coverage(f"{inputs}/inject_b.toml"), _coverage(f"{inputs}/inject_a.toml")),
@@ -165,7 +157,6 @@ def cases(inputs: Path) -> list[Case]:
             for kind, some in (
                 ("gate", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0")),
                 ("arm", ("--free", "1", "--holdout", "0", "--stiff", "1", "--soft", "0", "--format", "mixed")),
-                ("season", ("--runs", "2")),
             )
         ),
         *(

@@ -9,7 +9,6 @@ Every command is available as a function:
         cdtool.recover("damaged.mcap", "clean.mcap")                        -> Recovered
     cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
-    cdtool.forecast_signature("gate.json", logs, "machine.toml", ...)   -> Forecasted: false alarms by temperature, date
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> DetectionResult; of a list DetectionResults
         cdtool.detect_runs("cycles.csv", "machine.toml", operations="column:run_id", signature="gate.json")
@@ -67,7 +66,6 @@ if TYPE_CHECKING:
     from cdtool.workflows.planning import plan
     from cdtool.workflows.protocol.making import protocol
     from cdtool.workflows.recovering import recover
-    from cdtool.workflows.signature.forecasting import forecast_signature
     from cdtool.workflows.signature.learning import learn_signature
     from cdtool.workflows.signature.upkeep import check_signature
     from cdtool.workflows.signature.upkeep import update_with_runs as update_signature
@@ -78,7 +76,6 @@ _API = {
     "read": "cdtool.notebook.reading:read",
     "learn_signature": "cdtool.workflows.signature.learning:learn_signature",
     "check_signature": "cdtool.workflows.signature.upkeep:check_signature",
-    "forecast_signature": "cdtool.workflows.signature.forecasting:forecast_signature",
     "update_signature": "cdtool.workflows.signature.upkeep:update_with_runs",
     "coverage": "cdtool.workflows.coverage:coverage",
     "detect": "cdtool.notebook.detection_result:detect",
@@ -153,7 +150,6 @@ __all__ = [
     "detect_runs",
     "explain",
     "explain_runs",
-    "forecast_signature",
     "identify",
     "info",
     "init",

@@ -154,6 +154,14 @@ def parse_json(content: bytes, size_on_disk: int | None = None) -> Any:
         raise ContentError("nested too deeply") from fault
 
 
+def parse_own_json(text: str | bytes) -> Any:
+    """Return the values of JSON from inside a file that cdtool wrote, with NaN as it may hold; raises ValueError."""
+    try:
+        return json.loads(text)
+    except RecursionError as fault:
+        raise ContentError("nested too deeply") from fault
+
+
 def unpack_json(content: bytes) -> Any:
     """Return the values of gzipped strict JSON; ContentError before unpacking that takes far too much memory.
 

@@ -70,8 +70,8 @@ class ChannelSource:
     """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
-    `most`. `keys` are the columns by their names in the file, once these are known (resolve_columns). `words`: the
-    column may contain texts, which are read as categories.
+    `most`. `confirmed`: the unit is `stated`, whatever the header says. `keys` are the columns by their names in the
+    file, once these are known (resolve_columns). `words`: the column may contain texts, which are read as categories.
 
     A force may be a vector: `columns`, or `fields`, each of one of the `topics`, are then its axes. `direction` (axes,)
     is a unit vector: the force is the component along it; without one it is the magnitude. It may be in a file of its
@@ -97,6 +97,7 @@ class ChannelSource:
     own_file: OwnFile | None = None
     kinds: tuple[tuple[float, str], ...] = ()
     words: bool = False
+    confirmed: bool = False
 
     __repr__ = short_repr
 
@@ -140,7 +141,8 @@ class TimeSource:
     """The clock: a column and its factor to seconds, a fixed rate, or (MCAP) one of a message's clocks.
 
     With both a column and a rate, the column counts samples: a gap in it is a gap in time. `unit` is the column's.
-    `key` is the column by its name in the file, once this is known (resolve_columns).
+    `nanoseconds` is the column with the rest of each stamp within the second. `key` and `nanoseconds_key` are the
+    columns by their names in the file, once these are known (resolve_columns).
     """
 
     column: str | int | None = None
@@ -149,6 +151,8 @@ class TimeSource:
     rate: float | None = None
     clock: Literal["log", "publish", "header"] = "log"
     key: str = ""
+    nanoseconds: str | int | None = None
+    nanoseconds_key: str = ""
 
 
 @dataclass(frozen=True)
@@ -251,8 +255,9 @@ def _column_time(part: Table) -> TimeSource:
     found = unit(name, part.key("unit"))
     if found.si != "s":
         raise part.fault("unit", f"'{name}' is not a unit of time", "give s, ms, us, ns or min")
+    rest = _column(part, part.raw("nanoseconds"), "nanoseconds") if "nanoseconds" in part else None
     part.finish()
-    return TimeSource(column=column, factor=found.factor, unit=name)
+    return TimeSource(column=column, factor=found.factor, unit=name, nanoseconds=rest)
 
 
 def _source(
@@ -296,6 +301,7 @@ def _source(
         direction=_direction(table, count) if channel == "force" and "direction" in table else (),
         own_file=own_file,
         kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
+        confirmed=channel not in UNITLESS and table.flag("unit_confirmed", False),
     )
     table.finish()
     return source

@@ -52,9 +52,7 @@ class Signal:
     opposes the motion. `joints` names the columns: the monitored joints, or one name for a signal of the whole machine.
     A detector may leave it empty: then the columns are the recording's joints. `notes`: information on how the signal
     was computed. `lost` (n, J): where an input of the detector had no sample, so that the value is based on a held one,
-    or on an estimate within a gap; None if no input had gaps. `channels`: channel and joint of each column, if several
-    columns belong to a joint: `joints` then has a name of its own for each column, and only a threshold that judges the
-    whole machine serves.
+    or on an estimate within a gap; None if no input had gaps.
     """
 
     time: FloatArray
@@ -65,7 +63,6 @@ class Signal:
     joints: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     lost: BoolArray | None = None
-    channels: tuple[tuple[str, str], ...] = ()
 
     __repr__ = short_repr
     __eq__ = equal_by_values
@@ -95,16 +92,9 @@ class Signal:
     def watching(self, joints: Sequence[str]) -> Signal:
         """Return only the columns of these joints, in their order here; all columns if `joints` is empty.
 
-        A signal of the whole machine, or with several `channels` of a joint, is returned unchanged. Raises
-        ConfigurationError for an unknown joint.
+        A signal of the whole machine is returned unchanged. Raises ConfigurationError for an unknown joint.
         """
         if not joints or WHOLE_MACHINE in (self.joints, tuple(joints)):
-            return self
-        if self.channels:
-            known = dict.fromkeys(joint for _, joint in self.channels)
-            for joint in joints:
-                if joint not in known:
-                    raise ConfigurationError(f"unknown joint '{joint}'", nearest(joint, tuple(known)))
             return self
         for joint in joints:
             if joint not in self.joints:
@@ -116,18 +106,6 @@ class Signal:
             joints=tuple(self.joints[i] for i in columns),
             lost=None if self.lost is None else self.lost[:, columns],
         )
-
-    def as_whole_machine(self) -> Signal:
-        """Return one column of the whole machine, of a statistic that judges all columns at once: its values are NaN.
-
-        Its status is the lowest of the columns: VALID where any of them is assessable.
-        """
-        if self.joints == WHOLE_MACHINE:
-            return self
-        lost = None if self.lost is None else self.lost.any(axis=1, keepdims=True)
-        status = self.status.min(axis=1, keepdims=True, initial=Status.OTHER_RATE)
-        values = np.full(status.shape, np.nan)
-        return self.changed(values=values, status=status, unit="1", joints=WHOLE_MACHINE, lost=lost, channels=())
 
     def name_of(self, column: int) -> str:
         """Return the name of a column: its joint, or its number from 0 where the columns have no names."""
@@ -192,20 +170,6 @@ def contiguous(statistic: Signal, band: Band) -> tuple[FloatArray, StatusArray, 
         np.ascontiguousarray(lower, dtype=np.float64),
         np.ascontiguousarray(upper, dtype=np.float64),
     )
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """What a statistic of several columns is based on at a moment.
-
-    `columns`: of the deciding bank; empty in a start phase, in which a signature of all columns decides. `length`:
-    of the template with the largest evidence [s]. `moved`: the sum of each column's innovations over it, over the root
-    of their number, as spreads of impact-free runs.
-    """
-
-    columns: tuple[str, ...]
-    length: float
-    moved: tuple[float, ...]
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,11 @@ class NothingValidError(SignatureError):
     """The detector cannot assess any sample of the runs to learn from, because of detector and motion."""
 
 
+def installing(extra: str) -> str:
+    """Return how an extra is installed: in the checkout, as long as no index has the package."""
+    return f"pip install '.[{extra}]'"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return a hint for a wrong name: the nearest known names first, then all of them."""
     names = sorted(known)

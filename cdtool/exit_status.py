@@ -30,6 +30,7 @@ class Fact(Enum):
     LIMIT_VIOLATED = "a limit is violated, or is not assessable and therefore not met"
     FORCE_VIOLATED = "a contact violates its force profile, or is missed where one is set"
     WORSE = "a change for the worse is shown"
+    LATER = "a build is later on the same contacts, and --fail-if-later was given"
     WRONG_USAGE = "wrong usage, or a wrong file"
     NOTHING_USABLE = "nothing usable is left"
     INTERNAL_ERROR = "an error of cdtool itself"
@@ -45,6 +46,7 @@ _STATUS_OF: Mapping[Fact, ExitStatus] = {
     Fact.LIMIT_VIOLATED: ExitStatus.VIOLATED,
     Fact.FORCE_VIOLATED: ExitStatus.VIOLATED,
     Fact.WORSE: ExitStatus.VIOLATED,
+    Fact.LATER: ExitStatus.VIOLATED,
     Fact.WRONG_USAGE: ExitStatus.UNUSABLE,
     Fact.NOTHING_USABLE: ExitStatus.UNUSABLE,
     Fact.INTERNAL_ERROR: ExitStatus.UNUSABLE,
@@ -100,7 +102,6 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "coverage": _CAN_LOSE,
     "signature show": _ALWAYS,
     "signature check": _CAN_LOSE,
-    "signature forecast": _CAN_LOSE,
     "signature update": _CAN_LOSE,
     "protocol init": _ALWAYS,
     "protocol write": _ALWAYS | {ExitStatus.VIOLATED, ExitStatus.INCONCLUSIVE},
@@ -109,7 +110,6 @@ STATUSES_OF: Mapping[str, frozenset[ExitStatus]] = {
     "store gc": _ALWAYS,
     "simulate gate": _ALWAYS,
     "simulate arm": _ALWAYS,
-    "simulate season": _ALWAYS,
     "study sensors": _ALWAYS,
     "study figures": _ALWAYS,
     "list": _CAN_LOSE,

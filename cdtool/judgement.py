@@ -20,7 +20,7 @@ from cdtool.motion.evident_motion import evident_speed
 from cdtool.motion.strokes import Stroke, strokes_so_far
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.short_repr import short_repr
-from cdtool.thresholds.base import FittedThreshold, KnownBand, is_per_run, judges_whole_machine
+from cdtool.thresholds.base import FittedThreshold, KnownBand, is_per_run
 from cdtool.thresholds.contract import checked_evaluation, checked_exceedance, checked_factor
 from cdtool.thresholds.speed_range import over_speeds
 
@@ -92,7 +92,7 @@ class Judgement:
     @cached_property
     def met_at(self) -> FloatArray:
         """Return (n, J) the safety factor at which each sample's limit would be met; -inf without a limit."""
-        met = np.full(self._columns.values.shape, np.inf)
+        met = np.full(self.signal.values.shape, np.inf)
         judged = np.zeros(met.shape, dtype=bool)
         for share in self._shares:
             statistic, own = share.met_at
@@ -100,12 +100,6 @@ class Judgement:
             lower_factors(own, status, share.judges, share.rows.start, met, judged)
         met[~judged] = -np.inf
         return met
-
-    @cached_property
-    def _columns(self) -> Signal:
-        """Return the signal, or one column of the whole machine if the thresholds judge that: as the statistic has."""
-        whole = any(judges_whole_machine(item) for item in self.thresholds)
-        return self.signal.as_whole_machine() if whole else self.signal
 
     @cached_property
     def _shares(self) -> tuple[_Share, ...]:
@@ -154,7 +148,7 @@ class Judgement:
         shares = self._shares
         if len(shares) == 1 and shares[0].judges.all():
             return evaluated[0]
-        signal, shape = self._columns, self._columns.values.shape
+        signal, shape = self.signal, self.signal.values.shape
         recent = speed_is_recent(self.recording, self.classes, signal.time, self.hold)
         values, unit = np.array(signal.values, order="C"), signal.unit
         if len(shares) == 1 and shares[0].rows == slice(0, len(signal.time)):
@@ -244,7 +238,6 @@ def take_only_class(  # noqa: PLR0913  a kernel: one loop, arrays one by one
 @kernel(
     f"void({_MATRIX}, {_STATUS}, {_MATRIX}, {_MATRIX}, {_ROWS}, int64, "
     "float64[:,::1], uint8[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], uint8[:,::1])",
-    rare=True,
 )
 def merge_share(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     own_values: FloatArray,

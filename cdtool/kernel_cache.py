@@ -18,13 +18,15 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.errors import OutputError, UsageError
-from cdtool.file_locks import holding
 
 # A function as numba compiles it: `cdtool.kernels.named`.
 Function = Callable[..., Any]
 
 _logger = logging.getLogger(__name__)
 _reported = False
+
+before_compiling: list[Callable[[], object]] = []
+"""Called once, before this process compiles its first kernel: a command compiles those of other commands with it."""
 
 
 @cache
@@ -73,8 +75,13 @@ def report_compilation(count: int = 0) -> None:
         _reported = True
         kernels = f"{count} kernels" if count > 1 else "kernels"
         _logger.info(
-            "first use: compiling %s, which can take a minute; later commands load them from the cache", kernels
+            "first use: compiling %s, which can take a minute or two; later commands load them from the cache", kernels
         )
+
+
+def report_progress(line: str) -> None:
+    """Log how far the compilation is, in place of the line before; an empty line at its end."""
+    _logger.debug(line)
 
 
 class _SharedCache:
@@ -96,7 +103,11 @@ class _SharedCache:
         """Return the compiled function from the cache; None if this process is to compile it."""
         loaded = self._load(signature, context)
         if loaded is None:
+            while before_compiling:
+                before_compiling.pop()()
             report_compilation()
+            from cdtool.file_locks import holding
+
             folder = Path(self._cache.cache_path)
             target = folder / _name(self._function)
             with suppress(OSError, OutputError):

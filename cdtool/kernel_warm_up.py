@@ -1,4 +1,4 @@
-"""Compile kernels in parallel before work begins: other processes each compile a share into numba's cache.
+"""Compile all kernels of the package in one wait, in parallel: other processes each compile a share into the cache.
 
 Kernels that call the same kernels stay together, so that no two processes compile these. No process is started if it
 would save nothing (all in the cache, one core, little to compile) or cannot help (no writable cache folder).
@@ -9,11 +9,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from importlib import import_module
+from pathlib import Path
 
 from cdtool.cores import usable_cores
-from cdtool.kernel_cache import not_cached, report_compilation
+from cdtool.kernel_cache import before_compiling, not_cached, report_compilation, report_progress
 from cdtool.kernels import Kernel, entries, loaded, named
 
 # Compile time, in bytes of byte code: fixed cost of a kernel; cost of starting a process; and the minimum work per
@@ -21,6 +23,8 @@ from cdtool.kernels import Kernel, entries, loaded, named
 _ANY_KERNEL = 150
 _START = 1000
 _WORTH_A_PROCESS = 4000
+# How often the cache is looked at while other processes compile [s].
+_LOOK_S = 0.2
 
 _CHILD = """
 import json, sys
@@ -31,33 +35,54 @@ compile_named(kernels)
 """
 
 
-def compile_loaded() -> int:
-    """Compile the `missing` kernels of the modules imported so far; return their number.
+def compile_package() -> int:
+    """If a kernel of the modules imported so far is `missing`, compile all that the package misses; return how many.
 
-    Kernels that another process failed to compile are compiled by this one.
+    Later commands then find theirs in the cache. Kernels that another process failed to compile are compiled by this
+    one.
     """
+    before_compiling.clear()
+    if not missing():
+        return 0
+    import_kernels()
     absent = missing()
-    if absent:
-        report_compilation(len(absent))
+    report_compilation(len(absent))
     own, *others = shares(absent, usable_cores())
-    children = [child for share in others if (child := _start(share))]
+    begin, children = time.monotonic(), [child for share in others if (child := _start(share))]
     try:
         for item in own:
             _ = item.compiled
-        for child in children:
-            child.wait()
+            _report(absent, begin)
+        while any(child.poll() is None for child in children):
+            time.sleep(_LOOK_S)
+            _report(absent, begin)
     finally:
+        report_progress("")
         for child in children:
             child.kill()
             child.wait()
-    for item in absent:
+    for item in _not_cached(absent):
         _ = item.compiled
     return len(absent)
 
 
+def _report(absent: Iterable[Kernel], begin: float) -> None:
+    done = 1.0 - _weight(_not_cached(absent)) / _weight(absent)
+    left = (time.monotonic() - begin) * (1.0 / done - 1.0) if done > 0.0 else 0.0
+    report_progress(f"{done:.0%}, about {left:.0f} s left" if left else "")
+
+
+def import_kernels() -> None:
+    """Import the modules of the package that define kernels: those with `@kernel(` in their text."""
+    package = Path(__file__).parent
+    for path in sorted(package.rglob("*.py")):
+        if "\n@kernel(" in path.read_text(encoding="utf-8"):
+            import_module(".".join([package.name, *path.relative_to(package).with_suffix("").parts]))
+
+
 def missing() -> list[Kernel]:
-    """Return the kernels to compile before work begins: not in the cache, and not `rare`; none without a cache."""
-    return _not_cached(item for item in entries() if not item.rare and not item.is_ready)
+    """Return the kernels of the modules imported so far that are not in the cache; none without a cache."""
+    return _not_cached(item for item in entries() if not item.is_ready)
 
 
 def compile_named(names: Iterable[tuple[str, str]]) -> None:

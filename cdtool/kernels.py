@@ -53,8 +53,6 @@ class Kernel:
 
     A call with arrays takes longer than the reading of a number, as each array is passed as seven words and counted as
     in use: with `inline`, the machine code of a short kernel becomes a part of its callers.
-
-    A `rare` kernel, which few logs need, is compiled at its first call, not before work begins.
     """
 
     def __init__(
@@ -65,14 +63,12 @@ class Kernel:
         entry: bool = False,
         exact: bool = False,
         inline: bool = False,
-        rare: bool = False,
     ) -> None:
         self.function = function
         self.signature = signature
         self.entry = entry
         self.exact = exact
         self.inline = inline
-        self.rare = rare
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self._compiled: Callable[..., Any] | None = None
@@ -126,15 +122,14 @@ class Kernel:
 
 
 def kernel(
-    signature: str, *, entry: bool = False, exact: bool = False, inline: bool = False, rare: bool = False
+    signature: str, *, entry: bool = False, exact: bool = False, inline: bool = False
 ) -> Callable[[Callable[..., Any]], Kernel]:
     """Mark a function as a kernel with the given numba signature.
 
     `entry`: both Python and kernels call it. `exact`: its numbers have the bits of the same formula in numpy; the
-    kernels that it calls must be exact too. `inline`: its machine code is a part of its callers. `rare`: few logs need
-    it.
+    kernels that it calls must be exact too. `inline`: its machine code is a part of its callers.
     """
-    return lambda function: Kernel(function, signature, entry=entry, exact=exact, inline=inline, rare=rare)
+    return lambda function: Kernel(function, signature, entry=entry, exact=exact, inline=inline)
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

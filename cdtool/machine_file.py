@@ -102,7 +102,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
     for part in (root, table):
         if "operations" in part.values:
             raise part.fault(
-                "operations", "is a key of the benchmark file", "set it there, or give --operations motion"
+                "operations", "is a key of the benchmark file", "set it there, or give detect --operations motion"
             )
     machines = _registry("cdtool.machines", "MACHINES")
     kind = table.choice("type", machines.names_for(table.values.get("type")))

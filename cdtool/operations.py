@@ -109,7 +109,8 @@ def operations_of(recording: Recording, how: str = "whole") -> list[Operation]:
     spans: Sequence[tuple[float, float]] = motion_spans(recording) if how == "motion" else _trigger_spans(recording)
     if not spans:
         raise RecordingError(
-            f"{recording.name}: no operation found by {how}", "see cdtool info, or use --operations whole"
+            f"{recording.name}: no operation found by {how}",
+            "see cdtool info, or use operations = 'whole' (detect --operations whole)",
         )
     operations = []
     for number, (start, end) in enumerate(spans, 1):

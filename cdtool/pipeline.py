@@ -166,12 +166,7 @@ def detect_operations(
 
 
 def _lost_inputs(detector: Detector, recording: Recording, machine: Machine, signal: Signal) -> BoolArray | None:
-    """Return where the detector's inputs lost samples, for the columns of its signal; None without losses.
-
-    A signal of channels marks its columns itself: each is of one joint, and one that is not mapped has no column.
-    """
-    if signal.channels:
-        return None
+    """Return where the detector's inputs lost samples, for the columns of its signal; None without losses."""
     channels = dict.fromkeys((*detector.needs, *(("position",) if machine.coupled else ())))
     lost = lost_samples(recording, channels, signal.time)
     # Coupled joints affect each other, and a signal of the whole machine depends on all of them.

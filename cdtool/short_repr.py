@@ -50,28 +50,6 @@ def short_repr(value: Any) -> str:
     return f"{name}({', '.join(shown)})"
 
 
-class ShortRepr:
-    """The base of a family of dataclasses of which each has a short `repr`.
-
-    Examples
-    --------
-    >>> from dataclasses import dataclass
-    >>> class Fitted(ShortRepr):
-    ...     pass
-    >>> @dataclass(frozen=True)
-    ... class Curve(Fitted):
-    ...     upper: np.ndarray
-    >>> Curve(np.zeros((100, 2)))
-    Curve(upper=<100 x 2 floats>)
-    """
-
-    def __init_subclass__(cls, **named: Any) -> None:
-        """Set it before `dataclass` adds its own, which it does only in a class without one."""
-        super().__init_subclass__(**named)
-        if "__repr__" not in vars(cls):
-            cls.__repr__ = short_repr  # type: ignore[method-assign]
-
-
 def _is_default(item: Field[Any], held: Any) -> bool:
     if isinstance(held, np.ndarray) or not (item.default is not MISSING or item.default_factory is not MISSING):
         return False

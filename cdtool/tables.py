@@ -13,6 +13,8 @@ from cdtool.file_kinds import kind_of
 from cdtool.value_words import value_in_words
 
 _SWAPPED = ("a signature file", "a machine file")  # given, needed: commands take both
+#: No quantity of a machine in SI is larger, or smaller than its inverse unless 0: squares and products stay finite.
+_LARGEST = 1e12
 
 
 class Table:
@@ -139,6 +141,9 @@ class Table:
             raise self.fault(name, f"is {value_in_words(value)}", f"give a number{_range_text(minimum, above)}")
         if value < minimum or value <= above:
             raise self.fault(name, f"is {value_in_words(value)}", f"give a number{_range_text(minimum, above)}")
+        if value and not 1.0 / _LARGEST <= abs(value) <= _LARGEST:
+            hint = f"no quantity is above {_LARGEST:g} or, unless 0, below {1.0 / _LARGEST:g}: check the unit"
+            raise self.fault(name, f"is {value_in_words(value)}", hint)
         return float(value)
 
 

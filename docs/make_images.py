@@ -80,13 +80,16 @@ def coverage(work: Path) -> None:
 
 
 def season(work: Path) -> None:
-    """An obstruction that grows over a season of simulated runs, as docs/signature.md has it."""
+    """Friction that rises from month to month, as docs/signature.md has it."""
     cdtool("simulate", "gate", "-o", "gate", "--free", 14, "--holdout", 40, "--stiff", 0, "--soft", 0, folder=work)
-    cdtool("simulate", "season", "--runs", 60, "--obstruction-growth", 2, "-o", "season", folder=work)
+    free = ("--free", 15, "--holdout", 0, "--stiff", 0, "--soft", 0)
+    for month, friction in enumerate((1.0, 1.05, 1.1, 1.15), 1):
+        changed = ("--friction", friction, "--seed", 20 + month)
+        cdtool("simulate", "gate", *free, *changed, "-o", f"month{month}", folder=work)
     taught = sorted(path.relative_to(work) for name in ("free", "holdout") for path in (work / "gate" / name).iterdir())
     machine = ("-m", "gate/machine.toml")
     cdtool("learn-signature", *taught, *machine, "-d", "gm", "-o", "season.json", folder=work)
-    runs = sorted(path.relative_to(work) for path in (work / "season" / "free").iterdir())
+    runs = sorted(path.relative_to(work) for path in work.glob("month*/free/*"))
     cdtool("signature", "check", "season.json", *runs, *machine, "--plot", IMAGES / "season.png", folder=work)
 
 

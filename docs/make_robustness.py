@@ -52,7 +52,7 @@ STATES = (UNCHANGED, *CHANGES)
 SIMULATORS: Mapping[str, Callable[..., int]] = {"gate": simulate_gate, "arm": partial(simulate_arm, trial=1)}
 TITLES = {"gate": "Sliding gate", "arm": "Arm, hit on its first link"}
 # The signature with options that help, as lines of [signature], and the threshold that a detector brings.
-FOLLOWING, RANGE, OWN = "signature, adaptive_level", "signature, speed_range", "its own"
+FOLLOWING, RANGE = "signature, adaptive_level", "signature, speed_range"
 OPTIONS = {FOLLOWING: "adaptive_level = 6", RANGE: "speed_range = true"}
 # With speed_range, a third of the runs is learned from at each of these shares of the nominal speed.
 LEARNED_SPEEDS = {"slow": 0.8, "nominal": 1.0, "fast": 1.2}
@@ -187,9 +187,8 @@ class Simulated:
 
 
 def threshold_names() -> tuple[str, ...]:
-    """Return the thresholds for all detectors: without those of one detector, and those that need a list of others."""
-    own = {getattr(DETECTORS.load(name), "own_threshold", "") for name in DETECTORS.names()}
-    names = [name for name in THRESHOLDS.names() if name not in own and name != "combined"]
+    """Return the thresholds, without those that need a list of others."""
+    names = [name for name in THRESHOLDS.names() if name != "combined"]
     return ("signature", *OPTIONS, *(name for name in names if name != "signature"))
 
 
@@ -202,7 +201,7 @@ def benchmark_text(simulated: str, threshold: str, changes: Sequence[str]) -> st
         if threshold == RANGE:
             logs = ", ".join(f'"{folder}/free/*.csv"' for folder in LEARNED_SPEEDS)
             text = text.replace('logs = ["free/*.csv"]', f"logs = [{logs}]")
-    elif threshold != OWN:
+    else:
         text = text.replace("\n[learn]", f'threshold = "{threshold}"\n\n[learn]')
     return text + "".join(CONDITION.format(change=name, folder=f"changed_{i}") for i, name in enumerate(changes, 1))
 
@@ -262,11 +261,8 @@ def simulated_cells(
             folder = Path(made)
             simulate(folder, machine, seed, changes, counts)
             every = every or usable(folder)
-            own = [name for name in every if getattr(DETECTORS.load(name), "own_threshold", "")]
-            others = [name for name in every if name not in own]
-            work = [(name, others) for name in threshold_names() if others and name in (thresholds or (name,))]
-            for threshold, names in (*work, *([(OWN, own)] if own else [])):
-                for detector, state, seen in score(folder, threshold, tuple(changes), names):
+            for threshold in [name for name in threshold_names() if name in (thresholds or (name,))]:
+                for detector, state, seen in score(folder, threshold, tuple(changes), every):
                     of_threshold = cells.setdefault(detector, {}).setdefault(threshold, {})
                     of_threshold.setdefault(state, Cell()).add(seen)
                 print(machine, seed, threshold, file=sys.stderr, flush=True)
@@ -317,8 +313,7 @@ python docs/make_robustness.py --page   # only this page again, from robustness.
   mass is that of the load (arm: both links); the offsets are added to the logged motor current and to the
   accelerometers; a motor that is warmer by 10 K needs 1.1 % more current for a torque.
 {options}
-* Detectors that have a threshold of their own (`fused`) are shown with it. `combined` needs a list of other thresholds
-  and is left out.
+* `combined` needs a list of other thresholds and is left out.
 
 ## In short
 
@@ -357,7 +352,6 @@ another name, or `adaptive_level` in `[signature]`, and run it again.
 * The thresholds have their default settings, not a common false-alarm budget:
   [Thresholds compared](thresholds-compared.md) has that comparison for the unchanged machine.
   [`cdtool tune`](tuning.md) at a budget sets other limits; other runs may then alarm.
-* {learned} runs are fewer than `fused` should learn from: 40, see [Fused](detectors/fused.md).
 * The numbers are those of few runs: {few} of {count} alarming has a 95 % interval of {low:.1f} to {high:.0f} %.
 """
 LEGEND = """Upper table: share of the assessable impact-free runs that alarm [%]; * more than a tenth of the runs or of
@@ -573,7 +567,7 @@ def _in_words(states: Mapping[str, Cell], state: str) -> tuple[str, str]:
 
 
 def _named(detector: str, rule: str) -> str:
-    return f"`{detector}`" if rule == OWN else f"`{detector}` with `{rule}`"
+    return f"`{detector}` with `{rule}`"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -15,13 +15,14 @@ import numpy as np
 from cdtool.activation import Activation
 from cdtool.evaluation.truth.onset import OnsetRule, find_contacts
 from cdtool.machine_file import read_machine_file
+from cdtool.operations import operations_of
 from cdtool.pipeline import Detection, judge, run_detector
 from cdtool.report.plots.figures import drawing, new_figure, save, unit_label
 from cdtool.report.plots.style import BAND, LIMIT, ONSET_DASHES, look_of
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
-from cdtool.workflows.runs import load_operations
+from cdtool.workflows.runs import read_named
 
 ROOT = Path(__file__).resolve().parents[1]
 LOGS = ROOT / "sample_logs" / "gate"
@@ -39,9 +40,10 @@ def main() -> int:
     """Draw the figure; 1 where it is too large."""
     machine_file = read_machine_file(LOGS / "machine.toml")
     machine, detector = machine_file.machine, machine_file.detector(DETECTOR)
-    free = [load_operations(path, machine_file, "whole")[1][0] for path in sorted((LOGS / "free").iterdir())]
+    free = [operations_of(read_named(path, machine_file), "whole")[0] for path in sorted((LOGS / "free").iterdir())]
     pairs = [(item.recording.without_ground_truth(), run_detector(item, machine, detector)) for item in free]
-    recording, (impact, *_) = load_operations(IMPACT, machine_file, "whole")
+    recording = read_named(IMPACT, machine_file)
+    (impact, *_) = operations_of(recording, "whole")
     onset = find_contacts(recording, OnsetRule(above=20.0, back_to=8.0))[0].start
     signal = run_detector(impact, machine, detector)
     found = {}

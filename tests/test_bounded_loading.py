@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import ast
 import tomllib
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdtool.bounded_loading import ContentError, parse_toml, read_text
+from cdtool.bounded_loading import ContentError, parse_own_json, parse_toml, read_text
 from cdtool.errors import ConfigurationError
+from cdtool.workflows.injection.injected_logs import read_injected
+from tests.command import cdtool
+from tests.project.pages import ROOT
 
 PIECES = st.lists(st.sampled_from(['"', "'", '\\"', "\\\\", "\n", "a", " ", "#", "[", "]", '""', "''"]), max_size=12)
 
@@ -49,3 +53,46 @@ def test_the_mark_at_the_start_of_a_windows_text_is_no_part_of_it(tmp_path):
     file = tmp_path / "machine.toml"
     file.write_bytes(b"\xef\xbb\xbf[machine]\r\n")
     assert read_text(file, ConfigurationError) == "[machine]\n"
+
+
+NESTED = "[" * 200_000
+# These texts are not from a file, or the reader of a message catches what deep nesting raises.
+PARSED_ELSEWHERE = {
+    "cdtool/machine_file.py": "the parameters of a machine, encoded two lines above",
+    "cdtool/cli/console.py": "the result of a command, encoded two lines above",
+    "cdtool/messages/columns/json.py": "one message of a log, whose nesting is a reason",
+    "cdtool/messages/columns/json_shape.py": "one message of a log, whose nesting is a reason",
+    "cdtool/report/protocol/words.py": "a file of the package",
+    "cdtool/cli/init.py": "one value of an option",
+}
+
+
+def test_every_json_and_toml_of_a_file_goes_through_the_bounded_loader():
+    parsing = {"json.load", "json.loads", "json.JSONDecoder", "tomllib.load", "tomllib.loads"}
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "cdtool").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and ast.unparse(node) in parsing
+    }
+    assert found - {"cdtool/bounded_loading.py"} == set(PARSED_ELSEWHERE)
+
+
+@pytest.mark.parametrize("text", [NESTED, f'{{"a": {NESTED}'])
+def test_nested_brackets_are_one_line_in_every_file(tmp_path, text):
+    for name in ("store.json", "injected.json", "results.json", "signature.json"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    gate = ROOT / "sample_logs/gate"
+    detect = ("detect", gate / "stiff/03.csv", "-m", gate / "machine.toml", "--signature", tmp_path / "signature.json")
+    for arguments in (
+        ("store", "status", tmp_path),
+        ("report", tmp_path / "results.json", "-o", tmp_path / "r.md"),
+        detect,
+    ):
+        outcome = cdtool(*arguments)
+        (line,) = outcome.err.splitlines()
+        assert (outcome.status, line.startswith("error: ")) == (2, True)
+    with pytest.raises(ConfigurationError, match=r"injected\.json: is no manifest"):
+        read_injected(tmp_path)
+    with pytest.raises(ContentError, match="nested too deeply"):
+        parse_own_json(text)

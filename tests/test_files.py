@@ -313,6 +313,31 @@ def test_sigterm_cleans_up_as_sigint_does(tmp_path, name, status, word):
     assert names(tmp_path) == set()
 
 
+STRUCK = """
+import os, signal, sys
+from importlib.abc import MetaPathFinder
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Struck(MetaPathFinder):
+    def find_spec(self, name, *_):
+        if name == module:
+            os.kill(os.getpid(), signal.SIGINT)
+module, sys.argv = sys.argv[1], ["cdtool", "list", "detectors"]
+sys.meta_path.insert(0, Struck())
+from cdtool.__main__ import main
+main()
+"""
+
+
+@posix_only
+@pytest.mark.parametrize(
+    "module", ["cdtool.cli.app", "logging", "typer", "cdtool.exit_status", "cdtool.cli.list_known"]
+)
+def test_ctrl_c_during_the_first_imports_shows_no_traceback(module):
+    done = subprocess.run([sys.executable, "-c", STRUCK, module], cwd=ROOT, capture_output=True, text=True, check=False)
+    # Ended by the signal itself, which a shell shows as 130, or by the command once it catches signals.
+    assert done.returncode in (-signal.SIGINT, 130) and done.stderr in ("", "interrupted\n")
+
+
 @posix_only
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_a_command_even_during_an_import(monkeypatch, number, status):

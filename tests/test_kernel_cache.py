@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -140,16 +141,19 @@ def test_a_first_start_that_is_killed_does_not_block_the_next(tmp_path):
 
 
 _SHOWN = f"""
-from cdtool.cli.app import compilation_shown
-with compilation_shown():
+from cdtool import kernel_warm_up
+from cdtool.cli.app import compilation_at_once
+kernel_warm_up.import_kernels = lambda: import_module("cdtool.thresholds.whitening")
+from importlib import import_module
+with compilation_at_once():
     {_HITS}
-    from cdtool.clock import _differentiate as other
-    other.compiled
+    from cdtool.thresholds.whitening import _burg as other
+    print(other.is_ready)
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminal")
-def test_a_terminal_says_once_that_kernels_are_compiled_and_nothing_when_they_are_in_the_cache(tmp_path):
+def test_the_first_kernel_compiles_all_in_one_wait_with_progress(tmp_path):
     told = []
     for _ in range(2):
         terminal, stderr = os.openpty()
@@ -158,10 +162,10 @@ def test_a_terminal_says_once_that_kernels_are_compiled_and_nothing_when_they_ar
         hits = _output(process)
         told.append((hits, _read(terminal)))
     first, again = told
-    assert first[0] == "0\n"
-    assert first[1].startswith("first use: compiling kernels, which can take a minute")
-    assert first[1].count("\n") == 1
-    assert again == ("1\n", "")
+    assert first[0] == "1\nTrue\n", "the other one, too, was compiled before the first was loaded"
+    assert first[1].startswith("first use: compiling ") and "kernels, which can take a minute" in first[1]
+    assert first[1].count("\n") == 1 and re.search(r"\r\x1b\[2K\d+%, about \d+ s left", first[1])
+    assert again == ("1\nFalse\n", "")
 
 
 def _read(terminal: int) -> str:
@@ -175,4 +179,4 @@ def _read(terminal: int) -> str:
 
 def test_without_a_terminal_nothing_is_said(tmp_path):
     process = _python(_SHOWN, tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    assert process.communicate() == ("0\n", "")
+    assert process.communicate() == ("1\nTrue\n", "")

@@ -57,7 +57,6 @@ PARAMETER_ORDER = (
 @kernel(
     "float64(UniTuple(float64, 31), float64[:, ::1], float64[::1], float64[:, ::1], UniTuple(float64, 6), "
     "float64, int64, float64[:, ::1])",
-    rare=True,
 )
 def integrate_axis(
     parameters: tuple[float, ...],

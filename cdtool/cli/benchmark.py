@@ -23,7 +23,7 @@ from cdtool.cli.options import (
     listed,
 )
 from cdtool.cli.place import Place, location
-from cdtool.cli.protocol import facts_of, file_of_protocol, show_protocol
+from cdtool.cli.protocol import file_of_protocol, show_written
 from cdtool.cli.summary_table import finish
 from cdtool.cli.written_reports import show_results, write_reports
 from cdtool.errors import UsageError
@@ -54,7 +54,7 @@ def benchmark(
             "--protocol",
             "-p",
             parser=location,
-            help="Protocol file (TOML) for -o protocol.pdf or protocol.html. Default: [protocol] of FILE.",
+            help="Protocol file (TOML) for -o NAME.pdf or NAME.html, the protocol. Default: [protocol] of FILE.",
         ),
     ] = None,
     detectors: Annotated[
@@ -113,7 +113,7 @@ def benchmark(
     if dry_run:
         _show_dry_run(file, _named(detectors), false_alarm_budget, workers, use, as_json=as_json)
         return
-    documents, targets = protocol_names(output or [])
+    documents, targets = protocol_names(output or [], protocol is not None)
     protocol_file = file_of_protocol(file, protocol, documents)
     check_outputs(targets, force=force)
     check_outputs(documents, force=force, subject="protocol")
@@ -126,29 +126,33 @@ def benchmark(
             store=use,
             progress=advance,
         )
-    report = Report(done.evaluated, done.traces)
-    written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
-    made = None
-    if protocol_file is not None:
-        from cdtool.report.protocol.document import ProtocolReport
-        from cdtool.workflows.protocol.making import make_protocol
+    made, evaluated = None, done.evaluated
+    try:
+        if protocol_file is not None:
+            from cdtool.report.protocol.document import ProtocolReport, protocol_statement
+            from cdtool.workflows.protocol.making import make_protocol
 
-        made = make_protocol(protocol_file, done, _command(file, protocol, output or [], detectors, false_alarm_budget))
-        inputs = (*done.inputs, protocol_file.path)
-        write_outputs(ProtocolReport(made), documents, force=force, inputs=inputs, subject="protocol")
+            command = _command(file, protocol, output or [], detectors, false_alarm_budget)
+            made = make_protocol(protocol_file, done, command)
+            evaluated = evaluated.with_protocol(*protocol_statement(made))
+            inputs = (*done.inputs, protocol_file.path)
+            write_outputs(ProtocolReport(made), documents, force=force, inputs=inputs, subject="protocol")
+    finally:  # a protocol that cannot be made does not cost the reports
+        report = Report(evaluated, done.traces)
+        written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
     print_skipped(done.results.skipped, done.results.findings)
     if as_json:
-        typer.echo(to_json(done.results), nl=False)
+        typer.echo(to_json(evaluated.results), nl=False)
     else:
         if not quiet:
-            _show_agreement(done.evaluated)
-        show_results(done.evaluated, written, quiet=quiet, more=_stored(done.stored))
+            _show_agreement(evaluated)
+        show_results(evaluated, written, quiet=quiet, more=_stored(done.stored))
         if made is not None:
-            show_protocol(made, documents)
+            show_written(made, documents)
         elif done.results.forces and not quiet:
             typer.echo("next, for a test protocol of these forces:")
             typer.echo(f"  cdtool protocol init {shlex.quote(plain(file))} -o protocol.toml")
-    finish(done.evaluated, facts_of(made.verdict.outcome) if made is not None else ())
+    finish(evaluated)
 
 
 def _command(

@@ -9,7 +9,7 @@ import os
 import sys
 from dataclasses import dataclass
 
-# Bold red, yellow, green: the names that rich and click share.
+# Bold red, yellow, green: the names that rich and typer share.
 _COLOURS: dict[str, str] = {"bad": "red", "unknown": "yellow", "good": "green"}
 
 
@@ -44,6 +44,6 @@ def coloured(line: str, tone: str) -> str:
     """Return a line with the colour of its tone; unchanged where colours are not shown."""
     if not tone or not shows_colour():
         return line
-    from click import style
+    from typer import style
 
     return style(line, fg=_COLOURS[tone], bold=tone == "bad")

@@ -65,6 +65,14 @@ def compare(
             "or group is missing from the new file.",
         ),
     ] = False,
+    fail_if_later: Annotated[
+        bool,
+        typer.Option(
+            "--fail-if-later",
+            help="Exit with status 1 if the new build is later on the same contacts by --relevant-change, or misses "
+            "more of them, whatever this shows about other recordings.",
+        ),
+    ] = False,
     output: Annotated[
         list[Place] | None,
         typer.Option(
@@ -78,7 +86,8 @@ def compare(
     """Compare two builds and separate real changes from noise: latency, misses, false alarms, force at the alarm.
 
     Contacts in both files are compared one by one. Exits with status 1 if anything is shown to be worse. If a relevant
-    change could not have been shown, the result is "inconclusive": status 0, or 4 with --require-power.
+    change could not have been shown, the result is "inconclusive": status 0, or 4 with --require-power. What happened
+    on the same contacts is listed in any case.
 
     Example: cdtool compare old.json new.json -o compare.md
     """
@@ -98,7 +107,8 @@ def compare(
         _show(found, quiet=quiet)
         for path in () if quiet else targets:
             typer.echo(f"written: {plain(path)}")
-    leave(facts=found.facts if require_power else set(found.facts) & {Fact.WORSE})
+    later = {Fact.LATER} if fail_if_later and found.later else set()
+    leave(facts={*(found.facts if require_power else set(found.facts) & {Fact.WORSE}), *later})
 
 
 def _show(found: BuildComparison, *, quiet: bool) -> None:

@@ -132,7 +132,7 @@ def _show_checked(checked: CheckedProtocol) -> None:
         typer.echo(f"{plain(name)}: {counted(count, 'recording')}")
     for due, title in (("before_test", "before the test"), ("test_day", "on the day of the test")):
         part = Verdict(tuple(item for item in checked.verdict.reasons if item.due == due))
-        sentences = words.reasons(part, "incomplete")
+        sentences = [*words.reasons(part, "fail"), *words.reasons(part, "incomplete")]
         if sentences:
             typer.echo(f"incomplete, {title}:")
         for sentence in sentences:
@@ -160,7 +160,7 @@ def file_of_protocol(benchmark: Path, given: Path | None, targets: Sequence[Path
 
     if not targets:
         if given is not None:
-            raise UsageError("-p: no protocol is written", "add -o protocol.pdf or -o protocol.html")
+            raise UsageError("-p: no output is the protocol", "add -o protocol.pdf or -o protocol.html")
         return None
     if given is None and not has_protocol(benchmark):
         raise UsageError(
@@ -176,16 +176,20 @@ def facts_of(outcome: Outcome) -> tuple[Fact, ...]:
 
 
 def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
-    """Print the verdict of a protocol, the first of its reasons, and the next step."""
-    from cdtool.report.protocol.words import words_of
+    """Print the verdict of a protocol, the first of its reasons, its files, and the next step."""
+    from cdtool.report.protocol.document import protocol_statement
 
-    words = words_of("en")
-    typer.echo(f"protocol: {made.verdict.outcome}")
-    sentences = [*words.reasons(made.verdict, "fail"), *words.reasons(made.verdict, "incomplete")]
+    outcome, headline, *sentences = protocol_statement(made)
+    say(headline, tone={"pass": "good", "fail": "bad"}.get(outcome, "unknown"))
     for sentence in sentences[:_SHOWN]:
         say(f"- {sentence}", indent="  ")
     if len(sentences) > _SHOWN:
         typer.echo(f"  and {len(sentences) - _SHOWN} more, all in the protocol")
+    show_written(made, written)
+
+
+def show_written(made: Protocol, written: Sequence[Path]) -> None:
+    """Print the files of a protocol, and the next step."""
     for path in written:
         typer.echo(f"written: {plain(path)}")
     if made.verdict.outcome == "incomplete":

@@ -1,11 +1,10 @@
-"""`cdtool signature show|check|forecast|update`."""
+"""`cdtool signature show|check|update`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -28,10 +27,8 @@ from cdtool.cli.place import Place, location
 from cdtool.cli.signature_shown import (
     checked_as_json,
     file_as_json,
-    forecast_as_json,
     show_class,
     show_file,
-    show_forecast,
 )
 from cdtool.errors import UsageError
 from cdtool.exit_status import Fact, statuses_words
@@ -41,10 +38,8 @@ if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
     from cdtool.workflows.signature.upkeep import Checked
 
-_Class = TypeVar("_Class")
-
 signature = typer.Typer(
-    help="Show a signature, check it against runs, forecast its false alarms, add runs to it.",
+    help="Show a signature, check it against runs, add runs to it.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
@@ -52,7 +47,7 @@ signature = typer.Typer(
 
 @signature.callback()
 def _signature() -> None:
-    """Show a signature, check it against runs, forecast its false alarms, add runs to it."""
+    """Show a signature, check it against runs, add runs to it."""
 
 
 FileArgument = Annotated[
@@ -172,103 +167,6 @@ def check(
     leave(checked.skipped, checked.findings, [Fact.NOTHING_USABLE] if nothing else ())
 
 
-@signature.command("forecast", epilog=statuses_words("signature forecast"))
-def forecast(
-    file: FileArgument,
-    logs: Annotated[
-        list[Place],
-        logs_argument("Impact-free recordings of a season; runs learned from are not used."),
-    ],
-    machine: MachineOption,
-    ambient: Annotated[
-        Place | None,
-        typer.Option("--ambient", parser=location, help="CSV with recording, date and temperature_c of the logs."),
-    ] = None,
-    temperatures: Annotated[
-        str | None,
-        typer.Option(
-            "--temperatures", help="Coming temperatures [°C]: -10:5. Default: those seen.", metavar="LOW:HIGH"
-        ),
-    ] = None,
-    expected: Annotated[
-        Place | None,
-        typer.Option(
-            "--expected", parser=location, help="Instead: CSV with date and temperature_c of the coming time."
-        ),
-    ] = None,
-    until: Annotated[
-        str | None,
-        typer.Option(
-            "--until", help="Last day, or the number of runs if they have no dates. Default: half the season ahead."
-        ),
-    ] = None,
-    false_alarm_budget: Annotated[
-        str | None,
-        typer.Option("--false-alarm-budget", help="As 1/100op. Default: the budget that the signature was set for."),
-    ] = None,
-    operations: CutOption = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the resampled days.")] = 0,
-    plot: Annotated[
-        Place | None,
-        typer.Option(
-            "--plot", parser=location, help="PNG, SVG or PDF file of the forecast; a folder for several classes."
-        ),
-    ] = None,
-    force: ForceOption = False,
-    onset_above: OnsetAboveOption = None,
-    jobs: JobsOption = 1,
-    cluster: ClusterOption = None,
-    timeout: TimeoutOption = None,
-    quiet: QuietOption = False,
-    retries: RetriesOption = 1,
-    as_json: JsonOption = False,
-) -> None:
-    """Forecast false alarms over the coming temperatures, and when to relearn.
-
-    Example: cdtool signature forecast gate.gm.json season/*.csv -m machine.toml --ambient ambient.csv
-    --temperatures -10:5 --false-alarm-budget 1/100op
-    """
-    from cdtool.evaluation.truth.onset import OnsetRule
-    from cdtool.workflows.execution.workers import Workers
-    from cdtool.workflows.signature.forecasting import forecast_signature
-    from cdtool.workflows.signature.normal_runs import notes_on
-
-    if plot is not None and not plot.is_dir():
-        figure_name(plot, force=force)
-    with progress("reading runs", quiet=quiet) as advance:
-        done = forecast_signature(
-            file,
-            logs,
-            machine,
-            ambient=ambient,
-            temperatures=None if temperatures is None else _temperatures(temperatures),
-            expected=expected,
-            until=until,
-            false_alarm_budget=false_alarm_budget,
-            seed=seed,
-            operations=operations,
-            onset=OnsetRule(above=onset_above),
-            workers=Workers(jobs, timeout, retries, cluster),
-            progress=advance,
-        )
-    names = _class_names(plot, "forecast", done.classes, force=force)
-    print_skipped(done.skipped, [*done.findings, *notes_on(done.file)])
-    if as_json:
-        print_json(forecast_as_json(done))
-    else:
-        for item in done.classes:
-            show_forecast(item)
-        if done.learned:
-            typer.echo(f"not used: {counted(done.learned, 'run')} that the signature was learned from")
-    for path, item in names:
-        from cdtool.report.plots.forecast_plot import plot_forecast
-
-        plot_forecast(item, path)
-        if not as_json:
-            typer.echo(f"plot written to {plain(path)}")
-    leave(done.skipped, done.findings)
-
-
 @signature.command("update", epilog=statuses_words("signature update"))
 def update(
     file: FileArgument,
@@ -325,14 +223,6 @@ def update(
     leave(done.refused, done.findings, () if done.added else [Fact.NOTHING_USABLE])
 
 
-def _temperatures(text: str) -> tuple[float, float]:
-    low, _, high = text.partition(":")
-    try:
-        return float(low), float(high)
-    except ValueError as fault:
-        raise UsageError(f"--temperatures is '{text}'", "give the lowest and the highest in °C, as -10:5") from fault
-
-
 def _plot_names(plot: Path | None, checked: Checked, *, force: bool) -> list[tuple[Path, DriftAudit]]:
     """Return the plot file of each class with a season; raises UsageError if --plot does not fit."""
     audits = [item.drift for item in checked.classes if item.drift]
@@ -340,17 +230,10 @@ def _plot_names(plot: Path | None, checked: Checked, *, force: bool) -> list[tup
         raise UsageError(
             "--plot shows the drift over a season, but no log is new", "give logs that are not in the signature"
         )
-    return _class_names(plot, "drift", audits, force=force)
-
-
-def _class_names(plot: Path | None, name: str, classes: Sequence[_Class], *, force: bool) -> list[tuple[Path, _Class]]:
-    """Return the plot file of each class; raises UsageError if --plot does not fit."""
     if plot is None:
         return []
     if plot.is_dir():
-        return [
-            (figure_name(plot / f"{name}_{number}.png", force=force), item) for number, item in enumerate(classes, 1)
-        ]
-    if len(classes) > 1:
-        raise UsageError(f"--plot names one file for {len(classes)} classes of motion", "give an existing folder")
-    return [(figure_name(plot, force=force), classes[0])]
+        return [(figure_name(plot / f"drift_{number}.png", force=force), item) for number, item in enumerate(audits, 1)]
+    if len(audits) > 1:
+        raise UsageError(f"--plot names one file for {len(audits)} classes of motion", "give an existing folder")
+    return [(figure_name(plot, force=force), audits[0])]

@@ -1,4 +1,4 @@
-"""Output of `cdtool signature`: a stored file, and the results of a check and of a forecast."""
+"""Output of `cdtool signature`: a stored file, and the results of a check."""
 
 from __future__ import annotations
 
@@ -14,11 +14,8 @@ from cdtool.plain_text import counted, ordinal
 if TYPE_CHECKING:
     from cdtool.evaluation.upkeep.audit import DriftAudit
     from cdtool.evaluation.upkeep.coverage import Coverage
-    from cdtool.evaluation.upkeep.forecast import Forecast, ForecastCurve
-    from cdtool.evaluation.upkeep.season_model import SeasonRun
     from cdtool.evaluation.upkeep.summary import JointSummary, SignatureSummary
     from cdtool.signature_file import SignatureFile
-    from cdtool.workflows.signature.forecasting import Forecasted
     from cdtool.workflows.signature.upkeep import Checked, CheckedClass
 
 # Table rows, and sections, that are shown; --json has all.
@@ -218,73 +215,3 @@ def _drift_as_json(found: DriftAudit) -> dict[str, Any]:
         ],
         "not_assessable": [{"recording": name, "reason": reason} for name, reason in found.not_assessable],
     }
-
-
-def show_forecast(found: Forecast) -> None:
-    """Print the forecast of one class of motion."""
-    from cdtool.evaluation.upkeep.forecast_words import forecast_lines
-
-    typer.echo(f"class: {found.motion.described}, safety factor {found.safety_factor:.4g}")
-    for line in forecast_lines(found):
-        say(line, indent="  ")
-
-
-def forecast_as_json(done: Forecasted) -> dict[str, Any]:
-    """Return the forecasts of a signature file as JSON values."""
-    return {
-        "file": done.file.source,
-        "detector": done.file.detector,
-        "false_alarm_budget": str(done.budget),
-        "classes": [_forecast_as_json(item) for item in done.classes],
-        "runs_learned_from": done.learned,
-        "skipped": [asdict(item) for item in done.skipped],
-        "findings": [asdict(item) for item in done.findings],
-    }
-
-
-def _forecast_as_json(found: Forecast) -> dict[str, Any]:
-    from cdtool.evaluation.upkeep.forecast_words import forecast_lines
-
-    by = found.relearn_by
-    names = (
-        "safety_factor",
-        "budget",
-        "coming_runs",
-        "seen_temperatures",
-        "coming_temperatures",
-        "beyond",
-        "explained",
-    )
-    return {
-        "motion": found.motion.to_dict(),
-        **{name: getattr(found, name) for name in (*names, "residual", "correlation", "days")},
-        "share": asdict(found.share),
-        "alarms": asdict(found.alarms),
-        "so_far": {"alarms": found.so_far[0], "runs": found.so_far[1]},
-        "exceeded_below": asdict(found.colder) if found.colder else None,
-        "exceeded_above": asdict(found.warmer) if found.warmer else None,
-        "relearn_by": {name: found.date(getattr(by, name)) for name in ("value", "low", "high")},
-        "forecast_until": found.date(found.ends),
-        "place": asdict(found.place),
-        "effects": [{**asdict(effect), "joint": found.joints[effect.joint]} for effect in found.effects],
-        "lines": list(forecast_lines(found)),
-        "by_temperature": _curve_as_json(found.by_temperature) if found.by_temperature else None,
-        "by_time": _curve_as_json(found.by_time),
-        "runs": [_run_as_json(run) for run in found.runs],
-        "left_out": [_run_as_json(run) for run in found.left_out],
-    }
-
-
-def _run_as_json(run: SeasonRun) -> dict[str, Any]:
-    demand = run.demand
-    return {
-        "recording": demand.name,
-        "time": run.time,
-        "temperature_c": run.temperature,
-        "critical_factor": demand.critical_factor,
-        "alarm": demand.alarm,
-    }
-
-
-def _curve_as_json(curve: ForecastCurve) -> dict[str, Any]:
-    return {name: values.tolist() for name, values in vars(curve).items()}

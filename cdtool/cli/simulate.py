@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import date
 from pathlib import Path
 from typing import Annotated
 
@@ -133,59 +132,6 @@ def arm(
     _report(output, written, counts, seed, as_json)
 
 
-@simulate.command("season", epilog=statuses_words("simulate season"))
-def season(
-    output: OutputOption,
-    runs: Annotated[int, typer.Option("--runs", min=1, max=_MOST, help="Consecutive impact-free runs.")] = 60,
-    friction_change: Annotated[
-        float, typer.Option("--friction-change", help="Relative change of friction over the season: 0.3, -0.2.")
-    ] = 0.0,
-    obstruction_growth: Annotated[
-        float, typer.Option("--obstruction-growth", help="Resistance that grows at one position [N per run].")
-    ] = 0.0,
-    obstruction_at: Annotated[float, typer.Option("--obstruction-at", help="Position of that resistance [m].")] = 0.9,
-    friction_per_kelvin: Annotated[
-        float,
-        typer.Option("--friction-per-kelvin", help="Relative change of friction per kelvin: -0.01 is 1 % less."),
-    ] = 0.0,
-    temperature: Annotated[float, typer.Option("--temperature", help="Mean temperature of the year [°C].")] = 10.0,
-    temperature_swing: Annotated[
-        float, typer.Option("--temperature-swing", help="Amplitude of the temperature over the year [K].")
-    ] = 10.0,
-    start: Annotated[str, typer.Option("--start", help="Day of the first run.", metavar="DATE")] = "2025-07-01",
-    runs_per_day: Annotated[int, typer.Option("--runs-per-day", min=1, help="Runs per day.")] = 4,
-    seed: SeedOption = 1,
-    file_format: FormatOption = "csv",
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Simulate a season of the sliding gate without impacts: drifting friction, weather, a growing obstruction.
-
-    ambient.csv contains date and temperature of each run.
-
-    Example: cdtool simulate season --runs 200 --friction-per-kelvin -0.01 --runs-per-day 2 -o season
-    """
-    _check_format(file_format)
-    from cdtool.simulation.season import Season, write_gate_season
-    from cdtool.simulation.weather import Weather
-
-    wanted = Season(
-        *(runs, friction_change, obstruction_growth, obstruction_at, friction_per_kelvin, runs_per_day),
-        start=_day(start),
-        weather=Weather(temperature, temperature_swing),
-    )
-    with progress("simulating", quiet=quiet) as advance:
-        written = write_gate_season(output, wanted, seed, file_format, advance)
-    _report(output, written, {"free": runs}, seed, as_json)
-
-
-def _day(text: str) -> date:
-    try:
-        return date.fromisoformat(text)
-    except ValueError as fault:
-        raise UsageError(f"--start is '{text}'", "give a day such as 2025-07-01") from fault
-
-
 def _check_format(file_format: str) -> None:
     if file_format not in _FORMATS:
         raise UsageError(f"unknown format '{file_format}'", nearest(file_format, _FORMATS))
@@ -199,8 +145,6 @@ def _report(output: Path, written: int, counts: Mapping[str, int], seed: int, as
         return
     recordings, why_not = counted(written, "recording"), without_benchmark(counts)
     files = "machine.toml" if why_not else "machine.toml, benchmark.toml"
-    if set(counts) == {"free"}:  # a season
-        files += ", ambient.csv"
     typer.echo(f"{recordings}, {files} and contacts.csv written to {plain(output)}")
-    if why_not and set(counts) > {"free"}:  # a season has nothing to score
+    if why_not:
         typer.echo(f"no benchmark.toml: {why_not}")

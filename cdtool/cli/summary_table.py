@@ -139,10 +139,10 @@ def _with_unchanged(cell: Cell) -> Toned | str:
 
 def show_conclusion(evaluated: Evaluated) -> None:
     """Print the conclusion, then limits, force profiles and contacts with a problem."""
-    from cdtool.report.model import counts_text, headline_tone
+    from cdtool.report.model import counts_text
 
     conclusion = evaluated.results.conclusion
-    tone = headline_tone(evaluated.results)
+    tone = conclusion.tone
     say(conclusion.headline, tone=tone)
     say(counts_text(evaluated), indent="  ")
     for reason in conclusion.reasons[:_SHOWN]:
@@ -169,10 +169,10 @@ def _show_limits(evaluated: Evaluated) -> None:
         typer.echo(f"  limits not met: and {len(failed) - _SHOWN} more")
 
 
-def finish(evaluated: Evaluated, facts: Sequence[Fact] = ()) -> None:
-    """Exit with the status of the results' conclusion and of further facts."""
+def finish(evaluated: Evaluated) -> None:
+    """Exit with the status of the results' conclusion."""
     results = evaluated.results
-    leave(results.skipped, results.findings, [*(Fact[name.upper()] for name in results.conclusion.facts), *facts])
+    leave(results.skipped, results.findings, [Fact[name.upper()] for name in results.conclusion.facts])
 
 
 def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:

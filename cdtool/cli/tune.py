@@ -138,6 +138,8 @@ def _show(done: Tuning, *, quiet: bool) -> None:
     from cdtool.report.html.tuning_page import injected_words, rejection_words
     from cdtool.workflows.tuning.tuned_files import described_choice
 
+    tone, headline = done.verdict
+    say(headline, tone=tone)
     if not quiet:
         _show_table(done)
     for tuned in done.detectors:

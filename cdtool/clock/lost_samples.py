@@ -64,7 +64,7 @@ def _longest_recent_step(time: FloatArray, at: int) -> float:
     return longest
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_MARKS}, {READ_ONLY}, b1[:, ::1])", rare=True)
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, {READ_MARKS}, {READ_ONLY}, b1[:, ::1])")
 def _fill_lost(time: FloatArray, usual: FloatArray, missing: BoolArray, clock: FloatArray, lost: BoolArray) -> None:
     """Fill `lost` (m, J); `usual` (n,): the median step up to each sample, `missing` (n, J): which have no value.
 

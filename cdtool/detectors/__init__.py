@@ -19,7 +19,6 @@ _TABLE = {
     "velocity": ("vo", "cdtool.detectors.velocity:Velocity"),
     "kalman_momentum": ("kmo", "cdtool.detectors.kalman_momentum:KalmanMomentum"),
     "torque_deviation": ("td", "cdtool.detectors.torque_deviation:TorqueDeviation"),
-    "fused": ("fu", "cdtool.detectors.fused:Fused"),
 }
 
 DETECTORS = Registry(
@@ -27,6 +26,6 @@ DETECTORS = Registry(
     table={name: target for name, (_, target) in _TABLE.items()},
     short_names={short: name for name, (short, _) in _TABLE.items()},
     contract=("name", "short_name", "title", "needs", "signed", "unit", "signal"),
-    optional={"look": Look, "contact_torque": bool, "own_threshold": str},
+    optional={"look": Look, "contact_torque": bool},
     settings=("unit", "meaning"),
 )

@@ -46,9 +46,8 @@ class Detector(Protocol):
 
     Notes
     -----
-    Optional attributes are `look` (`cdtool.detectors.look.Look`), `contact_torque`: False if a signal in N or N m is
-    not the contact torque, and `own_threshold`: the name of the only threshold that serves, used whatever a file says.
-    docs/own-detector.md has a complete example.
+    Optional attributes are `look` (`cdtool.detectors.look.Look`), and `contact_torque`: False if a signal in N or N m
+    is not the contact torque. docs/own-detector.md has a complete example.
     """
 
     name: ClassVar[str]

@@ -224,7 +224,6 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
 @kernel(
     f"void({READ_ONLY}, {READ_TABLE}, {READ_MARKS}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64[::1], "
     "float64[:, ::1], float64[:, ::1])",
-    rare=True,
 )
 def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,
@@ -310,7 +309,7 @@ def _fill_starts(time: FloatArray, missing: BoolArray, longest_gap: FloatArray, 
             starts[k, j] = start
 
 
-@kernel(f"void({READ_ONLY}, int64, int64, float64[:, ::1], float64[::1], float64[::1])", rare=True)
+@kernel(f"void({READ_ONLY}, int64, int64, float64[:, ::1], float64[::1], float64[::1])")
 def _fill_powers(
     time: FloatArray, begin: int, before: int, window: FloatArray, powers: FloatArray, rows: FloatArray
 ) -> None:
@@ -376,7 +375,6 @@ def _give_rates(rows: FloatArray, begin: int, joint: int, first: FloatArray, sec
 @kernel(
     f"void({READ_ONLY}, {READ_TABLE}, int64, float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], "
     "float64[:, ::1])",
-    rare=True,
 )
 def _polynomial_rates(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 from cdtool.errors import ConfigurationError, nearest
 
-# The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8, and five more.
+# The colours of Okabe and Ito nearest to those of the thesis's figures 5.7 and 5.8, and four more.
 RED, GREEN, BLUE, VIOLET = "#D55E00", "#009E73", "#0072B2", "#B0569B"
 ORANGE, SKY, BROWN = "#E69F00", "#56B4E9", "#8C613C"
 NAVY, OLIVE, GREY = "#332288", "#7A7A00", "#595959"
-TEAL = "#117A8B"
 
 # Markers that both the figures and the HTML page can draw, named as in matplotlib.
 MARKERS = ("o", "s", "D", "^", "v", "<", ">", "p", "P", "X")

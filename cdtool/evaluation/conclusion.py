@@ -8,9 +8,14 @@ detector and group says how many may be missed: then the limit decides. What not
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
 
+from cdtool.errors import UsageError
+from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.limits import not_met
 from cdtool.evaluation.recording_outcomes import MISSES
 from cdtool.evaluation.results import ConclusionResult, ContactResult, ForceResult, Results
@@ -149,48 +154,91 @@ def force_missed(results: Results, summaries: Sequence[Summary]) -> list[Summary
     return [item for item in missed_unasked(results, summaries) if item.group in profiles]
 
 
+class Severity(IntEnum):
+    """What a statement of a verdict is about, the worst first. Red is what a requirement forbids: exit status 1."""
+
+    PROTOCOL_FAILED = 0
+    VIOLATED = 1
+    LIMIT_NOT_ASSESSABLE = 2
+    WITHOUT_LIMIT = 3
+    OVER_BUDGET = 4
+    NOT_ASSESSABLE = 5
+    LOST = 6
+    INCOMPLETE = 7
+    APPARENT = 8
+    MET = 9
+    NOT_ASKED = 10
+
+    @property
+    def tone(self) -> str:
+        """Return the colour of a verdict that opens with it: good, bad, unknown, or empty if nothing was required."""
+        if self <= Severity.VIOLATED:
+            return "bad"
+        return {Severity.MET: "good", Severity.NOT_ASKED: ""}.get(self, "unknown")
+
+
+class Statement(NamedTuple):
+    """One fact of a verdict: a few words, the fact for the exit status if it has one, and the reasons line by line."""
+
+    severity: Severity
+    words: str
+    fact: Fact | None = None
+    reasons: tuple[str, ...] = ()
+
+
+def worst_first(statements: Iterable[Statement]) -> tuple[str, str, list[Statement]]:
+    """Return the verdict that every report, screen and result shows.
+
+    Parameters
+    ----------
+    statements : iterable of Statement
+        At least one.
+
+    Returns
+    -------
+    tone : str
+        The colour of the worst statement.
+    headline : str
+        All statements in one sentence, the worst first.
+    statements : list of Statement
+        In this order.
+
+    Examples
+    --------
+    >>> worst_first([Statement(Severity.MET, "all 3 limits are met"), Statement(Severity.LOST, "1 entry left out")])[:2]
+    ('unknown', '1 entry left out; all 3 limits are met')
+    """
+    ordered = sorted(statements, key=lambda item: item.severity)
+    return ordered[0].severity.tone, "; ".join(item.words for item in ordered), ordered
+
+
 def conclude(results: Results, summaries: Sequence[Summary]) -> ConclusionResult:
     """Return headline, reasons and exit status of these results; `limits` of the results are checked already."""
     checks = force_checks(results)
-    verdicts = Counter(item.verdict for item in checks)
-    failing = not_met(results.limits)
-    missed = missed_unasked(results, summaries)
-    forbidden = force_missed(results, summaries)
-    unassessed = nothing_assessed(summaries)
-    facts = set()
-    if failing:
-        facts.add(Fact.LIMIT_VIOLATED)
-    if verdicts["fail"] or forbidden:
-        facts.add(Fact.FORCE_VIOLATED)
-    if results.skipped:
-        facts.add(Fact.LEFT_OUT)
-    if results.losses:
-        facts.add(Fact.LOST)
-    scored = any(item.contacts or item.operations for item in summaries)
-    if unassessed or not scored or (checks and verdicts["not_assessable"] == len(checks)):
-        facts.add(Fact.NOTHING_ASSESSABLE)
-    elif verdicts["not_assessable"]:
-        facts.add(Fact.INCOMPLETE)
-    violated = bool(verdicts["fail"] or forbidden) or any(item.outcome == "violated" for item in failing)
-    unknown = bool(failing or unassessed or not scored or verdicts["not_assessable"])
-    asked = bool(results.limits or checks)
-    outcome = "violated" if violated else "not_assessable" if unknown else "met" if asked else "not_asked"
-    nothing = [] if scored else ["nothing was scored"]
-    parts = [
-        *nothing,
-        *_force_words(verdicts, checks),
-        *_missed_words(missed, forbidden),
-        *_unassessed_words(unassessed, summaries),
-    ]
-    limits = limits_words(results)
-    headline = [limits, *parts] if failing else [*parts, limits] if outcome != "met" else [limits, *parts]
+    tone, headline, statements = worst_first(
+        (
+            *_of_protocol(results.conclusion.protocol),
+            *_of_limits(results),
+            *_of_forces(checks),
+            *_of_misses(results, summaries),
+            *_of_false_alarms(results, summaries),
+            *_of_unassessed(results, summaries),
+            *_of_losses(results),
+        )
+    )
+    severities = {item.severity for item in statements}
+    unknown = severities & {Severity.LIMIT_NOT_ASSESSABLE, Severity.NOT_ASSESSABLE}
+    asked = bool(results.limits or checks or results.conclusion.protocol)
+    facts = {item.fact for item in statements if item.fact}
     return ConclusionResult(
-        outcome=outcome,
-        headline="; ".join(headline),
-        reasons=tuple(_reasons(results, checks, missed, forbidden, unassessed)),
-        missed_without_limit=sum(item.missed for item in missed),
+        outcome="violated" if tone == "bad" else "not_assessable" if unknown else "met" if asked else "not_asked",
+        headline=headline,
+        reasons=tuple(reason for item in statements for reason in item.reasons),
+        missed_without_limit=sum(item.missed for item in missed_unasked(results, summaries)),
         facts=tuple(sorted(fact.name.lower() for fact in facts)),
         exit_status=int(status_of(facts)),
+        tone=tone,
+        protocol=results.conclusion.protocol,
     )
 
 
@@ -222,20 +270,6 @@ def partly_unassessed(results: Results, summaries: Sequence[Summary]) -> list[st
     return lines
 
 
-def limits_words(results: Results) -> str:
-    """Return whether the limits are met, in a few words."""
-    limits = results.limits
-    if not limits:
-        return "no limits are set"
-    failing = not_met(limits)
-    if not failing:
-        return f"all {len(limits)} limits are met" if len(limits) > 1 else "the limit is met"
-    unknown = sum(item.outcome == "not_assessable" for item in failing)
-    kinds = [f"{len(failing) - unknown} violated"] if len(failing) > unknown else []
-    kinds += [f"{unknown} not assessable"] if unknown else []
-    return f"{len(failing)} of {counted(len(limits), 'limit')} not met ({', '.join(kinds)})"
-
-
 def _profiles(results: Results) -> dict[str, str]:
     """The name of the profile of each group that has one: of the provenance, which a file may hold anything in."""
     listed = results.provenance.get("force_profiles")
@@ -247,19 +281,68 @@ def _profiles(results: Results) -> dict[str, str]:
     return found
 
 
-def _force_words(verdicts: Counter[str], checks: Sequence[ForceCheck]) -> Iterator[str]:
-    if not checks:
-        return
-    of = _things(checks)
-    if verdicts["fail"]:
-        yield f"force profile violated by {verdicts['fail']} of {of}"
+def _of_protocol(protocol: Sequence[str]) -> Iterator[Statement]:
+    severities = {
+        "fail": (Severity.PROTOCOL_FAILED, Fact.FORCE_VIOLATED),
+        "incomplete": (Severity.INCOMPLETE, Fact.INCOMPLETE),
+        "pass": (Severity.MET, None),
+    }
+    if protocol:
+        outcome, words, *reasons = protocol
+        severity, fact = severities[outcome]
+        yield Statement(severity, plain(words), fact, tuple(map(plain, reasons)))
+
+
+def _of_limits(results: Results) -> Iterator[Statement]:
+    limits, failing = results.limits, not_met(results.limits)
+    unchecked = [item.reason for item in results.findings if item.kind == "limits_unchecked"]
+    if failing:
+        unknown = sum(item.outcome == "not_assessable" for item in failing)
+        kinds = [f"{len(failing) - unknown} violated"] if len(failing) > unknown else []
+        kinds += [f"{unknown} not assessable"] if unknown else []
+        words = f"{len(failing)} of {counted(len(limits), 'limit')} not met ({', '.join(kinds)})"
+        severity = Severity.VIOLATED if len(failing) > unknown else Severity.LIMIT_NOT_ASSESSABLE
+        yield Statement(severity, words, Fact.LIMIT_VIOLATED)
+    elif limits:
+        words = f"all {len(limits)} limits are met" if len(limits) > 1 else "the limit is met"
+        yield Statement(Severity.MET, words)
+    elif not unchecked:
+        yield Statement(Severity.NOT_ASKED, "no limits are set")
+    for words in unchecked:
+        yield Statement(Severity.NOT_ASKED, plain(words))
+
+
+def _of_forces(checks: Sequence[ForceCheck]) -> Iterator[Statement]:
+    verdicts = Counter(item.verdict for item in checks)
+    of, unseen = _things(checks), verdicts["not_assessable"]
     groups = [item.group for item in checks if not item.name]
-    if verdicts["not_assessable"] > len(groups):
-        yield f"force profile not assessable for {verdicts['not_assessable'] - len(groups)} of {of}"
-    if groups:
-        yield f"force profile not assessable in {', '.join(groups)}, where no contact was scored"
-    if verdicts["pass"] == len(checks):
-        yield f"force profile met by {of}"
+    if verdicts["fail"]:
+        violated = f"force profile violated by {verdicts['fail']} of {of}"
+        yield Statement(Severity.VIOLATED, violated, Fact.FORCE_VIOLATED, _force_reasons(checks, "fail", "violated by"))
+    words = [f"force profile not assessable for {unseen - len(groups)} of {of}"] if unseen > len(groups) else []
+    words += [f"force profile not assessable in {', '.join(groups)}, where no contact was scored"] if groups else []
+    if words:
+        fact = Fact.NOTHING_ASSESSABLE if unseen == len(checks) else Fact.INCOMPLETE
+        reasons = _force_reasons(checks, "not_assessable", "not assessable for")
+        yield Statement(Severity.NOT_ASSESSABLE, "; ".join(words), fact, reasons)
+    if checks and verdicts["pass"] == len(checks):
+        yield Statement(Severity.MET, f"force profile met by {of}")
+
+
+def _force_reasons(checks: Sequence[ForceCheck], verdict: str, what: str) -> tuple[str, ...]:
+    """Return a line for each group and profile with this verdict, and its first reason."""
+    parts: dict[Pair, list[ForceCheck]] = {}
+    for item in checks:
+        parts.setdefault((item.group, item.profile), []).append(item)
+    lines = []
+    for (group, profile), items in parts.items():
+        those = [item for item in items if item.verdict == verdict]
+        if those and not those[0].name:
+            lines.append(plain(f"force, {group}, {profile}: not assessable: {those[0].reason}"))
+        elif those:
+            first = f"{those[0].name}: {those[0].reason}" if those[0].reason else those[0].name
+            lines.append(plain(f"force, {group}, {profile}: {what} {len(those)} of {_things(items)}; first {first}"))
+    return tuple(lines)
 
 
 def _things(checks: Sequence[ForceCheck]) -> str:
@@ -270,50 +353,75 @@ def _things(checks: Sequence[ForceCheck]) -> str:
     return f"{contacts + points} contacts and test points" if points else counted(contacts, "contact")
 
 
-def _missed_words(missed: Sequence[Summary], forbidden: Sequence[Summary]) -> Iterator[str]:
-    count, violations = sum(item.missed for item in missed), sum(item.missed for item in forbidden)
-    if violations:
-        yield f"{counted(violations, 'detection')} missed under a force profile"
-    if count > violations:
-        yield f"{counted(count - violations, 'detection')} missed without a limit"
+def _of_misses(results: Results, summaries: Sequence[Summary]) -> Iterator[Statement]:
+    profiles = _profiles(results)
+    kinds = (
+        (True, Severity.VIOLATED, Fact.FORCE_VIOLATED, "under a force profile", "where a force profile is set"),
+        (False, Severity.WITHOUT_LIMIT, None, "without a limit", "and no limit on misses is set"),
+    )
+    for forbidden, severity, fact, words, why in kinds:
+        those = [item for item in missed_unasked(results, summaries) if (item.group in profiles) == forbidden]
+        reasons = [f"{_pair(each)}: {each.missed} of {each.assessable} contacts missed, {why}" for each in those]
+        if those:
+            count = counted(sum(item.missed for item in those), "detection")
+            yield Statement(severity, f"{count} missed {words}", fact, tuple(map(plain, reasons)))
 
 
-def _unassessed_words(unassessed: Sequence[Summary], summaries: Sequence[Summary]) -> Iterator[str]:
-    if not unassessed:
-        return
-    if len(unassessed) == len([item for item in summaries if item.operations or item.contacts]):
-        yield "nothing could be assessed"
-    else:
-        pairs = "detector and group" if len(unassessed) == 1 else "detectors and groups"
-        yield f"nothing could be assessed in {len(unassessed)} of {len(summaries)} pairs of {pairs}"
+def _of_false_alarms(results: Results, summaries: Sequence[Summary]) -> Iterator[Statement]:
+    """Yield false alarms without a limit, and those above the budget of a detector whose safety factor it set."""
+    limited = {(item.detector, item.group) for item in results.limits if item.figure.startswith("false_alarms")}
+    budgets = {}
+    for each in results.calibration:
+        with suppress(UsageError):  # a results file may hold anything
+            budgets[each.detector] = Budget.parse(each.budget)
+    alone, above = [], []
+    for item in summaries:
+        if (item.detector, item.group) in limited or not item.false_alarms:
+            continue
+        if item.detector not in budgets:
+            alone.append(item)
+        elif words := budgets[item.detector].excess(
+            (item.alarming, item.judged_operations), (item.false_alarms, item.hours)
+        ):
+            above.append((words, plain(f"{_pair(item)}: {words}")))
+    if alone:
+        reasons = [
+            f"{_pair(item)}: {counted(item.false_alarms, 'false alarm')} in {item.alarming} of "
+            f"{counted(item.judged_operations, 'operation')}, and no limit on false alarms is set"
+            for item in alone
+        ]
+        words = f"{counted(sum(item.false_alarms for item in alone), 'false alarm')} without a limit"
+        yield Statement(Severity.WITHOUT_LIMIT, words, None, tuple(map(plain, reasons)))
+    if above:
+        words = f"more false alarms than the budget: {above[0][0]}"
+        yield Statement(Severity.OVER_BUDGET, words, None, tuple(line for _, line in above))
 
 
-def _reasons(
-    results: Results,
-    checks: Sequence[ForceCheck],
-    missed: Sequence[Summary],
-    forbidden: Sequence[Summary],
-    unassessed: Sequence[Summary],
-) -> Iterator[str]:
-    """What is not good about these results beside the limits, line by line, worst first."""
-    parts: dict[Pair, list[ForceCheck]] = {}
-    for item in checks:
-        parts.setdefault((item.group, item.profile), []).append(item)
-    for verdict, what in (("fail", "violated by"), ("not_assessable", "not assessable for")):
-        for (group, profile), items in parts.items():
-            those = [item for item in items if item.verdict == verdict]
-            if those and not those[0].name:
-                yield plain(f"force, {group}, {profile}: not assessable: {those[0].reason}")
-            elif those:
-                first = f"{those[0].name}: {those[0].reason}" if those[0].reason else those[0].name
-                text = f"force, {group}, {profile}: {what} {len(those)} of {_things(items)}; first {first}"
-                yield plain(text)
-    for each in missed:
-        why = "where a force profile is set" if each in forbidden else "and no limit on misses is set"
-        yield plain(f"{each.detector}, {each.group}: {each.missed} of {each.assessable} contacts missed, {why}")
-    reasons = _reasons_of_contacts(results) if unassessed else {}
-    for each in unassessed:
-        yield plain(f"{each.detector}, {each.group}: {_why_unassessed(results, each, reasons)}")
+def _pair(item: Summary) -> str:
+    return f"{item.detector}, {item.group}"
+
+
+def _of_unassessed(results: Results, summaries: Sequence[Summary]) -> Iterator[Statement]:
+    unassessed = nothing_assessed(summaries)
+    scored = [item for item in summaries if item.operations or item.contacts]
+    if not scored:
+        yield Statement(Severity.NOT_ASSESSABLE, "nothing was scored", Fact.NOTHING_ASSESSABLE)
+    elif unassessed:
+        words = "nothing could be assessed"
+        if len(unassessed) < len(scored):
+            pairs = "detector and group" if len(unassessed) == 1 else "detectors and groups"
+            words += f" in {len(unassessed)} of {len(summaries)} pairs of {pairs}"
+        of_contacts = _reasons_of_contacts(results)
+        reasons = [plain(f"{_pair(item)}: {_why_unassessed(results, item, of_contacts)}") for item in unassessed]
+        yield Statement(Severity.NOT_ASSESSABLE, words, Fact.NOTHING_ASSESSABLE, tuple(reasons))
+
+
+def _of_losses(results: Results) -> Iterator[Statement]:
+    if results.skipped:
+        yield Statement(Severity.LOST, f"{counted(len(results.skipped), 'entry')} left out", Fact.LEFT_OUT)
+    if results.losses:
+        names = set(values_of(results.losses, "recording"))
+        yield Statement(Severity.LOST, f"data lost in {counted(len(names), 'recording')}", Fact.LOST)
 
 
 def _why_unassessed(results: Results, item: Summary, reasons: Mapping[Pair, Sequence[str]]) -> str:

@@ -29,6 +29,11 @@ class Evaluated:
 
     __repr__ = short_repr
 
+    def with_protocol(self, *protocol: str) -> Evaluated:
+        """Return it with the verdict of a test protocol in its conclusion: outcome, sentence, and the reasons."""
+        results = replace(self.results, conclusion=replace(self.results.conclusion, protocol=protocol))
+        return replace(self, results=replace(results, conclusion=conclude(results, self.summaries)))
+
 
 def evaluate(results: Results, limits: Sequence[LimitRule] = ()) -> Evaluated:
     """Derive all statistics, comparisons and the conclusion from results.

@@ -104,6 +104,24 @@ class Budget:
             sure = gamma.cdf(self.rate * exposure, counts)
         return int(np.count_nonzero(sure >= self.confidence - 1e-12)) - 1
 
+    def excess(self, operations: tuple[int, int], hours: tuple[int, float] = (0, 0.0)) -> str:
+        """Return by how much runs that did not set the factor exceed the budget, in words; empty if they do not.
+
+        `operations`: those that alarm, of all; `hours`: false alarms in so many hours. The chance is that of as many or
+        more at exactly the budget (binomial, by hours Poisson).
+        """
+        from scipy import stats
+
+        count, of = operations if self.per == "operation" else hours
+        allowed = self.rate * of
+        if count <= allowed:
+            return ""
+        by_operation = self.per == "operation"
+        p = float(stats.binom.sf(count - 1, of, self.rate) if by_operation else stats.poisson.sf(count - 1, allowed))
+        chance = digits(100.0 * p, 2) if p >= 1e-3 else "below 0.1"
+        what = f"{count} of {of} runs alarm" if by_operation else f"{counted(count, 'false alarm')} in {of:.3g} h"
+        return f"{what} where {self} allows {digits(allowed, 2)} (chance {chance} %)"
+
     def check(self, exposure: float, detector: str) -> None:
         """Raise UsageError, with what is missing, if the exposure is too small to set the factor."""
         if exposure < self.needed * (1.0 - 1e-9):

@@ -11,8 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cdtool.errors import ConfigurationError, nearest
-from cdtool.evaluation.results import LimitResult
+from cdtool.evaluation.results import LimitResult, RecordingFinding
 from cdtool.evaluation.summary import COUNTED_ALWAYS, FIGURES, Summary, kind_group
+from cdtool.findings import Finding
+from cdtool.findings.scoring import LimitsUnchecked
 from cdtool.tables import Table
 
 ALL = "*"
@@ -129,6 +131,13 @@ def _unscored_kind(rule: LimitRule, summaries: Sequence[Summary]) -> list[LimitR
         LimitResult(rule.key, name, rule.group, rule.figure, None, least, largest, "not_assessable", reason)
         for name in detectors
     ]
+
+
+def unchecked(rules: Sequence[LimitRule], detectors: Sequence[str], file: str) -> list[RecordingFinding]:
+    """Return the warning that limits of a file are set for detectors that were not run; empty if none is."""
+    absent = [rule.detector for rule in rules if rule.detector not in (ALL, *detectors)]
+    fact = LimitsUnchecked(len(absent), len(rules), ", ".join(dict.fromkeys(absent)))
+    return [RecordingFinding.of(file, Finding(fact))] if absent else []
 
 
 def not_met(limits: Sequence[LimitResult]) -> list[LimitResult]:

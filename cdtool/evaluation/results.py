@@ -261,6 +261,11 @@ class ConclusionResult:
     missed_without_limit: int = meant("missed detections that no limit covers", default=0)
     facts: tuple[str, ...] = meant("what decides the exit status", default=())
     exit_status: int = meant("exit status of the benchmark with these results", default=0)
+    tone: str = meant("good, bad, unknown, or empty if nothing was required: that of the worst statement", default="")
+    protocol: tuple[str, ...] = meant(
+        "pass, fail or incomplete, the sentence and the reasons of the test protocol made with them; empty without one",
+        default=(),
+    )
 
 
 @frozen

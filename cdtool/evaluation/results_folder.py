@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from cdtool.bounded_loading import MOST_JSON, ContentError, parse_json, read_bytes
-from cdtool.errors import RecordingError, UsageError
+from cdtool.errors import RecordingError, UsageError, installing
 from cdtool.evaluation.results import SCHEMA_VERSION, Results
 from cdtool.evaluation.results_file import build
 from cdtool.evaluation.rows import Rows, picked, values_of
@@ -80,7 +80,7 @@ def require_pyarrow(folder: Path) -> None:
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError as fault:
-        raise UsageError(f"{folder.name}: Parquet needs pyarrow", "install it: pip install 'cdtool[store]'") from fault
+        raise UsageError(f"{folder.name}: Parquet needs pyarrow", f"install it: {installing('store')}") from fault
 
 
 @cache

@@ -15,10 +15,10 @@ import numpy as np
 
 from cdtool.evaluation.results import ContactResult, ExposureResult, ForceResult, Results
 from cdtool.evaluation.rows import Rows, grouped, values_of
-from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_at_most, binomial_share, poisson_at_most, poisson_rate
 from cdtool.evaluation.statistics.small_sample import FEWEST, median_of, p95_of
+from cdtool.evaluation.statistics.spread import mean_interval
 from cdtool.plain_text import counted
 from cdtool.short_repr import short_repr
 
@@ -27,14 +27,15 @@ from cdtool.short_repr import short_repr
 class Summary:
     """Latency [ms] over the contacts, shares, rates, and the counts to read them with; intervals at 95 %.
 
-    `mean`, `std`: of the detected contacts, BCa by recording or campaign. `median`, `p95`: Kaplan-Meier. Where there
-    are too few contacts or recordings for an interval it is NaN, with its reason (see `small_sample`). `missed_share`
-    is of the assessable contacts; "at most" is its one-sided bound, and that of the false alarms. `force_at_alarm` and
-    `peak_force` [N] are medians, of the detected and of all contacts; a missed contact makes the largest force at the
-    alarm infinite. `judged_operations` are those assessable at least in part: the false alarms are of these.
-    `clipped` of the detected contacts have a negative latency, counted as 0. `in_progress` contacts are not among
-    `contacts`: they had begun when the recording did. `onset_holes` of the contacts may have begun where load-cell
-    samples are missing: their latencies may be up to `later_ms` longer. In `force_holes` the peak may be unseen.
+    `mean`, `std_ms`: of the detected contacts; Student's interval by recording or campaign. `median`, `p95`:
+    Kaplan-Meier. Where there are too few contacts or recordings for an interval it is NaN, with its reason (see
+    `small_sample`). `missed_share` is of the assessable contacts; "at most" is its one-sided bound, and that of the
+    false alarms. `force_at_alarm` and `peak_force` [N] are medians, of the detected and of all contacts; a missed
+    contact makes the largest force at the alarm infinite. `judged_operations` are those assessable at least in part:
+    the false alarms are of these. `clipped` of the detected contacts have a negative latency, counted as 0.
+    `in_progress` contacts are not among `contacts`: they had begun when the recording did. `onset_holes` of the
+    contacts may have begun where load-cell samples are missing: their latencies may be up to `later_ms` longer. In
+    `force_holes` the peak may be unseen.
     `alarming` of the operations have a false alarm.
     """
 
@@ -45,7 +46,7 @@ class Summary:
     missed: int
     not_assessable: int
     mean: Interval
-    std: Interval
+    std_ms: float
     median: Interval
     p95: Interval
     min_ms: float
@@ -94,11 +95,6 @@ class Summary:
         return self.mean.value
 
     @property
-    def std_ms(self) -> float:
-        """Standard deviation of the latency of the detected contacts [ms]."""
-        return self.std.value
-
-    @property
     def median_ms(self) -> float:
         """Median latency [ms], missed contacts taken as censored."""
         return self.median.value
@@ -127,7 +123,7 @@ class Summary:
 FIGURES: Mapping[str, Callable[[Summary], float]] = {
     "mean_ms": lambda item: item.mean.value,
     "mean_ms_upper": lambda item: item.mean.high,
-    "std_ms": lambda item: item.std.value,
+    "std_ms": lambda item: item.std_ms,
     "median_ms": lambda item: item.median.value,
     "median_ms_upper": lambda item: item.median.high,
     "p95_ms": lambda item: item.p95.value,
@@ -378,8 +374,8 @@ def _summary(
         detected=len(values),
         missed=missed,
         not_assessable=len(contacts) - len(latency),
-        mean=bca(values, labels, "mean"),
-        std=bca(values, labels, "std"),
+        mean=mean_interval(values, labels),
+        std_ms=float(np.std(values - values[0], ddof=1)) if len(values) > 1 else math.nan,
         median=median_of(latency, censored, seen),
         p95=p95_of(latency, censored, seen),
         min_ms=float(values.min()) if len(values) else (math.inf if missed else math.nan),

@@ -159,8 +159,9 @@ class StuckChannel(Fact):
 
 @frozen
 class UnitContradicted(Fact):
-    """The header of a column, and of `more` others, states another unit than the machine file.
+    """The header of a column, and of `more` others, states another unit than the machine file, or none that is known.
 
+    A loss: the channel is not assessable. A note, of a text that is no unit: a force is not compared with limits.
     `stated` is what the machine file says, `ratio` the factor between both units (0: they measure different things).
     `advice`: what to write if the header is right, with "unit and scale" a scale in the unit `scale`.
     """
@@ -170,7 +171,7 @@ class UnitContradicted(Fact):
     more: int
     stated: str
     ratio: float
-    advice: Literal["unit", "unit and scale", "unit without scale", "other column"]
+    advice: Literal["unit", "unit and scale", "unit without scale", "other column", "no unit"]
     scale: str = ""
 
     def sentence(self) -> str:
@@ -178,10 +179,13 @@ class UnitContradicted(Fact):
         more = f" and {self.more} more so" if self.more else ""
         ratio = f" (a factor of {self.ratio:.4g})" if self.ratio else ""
         text = f"the header says '{self.header}'{more}, the machine file {self.stated}{ratio}"
+        if self.advice == "no unit":
+            return f"{text}, which the header does not confirm: write unit_confirmed = true if that is right"
         if self.advice == "other column":
-            return f"{text}: is it another column?"
+            return f"{text}, not assessable: map another column, or write unit_confirmed = true if it is this one"
         scale = {"unit and scale": f" with a scale in {self.scale}", "unit without scale": " without that scale"}
-        return f'{text}: write unit = "{self.header_unit}"{scale.get(self.advice, "")} if the header is right'
+        unit = f'unit = "{self.header_unit}"{scale.get(self.advice, "")}'
+        return f"{text}, not assessable: write {unit} if the header is right, else unit_confirmed = true"
 
 
 @frozen

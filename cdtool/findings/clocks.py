@@ -114,8 +114,8 @@ class ClockRestart:
     def __str__(self) -> str:
         if not self.wrapped_bits:
             return (
-                "the clock starts again there, or has jumped ahead before: cut the log there (--operations "
-                "clock-reset), or correct its stamps"
+                "the clock starts again there, or has jumped ahead before: cut the log there (operations "
+                '= "clock-reset" in the benchmark file, or detect --operations clock-reset), or correct its stamps'
             )
         return (
             f"the counter of {self.wrapped_bits} bits wraps there: log a wider one, "

@@ -77,7 +77,7 @@ class LogNotCut(Fact):
         which = f"stroke {number[0]} is" if len(number) == 1 else f"{len(number)} of them are"
         return (
             f"contains {counted(self.strokes, 'stroke')} in one operation, and {which} not assessable: cut it with "
-            'operations = "motion" in the benchmark file, or --operations motion'
+            'operations = "motion" in the benchmark file, or detect --operations motion'
         )
 
 
@@ -126,8 +126,9 @@ class LimitsUnchecked(TemplateFact):
 
     count: int
     limits: int
+    detectors: str
 
-    words = "{count} of {limits} limits are set for detectors that were not run: not checked"
+    words = "{count} of {limits} limits are set for detectors that were not run ({detectors}): not checked"
 
 
 @frozen
@@ -159,6 +160,20 @@ class CreepNotLearned(Fact):
     def sentence(self) -> str:
         """Return how many, and why."""
         return f"{counted(self.strokes, 'stroke')} at creep speed not learned, and not assessed: {self.reason}"
+
+
+@frozen
+class SpeedsPooled(TemplateFact):
+    """A threshold that does not distinguish speeds was learned from runs at several speeds of one motion."""
+
+    threshold: str
+    slowest: str
+    fastest: str
+
+    words = (
+        "the threshold {threshold} pools runs {slowest} and {fastest}: its limits are too wide for one of them; learn "
+        'and score each speed in a benchmark file of its own, or set threshold = "signature", which has limits by speed'
+    )
 
 
 @frozen

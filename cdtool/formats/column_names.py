@@ -57,8 +57,8 @@ def wanted_keys(path: Path, wanted: ChannelMap, names: Sequence[str]) -> list[st
     other column is missing.
     """
     resolved, _ = _resolved(path, wanted, names)
-    keys = {resolved.time.key, *(key for source in resolved.sources for key in source.keys)} - {""}
-    return [name for name in names if name in keys]
+    keys = {resolved.time.key, resolved.time.nanoseconds_key}.union(*(source.keys for source in resolved.sources))
+    return [name for name in names if name and name in keys]
 
 
 def requested_keys(path: Path, wanted: ChannelMap | None, names: Sequence[str]) -> list[str]:
@@ -135,6 +135,8 @@ def _find_columns(path: Path, channels: ChannelMap, names: Sequence[str]) -> tup
     time = channels.time
     if time.column is not None:
         time = replace(time, key=find_key(path, "time", time.column, names))
+    if time.nanoseconds is not None:
+        time = replace(time, nanoseconds_key=find_key(path, "time", time.nanoseconds, names))
     sources = tuple(
         replace(
             source,

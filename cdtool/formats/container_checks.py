@@ -12,7 +12,7 @@ from typing import Any
 import numpy.typing as npt
 
 from cdtool.columns import as_float64
-from cdtool.errors import CdtoolError, RecordingError
+from cdtool.errors import CdtoolError, RecordingError, installing
 from cdtool.findings import Finding
 from cdtool.findings.containers import ColumnLeftOut, RoundedColumn
 from cdtool.recording import FloatArray
@@ -29,14 +29,13 @@ def library(module: str, extra: str, path: Path) -> Any:
     try:
         return import_module(module)
     except ImportError as fault:
-        raise RecordingError(
-            f"{path}: {module.partition('.')[0]} is not installed", f"pip install 'cdtool[{extra}]'"
-        ) from fault
+        raise RecordingError(f"{path}: {module.partition('.')[0]} is not installed", installing(extra)) from fault
 
 
 def check_size(path: Path, values: int) -> None:
     """Raise RecordingError if a file declares far more numbers than a log of its size can contain."""
-    size, declared = path.stat().st_size, 8 * values
+    # A product of damaged dimensions may exceed every float.
+    size, declared = path.stat().st_size, min(8 * values, 2**63)
     if declared > _FREE and declared > _RATIO * size:
         raise RecordingError(
             f"{path}: unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.errors import ConfigurationError, UsageError
+from cdtool.errors import ConfigurationError, UsageError, installing
 from cdtool.identification.estimate import IdentificationError
 from cdtool.identification.robot_dynamics import RobotFit, fitted_robot
 from cdtool.identification.robot_regressor import BODY_PARAMETERS, Column, Group, regressor_of
@@ -113,7 +113,7 @@ def _solver() -> Any:
     except ImportError as fault:
         raise ConfigurationError(
             f"consistent inertias need {fault.name or 'cvxpy'}, which is not installed",
-            "pip install 'cdtool[identify]'",
+            installing("identify"),
         ) from fault
 
 

@@ -41,7 +41,6 @@ PARAMETER_ORDER = (
 
 @kernel(
     "void(UniTuple(float64, 18), float64[::1], float64[:, ::1], int64, float64[:, ::1])",
-    rare=True,
 )
 def simulate_contact(
     parameters: tuple[float, ...], initial_state: Array, inputs: Array, substeps: int, output: Array

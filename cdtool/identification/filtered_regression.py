@@ -478,7 +478,7 @@ def fit_linear(
         )
     coefficients = _solved(scaled, force, given, weights)
     for _ in range(_ITERATIONS if loss is not Loss.SQUARES else 0):
-        weights = _robust_weights(force - scaled @ coefficients, loss)
+        weights = _robust_weights(force - scaled @ coefficients, force, loss)
         before = coefficients
         coefficients = _solved(scaled, force, given, weights)
         if np.max(np.abs(coefficients - before)) <= _SAME * np.max(np.abs(coefficients)):
@@ -505,11 +505,10 @@ def _solved(regressors: FloatArray, force: FloatArray, instruments: FloatArray, 
     return np.asarray(np.linalg.solve(weighted @ regressors, weighted @ force), dtype=np.float64)
 
 
-def _robust_weights(residuals: FloatArray, loss: Loss) -> FloatArray:
+def _robust_weights(residuals: FloatArray, force: FloatArray, loss: Loss) -> FloatArray:
     """Return rho'(u) / u of each residual, u in units of 1.345 times the scatter (Huber's 95 % efficiency)."""
-    scatter = 1.4826 * float(np.median(np.abs(residuals)))
-    if scatter <= 0.0:
-        return np.ones(len(residuals))
+    # No sensor resolves 1e-9 of its range: less scatter is rounding, which must not choose weights.
+    scatter = max(1.4826 * float(np.median(np.abs(residuals))), 1e-9 * float(np.max(np.abs(force)))) or 1.0
     ratio = np.abs(residuals) / (1.345 * scatter)
     if loss is Loss.HUBER:
         return 1.0 / np.maximum(ratio, 1.0)

@@ -27,8 +27,6 @@ _SEPARATED = 0.02
 _FEWEST_SMOOTHED, _LONGEST_SMOOTHED = 1.5, 0.012
 # The inertia force of the motor may be as noisy as this share of the torque's noise.
 _NOISE_SHARE = 0.5
-# The rest level of the load cell is that of this time before the contact [s].
-_REST = (0.5, 0.02)
 # An axis below this share of its highest speed does not approach.
 _APPROACH_SHARE = 0.02
 

@@ -551,6 +551,8 @@ def _sections_of(runs: Sequence[AxisRun], source: _Source) -> _Sections | None:
 
 def _joined(pieces: Sequence[FloatArray], period: float) -> _Sections:
     """Return pieces (5, samples) as sections: the inputs, the output and the demand."""
+    if not pieces:
+        raise IdentificationError("no section has torque, speed and reference", "check the channels with cdtool info")
     starts = np.concatenate(([0], np.cumsum([piece.shape[1] for piece in pieces]))).astype(np.int64)
     values = np.ascontiguousarray(np.hstack(pieces))
     weight = np.ones(int(starts[-1]))

@@ -38,7 +38,6 @@ INPUTS = ("reference_speed", "position_error", "raw_speed")
 
 @kernel(
     "void(UniTuple(float64, 13), int64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1])",
-    rare=True,
 )
 def simulate_controller(
     parameters: tuple[float, ...], starts: Indices, integrals: Array, commands: Array, inputs: Array, output: Array

@@ -52,7 +52,9 @@ def _outside(fit: RobotFit) -> BoolArray:
     outside: BoolArray = np.zeros(len(size), dtype=np.bool_)
     for joint in np.unique(joints).tolist():
         own = joints == joint
-        outside[own] = size[own] > _BEYOND * float(np.median(size[own])) / _MEDIAN_TO_DEVIATION
+        # No sensor resolves 1e-9 of its range: less is rounding.
+        least = 1e-9 * float(np.max(np.abs(equations.torques[own])))
+        outside[own] = size[own] > _BEYOND * max(float(np.median(size[own])), least) / _MEDIAN_TO_DEVIATION
     return outside
 
 

@@ -23,14 +23,21 @@ from cdtool.clock.stamps import gaps_of, missing_findings
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings import Finding, Severity
-from cdtool.findings.channels import ImpossibleValues, InfiniteValues, MaskedValues, SaturatedValues, StuckChannel
+from cdtool.findings.channels import (
+    ImpossibleValues,
+    InfiniteValues,
+    MaskedValues,
+    SaturatedValues,
+    StuckChannel,
+    UnitContradicted,
+)
 from cdtool.findings.clocks import ClocksApart, LowerRate
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.log_names import log_stem
 from cdtool.plausible import IMPOSSIBLE
-from cdtool.recording import MEASURED, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
+from cdtool.recording import MEASURED, RIG_UNITS, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
 from cdtool.remote.remote_path import RemotePath
 
 _TABLE = "Array(float64, 2, 'C', readonly=True)"
@@ -55,8 +62,14 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
     """
     work = _Assembly(source, channels)
     series = {}
+    findings = (*source.findings, *work.findings)
+    doubted = {item.channel for item in findings if isinstance(item.fact, UnitContradicted) and item.severity == "loss"}
     for number, item in enumerate(channels.sources):
-        series[item.channel] = work.series(item)
+        made = work.series(item)
+        if item.channel not in doubted:
+            series[item.channel] = made
+        elif item.channel not in RIG_UNITS:  # present, so that nothing takes its place, but not assessable
+            series[item.channel] = made.with_values(np.full(made.values.shape, np.nan), made.unit)
         work.drop_columns(item, channels.sources[number + 1 :])
     work.columns.clear()
     for item in channels.sources:

@@ -17,7 +17,7 @@ from cdtool.channels import ChannelMap, ChannelSource, OwnFile
 from cdtool.dynamics import Machine
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding, Severity
-from cdtool.findings.channels import AbsentFile, AbsentTruth
+from cdtool.findings.channels import AbsentFile, AbsentTruth, UnitContradicted
 from cdtool.findings.clocks import ClocksApart, FileAligned, TriggersDiffer, TriggersDrift
 from cdtool.formats.source import Source
 from cdtool.ingest.channel_assembly import assemble_recording
@@ -92,7 +92,7 @@ def _with_file(
     name, path = item.channel, location(beside.source)
     findings = [replace(found, file=path.name) for found in beside.findings if not isinstance(found.fact, ClocksApart)]
     if name not in beside:
-        absent = [found.fact for found in beside.findings if isinstance(found.fact, AbsentTruth)]
+        absent = [found.fact for found in beside.findings if isinstance(found.fact, AbsentTruth | UnitContradicted)]
         raise RecordingError(f"{path}: {absent[0].sentence()}" if absent else f"{path}: contains no {name}")
     shift = _shift(recording, item.channel, own, beside, trigger)
     shift = replace(shift, seconds=shift.seconds + item.time_offset)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -18,19 +19,23 @@ from cdtool.findings.channels import UnitContradicted
 from cdtool.findings.clocks import ClockUnitContradicted, StepsImplausible
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.source import Source
+from cdtool.recording import CONTACT_PRESSURE, RIG_UNITS
 from cdtool.units import RAW_UNITS, Unit, find_unit
 
 # Units of plain numbers.
 _PLAIN = ("1", "count")
 # A scale that converts another unit is often rounded: 0.1047 for rpm. No two units of one kind are this close.
 _ROUNDED = 1e-3
+# Where the name of a force may state its unit: `F [kN] filtered`, `Kraft in daN`, `F_kN`; not `F_N`, a normal force.
+_IN_NAME = re.compile(r"[\[(]([^\[\]()]+)[\])]|([^\W_]{2,})$")
 
 
 def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
-    """Return a warning for each channel whose columns have units that contradict the machine file, in kind or factor.
+    """Return a loss for each channel whose columns have units that contradict the machine file, in kind or factor.
 
-    An explicit scale that converts the header's unit to the channel's is not a contradiction. A header without a unit,
-    with an unknown one, or with "1" is not checked. The map's columns are resolved (resolve_columns).
+    An explicit scale that converts the header's unit to the channel's is not a contradiction, and a unit that the
+    machine file confirms is none either. A text in the place of the unit that is no unit is a note; of a pressure a
+    loss, as that is only compared with limits. The map's columns are resolved (resolve_columns).
     """
     findings = []
     for item in channels.sources:
@@ -39,16 +44,30 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
 
 
 def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> list[Finding]:
-    """Return the warnings of one channel, one per contradicting unit; `columns` are those of its joints."""
+    """Return the findings of one channel, one per contradicting unit; `columns` are those of its joints."""
     stated = find_unit(item.stated) if item.stated else None
-    if stated is None:
+    if stated is None or item.confirmed:
         return []
     by_unit: dict[str, list[Column]] = {}
     for column, factor in zip(columns, item.factor, strict=False):
-        header_unit = find_unit(column.unit) if column.unit else None
-        if header_unit is not None and not _fits(header_unit, stated, item.unit, abs(factor)):
-            by_unit.setdefault(str(column.unit), []).append(column)
-    return [Finding(_contradiction(item, stated, unit, columns), item.channel) for unit, columns in by_unit.items()]
+        text = _unit_text(item, column)
+        header_unit = find_unit(text) if text else None
+        if text and (header_unit is None or not _fits(header_unit, stated, item, abs(factor))):
+            by_unit.setdefault(text, []).append(column)
+    facts = [_contradiction(item, stated, unit, columns) for unit, columns in by_unit.items()]
+    return [
+        Finding(fact, item.channel, "note" if fact.advice == "no unit" and item.channel != CONTACT_PRESSURE else "loss")
+        for fact in facts
+    ]
+
+
+def _unit_text(item: ChannelSource, column: Column) -> str | None:
+    """Return the text in the place of a column's unit; of a force or pressure also a unit elsewhere in its name."""
+    if item.channel not in RIG_UNITS:
+        return column.unit
+    texts = [column.unit or "", *("".join(found) for found in _IN_NAME.findall(column.name))]
+    known = [text for text in texts if text and (found := find_unit(text)) and found.si == item.unit]
+    return next(iter(known), column.unit or ("1" if column.name.endswith((" [1]", " (1)")) else None))
 
 
 def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
@@ -103,20 +122,23 @@ def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:
     return float(column.values[first]) + origin / time.factor if len(finite) and finite[first] else 0.0
 
 
-def _fits(header_unit: Unit, stated: Unit, channel_unit: str, factor: float) -> bool:
+def _fits(header_unit: Unit, stated: Unit, item: ChannelSource, factor: float) -> bool:
     if header_unit == Unit("1", 1.0) and stated.si != "1":  # some loggers write "1" if the unit is unknown
-        return True
+        return item.channel not in RIG_UNITS
+    if header_unit.si in RAW_UNITS and stated.si == item.unit and not math.isclose(factor, stated.factor):
+        return True  # the scale is a torque constant, or converts percent of the rated torque
     same_kind = header_unit.si == stated.si or (header_unit.si in _PLAIN and stated.si in _PLAIN)
     if stated.si == "SI":  # linear and rotary joints together: each has its own SI unit
         same_kind = header_unit.si not in RAW_UNITS
     if same_kind and math.isclose(header_unit.factor, stated.factor):
         return True
-    return header_unit.si == channel_unit and math.isclose(header_unit.factor, factor, rel_tol=_ROUNDED)
+    return header_unit.si == item.unit and math.isclose(header_unit.factor, factor, rel_tol=_ROUNDED)
 
 
 def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequence[Column]) -> UnitContradicted:
     header_unit = find_unit(unit)
-    assert header_unit is not None
+    if header_unit is None or (unit == "1" and item.channel in RIG_UNITS):
+        return UnitContradicted(_header_text(columns[0]), unit, len(columns) - 1, str(item.stated), 0.0, "no unit")
     advice: Literal["unit", "unit and scale", "unit without scale", "other column"] = "unit"
     if item.duty is None and header_unit.si in RAW_UNITS and stated.si != header_unit.si:
         advice = "unit and scale"
@@ -138,4 +160,5 @@ def _ratio(header_unit: Unit, stated: Unit) -> float:
 
 
 def _header_text(column: Column) -> str:
-    return column.name if split_unit(column.name)[1] is not None else f"{column.name} [{column.unit}]"
+    is_named = column.unit is None or split_unit(column.name)[1] is not None
+    return column.name if is_named else f"{column.name} [{column.unit}]"

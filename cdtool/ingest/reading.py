@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from cdtool.channels import ChannelMap, ChannelSource
+from cdtool.clock.stamps import epoch_start
 from cdtool.columns import Column, Piece
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.file_kinds import kind_of
@@ -281,7 +282,20 @@ def _resolved_source(
         channels = replace(channels, sources=(*channels.sources, also(channels.topics)))
     asked = fields_by_axis(channels)
     source, resolved = resolve_columns(file_format.columns(path, asked), asked)
+    if resolved.time.nanoseconds_key:
+        source = with_nanoseconds(source, resolved.time.key, resolved.time.nanoseconds_key, resolved.time.factor)
     return with_own_clocks(*join_fields(source, resolved, channels))
+
+
+def with_nanoseconds(source: Source, seconds: str, nanoseconds: str, factor: float = 1.0) -> Source:
+    """Return a table with one clock, `seconds` (of `factor` s), in place of it and of the nanoseconds within each."""
+    columns = {key: column for key, column in source.columns.items() if key != nanoseconds}
+    clock, rest = columns[seconds], source.columns[nanoseconds].values
+    # An epoch is subtracted first: float64 does not represent nanoseconds since 1970.
+    start = epoch_start(clock.values, factor)
+    values = clock.values - start + rest * (1e-9 / factor)
+    columns[seconds] = replace(clock, values=values, unit="s" if factor == 1.0 else clock.unit)
+    return replace(source, columns=columns, origin=source.origin + start * factor)
 
 
 def has_topics(file_format: Format) -> bool:
@@ -362,7 +376,7 @@ def _read_head(path: Path) -> bytes:
         if not path.exists():
             whole, mark, _ = str(path).rpartition("#")
             is_run = mark and location(whole).exists()
-            hint = f"for a run of {whole}, state how it is cut, e.g. --operations column:NAME" if is_run else ""
+            hint = f"for a run of {whole}, state how it is cut, as detect --operations column:NAME" if is_run else ""
             raise RecordingError(f"{path}: no such file", hint or "check the path")
         if not path.is_file():
             raise RecordingError(f"{path}: is not a regular file", "save the stream to a file first")

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from cdtool.bounded_loading import read_bytes
-from cdtool.errors import ConfigurationError, nearest
+from cdtool.errors import ConfigurationError, installing, nearest
 from cdtool.machines.kinematic_tree import KinematicTree, TreeJoint, TreeLink
 from cdtool.recording import FloatArray
 
@@ -67,7 +67,7 @@ def _pinocchio(path: Path) -> Any:
         return import_module("pinocchio")
     except ModuleNotFoundError as fault:
         raise ConfigurationError(
-            f"{path}: reading a URDF needs pinocchio, which is not installed", "pip install 'cdtool[urdf]'"
+            f"{path}: reading a URDF needs pinocchio, which is not installed", installing("urdf")
         ) from fault
     except ImportError as fault:  # a library of the system that the wheel does not contain
         why = str(fault).partition("\n")[0]

@@ -51,7 +51,7 @@ def evident_speed(speed: Series) -> FloatArray:
     return found
 
 
-@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64[::1])", rare=True)
+@kernel(f"void({READ_ONLY}, {READ_ONLY}, float64[::1])")
 def _evident(time: FloatArray, speed: FloatArray, found: FloatArray) -> None:
     for k in range(len(time)):
         found[k] = 0.0

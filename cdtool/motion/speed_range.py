@@ -162,7 +162,6 @@ def in_ranges(classes: Sequence[MotionClass]) -> list[list[int]]:
 @kernel(
     f"void({READ_ONLY}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, Courses, {_TABLE}, {_TABLE}, b1[::1], b1[::1], "
     "float64[::1])",
-    rare=True,
 )
 def follow_speed(  # noqa: C901, PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,

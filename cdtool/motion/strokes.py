@@ -98,7 +98,7 @@ def averaged_so_far(series: Series) -> FloatArray:
     return mean
 
 
-@kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64[::1], float64, int64[::1], int64[::1], b1[::1])", rare=True)
+@kernel(f"int64({READ_ONLY}, {READ_ONLY}, int64[::1], float64, int64[::1], int64[::1], b1[::1])")
 def _cut(
     time: FloatArray,
     level: FloatArray,

@@ -50,6 +50,11 @@ class TuningResult(NearAttributes):
         return self.tuning.detectors[0]
 
     @property
+    def headline(self) -> str:
+        """The verdict on the best detector in one line, the worst fact first, as the report shows it."""
+        return self.tuning.verdict[1]
+
+    @property
     def unusable(self) -> Mapping[str, str]:
         """The detectors that could not be tuned, with the reason."""
         return self.tuning.unusable
@@ -106,10 +111,7 @@ class TuningResult(NearAttributes):
         return list(write_tuning(self.tuning, target))
 
     def __repr__(self) -> str:
-        best, count = self.best, len(self.detectors)
-        means = ", ".join(f"{group} {found.mean_ms:.3g} ms" for group, found in best.honest.groups.items())
-        what = best.detector if count == 1 else f"{counted(count, 'detector')}, best {best.detector}"
-        return f"TuningResult({what} with {best.choice.rule.name} at {self.tuning.options.budget}: {means})"
+        return f"TuningResult({counted(len(self.detectors), 'detector')}: {self.headline})"
 
     def _repr_html_(self) -> str:
         return self.tuning._repr_html_()

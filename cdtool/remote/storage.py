@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from cdtool.errors import nearest
+from cdtool.errors import installing, nearest
 from cdtool.remote import transferred
 from cdtool.remote.storage_error import MissingObjectError, StorageError, is_no_space, words_of
 from cdtool.remote.urls import complete, scheme_of, without_secrets
@@ -172,13 +172,13 @@ def _filesystem(url: str) -> tuple[Any, str]:
         from fsspec.registry import get_filesystem_class, known_implementations
     except ImportError as fault:
         raise StorageError(
-            url, "reading a URL needs fsspec, which is not installed", "pip install 'cdtool[remote]'", errno.ENOSYS
+            url, "reading a URL needs fsspec, which is not installed", installing("remote"), errno.ENOSYS
         ) from fault
     try:
         kind = get_filesystem_class(scheme)
     except ImportError as fault:
         said = without_secrets(" ".join(str(fault).split()))[:_LONGEST_REASON]
-        hint = "pip install 'cdtool[remote]'" if scheme in _OF_EXTRA else said
+        hint = installing("remote") if scheme in _OF_EXTRA else said
         raise StorageError(url, f"{scheme}:// needs a package that is not installed", hint, errno.ENOSYS) from fault
     except ValueError:
         known = nearest(scheme, known_implementations)

@@ -48,8 +48,12 @@ class Suite:
 
 
 def suites_of(evaluated: Evaluated) -> Iterator[Suite]:
-    """Yield limits, force profiles, what was left out, recordings by detector and group, conditions, and kinds."""
+    """Yield the conclusion, limits, force profiles, losses, recordings by detector and group, conditions, and kinds."""
     results = evaluated.results
+    conclusion = results.conclusion
+    kind = {"bad": "failure", "unknown": "skipped"}.get(conclusion.tone, "")
+    head = Case("conclusion", kind, conclusion.headline if kind else "", (conclusion.headline, *conclusion.reasons))
+    yield Suite("conclusion", (head,))
     if results.limits:
         yield Suite("limits", _bounded(map(_limit, results.limits)))
     checks = force_checks(results)

@@ -209,7 +209,7 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
     return Model(
         headline=results.conclusion.headline,
         counts=counts_text(evaluated),
-        tone=headline_tone(results),
+        tone=results.conclusion.tone,
         scope=tuple(part for part in scope if part),
         reasons=results.conclusion.reasons,
         left_out=f"{counted(lost, 'entry')} of data left out or lost" if lost else "",
@@ -278,16 +278,6 @@ def _groups_note(evaluated: Evaluated) -> str:
     if len(plotted) == len(every):
         return ""
     return f"Plotted are the {len(plotted)} of {len(every)} groups with the largest share of missed contacts."
-
-
-def headline_tone(results: Results) -> str:
-    """Return whether the headline is good, bad or unknown; empty if nothing was required."""
-    conclusion = results.conclusion
-    if conclusion.outcome == "violated":
-        return "bad"
-    if conclusion.outcome == "not_assessable" or conclusion.missed_without_limit:
-        return "unknown"
-    return "good" if conclusion.outcome == "met" else ""
 
 
 def _results_note(evaluated: Evaluated) -> str:

@@ -99,7 +99,6 @@ _BEFORE, _ONCE, _MEASURED, _SUM, _COMMAND, _ACTING, _KEEP, HELD = range(8)
 @kernel(
     "float64(float64[:, ::1], float64[:, ::1], UniTuple(float64, 3), float64[:, ::1], float64, float64[:, ::1], "
     "float64[:, ::1], float64[:, :, ::1], UniTuple(float64, 11), int64, int64, float64[:, :, ::1], float64[::1])",
-    rare=True,
 )
 def integrate_robot(
     bodies: Array,

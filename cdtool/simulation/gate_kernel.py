@@ -8,8 +8,6 @@ and the force F_m of the current loop, so that its lag is integrated with the sa
     m_f v_f' = F_post - F_contact
     F_m'     = (u - F_m) / lag
 
-F_f includes a section of the track that resists, a growing obstruction that the gate still passes: a bump of
-cos^2 shape, F_obs cos^2(pi (x - x_obs) / l_obs) tanh(v / v_s) within l_obs / 2 of x_obs.
 Control, disturbance and resolver are sampled once per log period and held over its sub-steps.
 """
 
@@ -52,15 +50,14 @@ PARAMETER_ORDER = (
     "load_cell_stiffness", "load_cell_damping", "bumper_stiffness", "bumper_buckling_travel",
     "bumper_buckled_stiffness", "bumper_bottom_travel", "bumper_bottom_stiffness", "bumper_damping",
     "speed_gain", "integral_gain", "anti_windup_rate", "force_slew_limit", "force_limit", "current_lag",
-    "resolver_step", "speed_filter_frequency", "sample_period", "obstruction_force", "obstruction_position",
-    "obstruction_length",
+    "resolver_step", "speed_filter_frequency", "sample_period",
 )
 # fmt: on
 """The attributes of `GateParameters` that the kernel takes, in the order in which it unpacks them."""
 
 
 @kernel(
-    "float64(UniTuple(float64, 41), float64[:, ::1], float64[::1], float64[::1], float64[::1], "
+    "float64(UniTuple(float64, 38), float64[:, ::1], float64[::1], float64[::1], float64[::1], "
     "UniTuple(float64, 3), int64, int64, float64[:, ::1])"
 )
 def integrate_gate(
@@ -119,9 +116,6 @@ def integrate_gate(
         resolver_step,
         speed_filter_frequency,
         sample_period,
-        obstruction_force,
-        obstruction_position,
-        obstruction_length,
     ) = parameters
     friction_factor, cogging_phase, obstacle = run
     step = sample_period / substeps
@@ -191,10 +185,6 @@ def integrate_gate(
                 coulomb = coulomb_friction * friction_factor * (1.0 + friction_waviness * wave)
                 stribeck = (static_friction - coulomb) * math.exp(-((v / stribeck_speed) ** 2))
                 friction = (coulomb + stribeck) * math.tanh(v / friction_smoothing_speed) + viscous_friction * v
-                from_obstruction = x - obstruction_position
-                if obstruction_force > 0.0 and 2.0 * abs(from_obstruction) < obstruction_length:
-                    bump = math.cos(math.pi * from_obstruction / obstruction_length) ** 2
-                    friction += obstruction_force * bump * math.tanh(v / friction_smoothing_speed)
 
                 post = post_stiffness * (x - x_f) + post_damping * (v - v_f)
 

@@ -60,9 +60,6 @@ class GateParameters:
     disturbance_rate: float = 60.0  # its corner [rad/s]
     cogging_force: float = 30.0  # amplitude [N]
     cogging_periods: float = 36.0  # per motor revolution [-]
-    obstruction_force: float = 0.0  # of a section of the track that resists, at its middle [N]; 0 = none
-    obstruction_position: float = 0.9  # where its middle is [m]
-    obstruction_length: float = 0.1  # from one end of it to the other [m]
 
     # Front post, load cell and bumper
     post_stiffness: float = 1.15e6  # ks [N/m]

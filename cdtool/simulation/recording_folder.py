@@ -1,6 +1,6 @@
 """A folder of simulated recordings with machine.toml and contacts.csv.
 
-Where the runs make one also benchmark.toml, and of a season ambient.csv.
+Where the runs make one also benchmark.toml.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Bench(Generic[AnyRun]):
     """One simulated machine on its test bench: how a run is simulated and logged, and the content of the TOML files.
 
     `simulate` takes a group of GROUPS and a number from 1. In benchmark.toml the lines `settings` come before the
-    groups and `rules` after them. `ambient` returns date and temperature [°C] of an impact-free run by its number.
+    groups and `rules` after them.
     """
 
     simulate: Callable[[str, int], AnyRun]
@@ -56,7 +56,6 @@ class Bench(Generic[AnyRun]):
     machine_toml: str
     settings: tuple[str, ...]
     rules: tuple[str, ...]
-    ambient: Callable[[int], tuple[str, float]] | None = None
 
 
 def without_references(machine_toml: str) -> str:
@@ -100,7 +99,7 @@ def write_folder(
 def _write_all(
     folder: Path, planned: list[_Planned], bench: Bench[AnyRun], progress: Callable[[int, int], None] | None
 ) -> None:
-    contacts, ambient = [], []
+    contacts = []
     for done, item in enumerate(planned, 1):
         run = bench.simulate(item.group, item.number)
         path = folder / item.group / f"{item.name}{item.suffix}"
@@ -108,22 +107,13 @@ def _write_all(
         (bench.write_mcap if item.suffix == ".mcap" else bench.write_csv)(path, run)
         if run.contact_start is not None:
             contacts.append((f"{item.group}/{path.name}", f"{run.contact_start:.6f}", item.group))
-        if bench.ambient and item.group == "free":
-            date, temperature = bench.ambient(item.number)
-            ambient.append((f"{item.group}/{path.name}", date, f"{temperature:.1f}"))
         if progress:
             progress(done, len(planned))
     (folder / "machine.toml").write_text(bench.machine_toml, encoding="utf-8", newline="\n")
     if not without_benchmark({group: sum(item.group == group for item in planned) for group in GROUPS}):
         (folder / "benchmark.toml").write_text(_benchmark_toml(planned, bench), encoding="utf-8", newline="\n")
-    _write_table(folder / "contacts.csv", [("recording", "true_contact_s", "kind"), *contacts])
-    if ambient:
-        _write_table(folder / "ambient.csv", [("recording", "date", "temperature_c"), *ambient])
-
-
-def _write_table(path: Path, rows: Sequence[tuple[str, ...]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerows(rows)
+    with (folder / "contacts.csv").open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows([("recording", "true_contact_s", "kind"), *contacts])
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ THRESHOLDS = Registry(
         "cusum": "cdtool.thresholds.cusum:Cusum",
         "glr": "cdtool.thresholds.glr:Glr",
         "combined": "cdtool.thresholds.combined:Combined",
-        "matched_banks": "cdtool.thresholds.matched_banks:MatchedBanks",
         "baseline": "cdtool.thresholds.baseline:Baseline",
     },
     contract=("name", "needs", "fitted", "safety_factor", "fit"),

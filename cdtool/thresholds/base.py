@@ -45,8 +45,7 @@ class KnownBand(Protocol):
         Returns
         -------
         statistic : Signal
-            What is compared with the band, on the signal's clock; status NO_LIMIT where no limit is known. Columns as
-            the signal, or a single one of the whole machine if the class says `whole_machine = True`.
+            What is compared with the band, on the signal's clock; status NO_LIMIT where no limit is known.
         band : Band
             Lower and upper limit (n, J), in the statistic's unit.
 
@@ -144,29 +143,6 @@ def is_per_run(threshold: Threshold | KnownBand | type) -> bool:
     (True, False)
     """
     return bool(getattr(threshold, "per_run", False))
-
-
-def judges_whole_machine(threshold: KnownBand | type) -> bool:
-    """Return whether the statistic of a threshold has one column, of the whole machine, whatever the signal has.
-
-    Parameters
-    ----------
-    threshold : KnownBand or type
-        A fitted threshold, or the class of one.
-
-    Returns
-    -------
-    bool
-        Its `whole_machine`, which is optional.
-
-    Examples
-    --------
-    >>> from cdtool.thresholds.limit import FittedLimit
-    >>> from cdtool.thresholds.matched_banks import FittedMatchedBanks
-    >>> judges_whole_machine(FittedMatchedBanks), judges_whole_machine(FittedLimit)
-    (True, False)
-    """
-    return bool(getattr(threshold, "whole_machine", False))
 
 
 def exceedance(

@@ -87,6 +87,7 @@ class FittedBaseline:
             column = np.empty((2, shape[0]))
             speed = np.abs(speeds[j])
             _first_seconds(signal.time, values, usable, speed, self.warm_up, self.widen, column[0], column[1])
+            column[1][column[1] <= 1e-12 * np.abs(column[0])] = 0.0  # rounding errors
             opposed[:, j] = _last_direction(speeds[j]) if signal.signed else 1.0
             centre[:, j], spread[:, j] = column
             status[usable & np.isnan(column[0]), j] = Status.START_UP
@@ -197,7 +198,6 @@ def _speeds(recording: Recording, signal: Signal) -> list[FloatArray]:
 @kernel(
     f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {READ_ONLY}, float64, b1, "
     "float64[::1], float64[::1])",
-    rare=True,
 )
 def _first_seconds(  # noqa: C901, PLR0913  a kernel: one loop, arrays and scalars one by one
     time: FloatArray,

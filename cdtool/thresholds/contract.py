@@ -9,7 +9,7 @@ import numpy as np
 from cdtool.detection import Band, Signal, contiguous
 from cdtool.errors import CdtoolError, RecordingError, SignatureError
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.base import FittedThreshold, KnownBand, Threshold, exceedance, judges_whole_machine
+from cdtool.thresholds.base import FittedThreshold, KnownBand, Threshold, exceedance
 from cdtool.thresholds.comparison_kernel import unknown_but_valid
 from cdtool.value_words import fault_and_place
 
@@ -78,8 +78,7 @@ def checked_evaluation(threshold: KnownBand, recording: Recording, signal: Signa
     Raises
     ------
     RecordingError
-        The threshold fails, returns other shapes than the signal's (one column if `whole_machine`), or NaN where its
-        status is valid.
+        The threshold fails, returns other shapes than the signal's, or NaN where its status is valid.
 
     Examples
     --------
@@ -97,7 +96,7 @@ def checked_evaluation(threshold: KnownBand, recording: Recording, signal: Signa
         raise
     except Exception as fault:
         raise RecordingError(f"{recording.name}: threshold {name} fails: {fault_and_place(fault)}", _HINT) from fault
-    shape = (len(signal.time), 1) if judges_whole_machine(threshold) else signal.values.shape
+    shape = signal.values.shape
     if any(np.shape(item) != shape for item in (statistic.values, statistic.status, band.lower, band.upper)):
         raise RecordingError(f"{recording.name}: threshold {name} returns another shape than {shape}", _HINT)
     values, status, lower, upper = (item.reshape(-1) for item in contiguous(statistic, band))

@@ -29,6 +29,8 @@ LEAST_RUNS = 2
 
 # The time curve reaches this much beyond the slowest run's acceleration.
 _TIME_RESERVE = 1.5
+#: 40 m in steps of 2 mm; memory and time grow with the places, and a wrong unit makes a thousand times as many.
+_MOST_PLACES = 20_000
 
 
 @dataclass(frozen=True)
@@ -144,8 +146,16 @@ class Signature:
         # In time the grid and the window are what they are in position at the nominal speed.
         pace = 1.0 / motion.nominal_speed
         step, window = pace * self.position_step, pace * self.position_window
-        by_time = Curve.empty(step, window, self._longest_time(wheres), joints)
+        lasting = self._longest_time(wheres)
         longest = max((float(np.nanmax(where.travel, initial=0.0)) for where in wheres), default=0.0)
+        if max(longest / self.position_step, lasting / step) > _MOST_PLACES:
+            unit = pairs[0][0]["position"].unit
+            raise UsageError(
+                f"a travel of {longest:.6g} {unit} has more than {_MOST_PLACES:,} places of {self.position_step:g} "
+                f"{unit}: transmission_ratio or the position's unit may be wrong",
+                "correct it, or set a larger position_step in [signature]",
+            )
+        by_time = Curve.empty(step, window, lasting, joints)
         by_position = Curve.empty(self.position_step, self.position_window, longest, joints)
         samples: tuple[list[FloatArray], list[FloatArray]] = ([], [])
         for (_, signal), where in zip(pairs, wheres, strict=True):
@@ -177,7 +187,8 @@ class Signature:
         if runs < enough:
             many = "run" if runs == 1 else "runs"
             more = f"{enough - runs} more {'is' if enough - runs == 1 else 'are'} needed to have {enough}"
-            fewer = f"to learn from fewer, but at least {LEAST_RUNS}: --force, or force = true in [signature]"
+            how = "learn-signature --force, or force = true in [signature]"
+            fewer = f"to learn from fewer, but at least {LEAST_RUNS}: {how}"
             raise SignatureError(
                 f"{runs} impact-free {many} of one class: {more}", "add runs" if self.force else f"add runs; {fewer}"
             )

@@ -139,7 +139,6 @@ def over_speeds(thresholds: Sequence[KnownBand]) -> tuple[KnownBand, ...]:
 @kernel(
     f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {READ_ONLY}, {_TABLES}, {_TABLES}, "
     "float64[:,::1], float64[:,::1], float64[:,::1])",
-    rare=True,
 )
 def interpolate(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.evaluation.statistics.bootstrap import bca
 from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import binomial_share
+from cdtool.evaluation.statistics.spread import mean_interval
 from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.tuning.candidate import Candidate
@@ -191,7 +191,6 @@ def results_of(
     force: FloatArray,
     assessable: np.ndarray[Any, np.dtype[np.bool_]],
     counts: tuple[int, int],
-    seed: int,
 ) -> ChoiceResults:
     """Return the results of latencies [s] and forces [N] of all contacts (C,); `counts`: alarming and free runs."""
     recordings = objective.recordings
@@ -207,7 +206,7 @@ def results_of(
             int(missed.sum()),
             int((~assessable[own]).sum()),
             float(np.mean(values[own])),
-            bca(values[own], range(int(own.sum())), "mean", seed=seed),
+            mean_interval(values[own], range(int(own.sum()))),
             (float(np.min(values[own])), float(np.max(values[own]))),
             float(np.quantile(values[own], 0.95)),
             float(np.mean(known)) if len(known) else math.nan,
@@ -216,22 +215,22 @@ def results_of(
     return ChoiceResults(found, *counts, objective.score(costs), costs)
 
 
-def held_out_results(objective: Objective, made: Pooled | None, seed: int) -> ChoiceResults | None:
+def held_out_results(objective: Objective, made: Pooled | None) -> ChoiceResults | None:
     """Return the results of all folds together; None if one could not be assessed."""
     if made is None:
         return None
     counts = (made.alarming, made.free)
-    return results_of(objective, made.latency, made.force, made.assessable, counts, seed)
+    return results_of(objective, made.latency, made.force, made.assessable, counts)
 
 
-def apparent_results(objective: Objective, searched: Searched, item: Scored, seed: int) -> ChoiceResults | None:
+def apparent_results(objective: Objective, searched: Searched, item: Scored) -> ChoiceResults | None:
     """Return the results of a candidate on the recordings used to choose it; None if it cannot be used."""
     measured = searched.measured[item.candidate.key]
     if measured.reason:
         return None
     at = item.debounce, 0
     counts = (int(measured.alarming[at]), len(objective.recordings.free))
-    return results_of(objective, measured.latency[at], measured.force[at], measured.assessable, counts, seed)
+    return results_of(objective, measured.latency[at], measured.force[at], measured.assessable, counts)
 
 
 def settings_of(candidate: Candidate, gains: Sequence[str]) -> dict[str, Any]:

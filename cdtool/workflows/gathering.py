@@ -268,7 +268,7 @@ class Gathering:
 
     def results(self, provenance: Mapping[str, Any], calibration: Sequence[CalibrationResult] = ()) -> Results:
         """Return all results; raises RecordingError if no log could be scored."""
-        if not self._exposure:
+        if not self._exposure and not self.setup.limits:
             first = self.skipped[0] if self.skipped else None
             reason = f"; first reason: {first.recording}: {first.reason}" if first else ""
             raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", "check with cdtool info")

@@ -19,6 +19,7 @@ from cdtool.short_repr import short_repr
 from cdtool.tables import read_toml
 from cdtool.version import __version__
 from cdtool.workflows.benchmark.benchmark_file import HOLDOUT, BenchmarkFile, read_benchmark_file
+from cdtool.workflows.benchmark.with_injected import mark_as_made
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.injection.inject_section import InjectSection, require_section
 from cdtool.workflows.injection.injected_logs import CONTACTS, InjectedLogs, write_injected, write_recording
@@ -102,6 +103,7 @@ def inject(
         injected = write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
         copied = _copy_learned(setup, section, part)
         _write_benchmark(setup, injected, copied, part)
+        mark_as_made(part, setup, section)
     return Injected(str(folder), replace(injected, folder=folder), sum(map(len, copied.values())))
 
 

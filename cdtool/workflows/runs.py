@@ -13,7 +13,7 @@ from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.findings import Finding
-from cdtool.findings.channels import AbsentTruth
+from cdtool.findings.channels import AbsentTruth, UnitContradicted
 from cdtool.ingest.reading import is_bag_folder, read_as_logged, read_recording
 from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
@@ -28,6 +28,8 @@ from cdtool.workflows.log_checks.log_findings import log_warnings
 
 # Folders of which every worker of a cluster must see a log, before it reads others.
 _FOLDERS = 50
+# Without these nothing is learned from a run: its motion and its load.
+_LEARNED_FROM = ("torque", "speed", "position")
 
 
 @dataclass(frozen=True)
@@ -85,22 +87,6 @@ def read_log(log: str | Path, machine: str | Path | MachineFile, ranges: Plausib
     """Read a log through a machine file, as `cdtool.read` describes; raises CdtoolError."""
     machine_file = machine if isinstance(machine, MachineFile) else read_machine_file(machine)
     return _with_channels(location(log), read_recording(location(log), machine_file, ranges))
-
-
-def load_operations(
-    path: Path,
-    machine_file: MachineFile,
-    how: str,
-    base: Path | None = None,
-    ranges: PlausibleRanges | None = None,
-    onset: OnsetRule | None = None,
-) -> tuple[Recording, list[Operation]]:
-    """Return one log's recording, named by its path below `base`, and its operations; CdtoolError names the file.
-
-    A force with several axes is a magnitude, their rest levels removed by the `onset` rule.
-    """
-    recording = read_named(path, machine_file, base, ranges, onset)
-    return recording, operations_of(recording, how)
 
 
 def read_named(
@@ -176,6 +162,8 @@ def _lost_run(path: Path, reason: str) -> _NotRead:
 
 def _with_channels(path: Path, recording: Recording) -> Recording:
     if not recording.channels:
+        for item in absent_truth(recording):
+            raise RecordingError(f"{path}: {item}")
         raise RecordingError(f"{path}: no channel is mapped", "add [channels] to the machine file")
     return recording
 
@@ -221,9 +209,9 @@ def load_runs(
 ) -> Runs:
     """Return the operations of many impact-free logs; a log that cannot be read is left out and reported.
 
-    Also left out: a log that is given twice or has the content of another one, and an operation in which the load cell
-    shows a contact. Values that no sensor can measure are masked: those outside the plausible `ranges`, which are
-    learned from all these logs if none are given.
+    Also left out: a log that is given twice or has the content of another one, a log whose header contradicts the unit
+    of its motion or torque, and an operation in which the load cell shows a contact. Values that no sensor can measure
+    are masked: those outside the plausible `ranges`, which are learned from all these logs if none are given.
     """
     rule, base = reading.onset or OnsetRule(), reading.base
     paths, repeated = _each_once(paths)
@@ -254,6 +242,7 @@ def load_runs(
         try:
             if isinstance(item, CdtoolError):
                 raise item
+            _refuse_doubted(path, item.recording)
             recording = item.on_load_side(machine_file.machine, known.all, to_learn=True)
             recording = with_scalar_force(replace(recording, name=shown_path(path, base)), rule)
             contacts: Sequence[Contact] | None = None
@@ -369,12 +358,20 @@ def lost(recording: Recording) -> list[RecordingFinding]:
 
 
 def absent_truth(recording: Recording) -> list[Finding]:
-    """Return the notes about ground truth of contacts that the machine file maps but the log does not contain."""
+    """Return the findings about ground truth of contacts that is mapped, but not in the log or in a doubtful unit."""
     return [
         item
         for item in recording.findings
-        if isinstance(item.fact, AbsentTruth) and item.channel in SHOWS_CONTACTS and item.channel not in recording
+        if isinstance(item.fact, AbsentTruth | UnitContradicted)
+        and item.channel in SHOWS_CONTACTS
+        and item.channel not in recording
     ]
+
+
+def _refuse_doubted(path: Path, recording: Recording) -> None:
+    for item in recording.findings:
+        if isinstance(item.fact, UnitContradicted) and item.severity == "loss" and item.channel in _LEARNED_FROM:
+            raise RecordingError(f"{path}: {item}")
 
 
 def _glob(path: Path) -> Iterator[Path]:

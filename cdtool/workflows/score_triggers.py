@@ -13,7 +13,7 @@ import numpy as np
 from cdtool.detection import WHOLE_MACHINE, Alarm, Band, Signal, Status, Verdict
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
-from cdtool.evaluation.limits import ALL
+from cdtool.evaluation.limits import ALL, unchecked
 from cdtool.evaluation.results import RecordingFinding, RecordingResult, Skipped
 from cdtool.evaluation.traces.trace import Trace
 from cdtool.evaluation.truth.trigger_file import Triggered, TriggerFile, read_triggers
@@ -136,6 +136,7 @@ def _run(
     gathered.score(lambda: scoring, work, workers, progress)
     if runs:
         gathered.skipped += _without_run(said, known, gathered.scored)
+    gathered.findings += unchecked(setup.limits, names, str(setup.path))
     results = gathered.results(_provenance(setup, given, clock))
     rules = [rule for rule in setup.limits if rule.detector in (ALL, *names)]
     return Score(evaluate(results, rules), gathered.traces, (given.path, *setup.inputs))

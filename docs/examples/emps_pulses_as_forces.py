@@ -24,12 +24,10 @@ from cdtool.machine_file import read_machine_file
 from cdtool.operations import Operation, operations_of
 from cdtool.pipeline import Detection, detect_operation
 from cdtool.recording import FloatArray, Recording
-from cdtool.thresholds.own_rule import rule_for
-from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.signature.fitting import fit_operations
 
-DETECTORS = ("fused", "gm", "pt")
+DETECTORS = ("gm", "pt")
 RULE = Signature(sides="one", force=True)
 # An alarm belongs to a step of the force up to this long after it [s].
 WINDOW = 0.3
@@ -68,10 +66,9 @@ def main(folder: Path) -> int:
     struck = operations_of(without_pulses(logged, pulse, 35.15), "motion")
     for name in DETECTORS:
         detector: Any = machine.detector(name)
-        rule = with_context(rule_for(detector, RULE), "one", RULE)
 
-        def verdict(stroke: Operation, runs: list[Operation], detector: Any = detector, rule: Any = rule) -> Detection:
-            fitted = fit_operations(runs, machine.machine, detector, rule).thresholds
+        def verdict(stroke: Operation, runs: list[Operation], detector: Any = detector) -> Detection:
+            fitted = fit_operations(runs, machine.machine, detector, RULE).thresholds
             return detect_operation(stroke, machine.machine, detector, fitted, Activation(debounce=3))
 
         quiet = [verdict(stroke, [other for other in free if other is not stroke]) for stroke in free]

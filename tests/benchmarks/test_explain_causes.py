@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "explain_causes.py"
+from tests.project.pages import benchmark_script
 
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it imports modules from its own folder."""
-    kept = list(sys.path)
-    sys.path.insert(0, str(SCRIPT.parent))
-    try:
-        spec = importlib.util.spec_from_file_location("explain_causes", SCRIPT)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["explain_causes"] = module
-        spec.loader.exec_module(module)
-    finally:
-        sys.path[:] = kept
+    module = benchmark_script("explain_causes")
     two = (module.benches()[1], module.benches()[2])
     module.benches = lambda: two
     return module

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "installed_size.py"
+from tests.project.pages import benchmark_script
 
 
 @pytest.fixture(scope="module")
-def script():
-    spec = importlib.util.spec_from_file_location("installed_size", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["installed_size"] = module  # a dataclass looks its module up by name
-    spec.loader.exec_module(module)
-    return module
+def script() -> ModuleType:
+    return benchmark_script("installed_size")
 
 
 def put(folder: Path, name: str, files: dict[str, int], *requires: str) -> None:

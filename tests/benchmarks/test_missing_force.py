@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "missing_force.py"
+from tests.project.pages import benchmark_script
 
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it imports modules from its own folder."""
-    kept = list(sys.path)
-    sys.path.insert(0, str(SCRIPT.parent))
-    try:
-        spec = importlib.util.spec_from_file_location("missing_force", SCRIPT)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["missing_force"] = module
-        spec.loader.exec_module(module)
-    finally:
-        sys.path[:] = kept
-    return module
+    return benchmark_script("missing_force")
 
 
 def test_no_hole_causes_an_unmarked_wrong_onset_or_an_unmeasured_pass(script):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "same_report.py"
+from tests.project.pages import benchmark_script
+
 OLD = {
     "report.html": (
         "<table><tr><th>largest figure</th></tr><tr><td>quick</td><td>33.5 <small>(–)</small></td></tr>"
@@ -24,12 +23,7 @@ OLD = {
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("same_report", SCRIPT)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return benchmark_script("same_report")
 
 
 @pytest.fixture

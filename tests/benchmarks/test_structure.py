@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import itertools
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from textwrap import dedent
@@ -15,25 +13,14 @@ import numpy as np
 import pytest
 
 import cdtool
+from tests.project.pages import benchmark_script
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "structure.py"
 _numbers = itertools.count()
 
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it imports modules from its own folder."""
-    kept = list(sys.path)
-    sys.path.insert(0, str(SCRIPT.parent))
-    try:
-        spec = importlib.util.spec_from_file_location("structure", SCRIPT)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["structure"] = module
-        spec.loader.exec_module(module)
-    finally:
-        sys.path[:] = kept
-    return module
+    return benchmark_script("structure")
 
 
 @pytest.fixture

@@ -53,3 +53,11 @@ def test_a_file_compared_with_itself_or_a_copy_is_reported_as_identical(results,
     assert done.status == 0
     assert done.out.splitlines()[-1].endswith(": both files contain the same results")
     assert "too few" not in done.out and "would have been" not in done.out
+
+
+@pytest.mark.parametrize(("options", "status"), [((), 0), (("--fail-if-later",), 1), (("--require-power",), 4)])
+def test_later_on_the_same_contacts_exits_with_1_if_asked(options, status, results):
+    old, new, _ = results
+    done = cdtool("compare", old, new, *options)
+    assert done.status == status and "on the same 2 contacts: 2 later by " in " ".join(done.out.split())
+    assert cdtool("compare", new, old, *options).status == (0 if "--fail-if-later" in options else status)

@@ -143,14 +143,6 @@ def _update(files: Folder, *logs: Path) -> Outcome:
     return cdtool("signature", "update", files.path / "u.json", *logs, "-m", files.machine)
 
 
-def _forecast(files: Folder, *more: Path) -> Outcome:
-    made = cdtool("simulate", "season", "--runs", 33, "--runs-per-day", 3, "-o", files.path / "season")
-    assert made.status == 0, made.err
-    logs = sorted((files.path / "season" / "free").iterdir())
-    table = ("--ambient", files.path / "season" / "ambient.csv", "--false-alarm-budget", "1/100op")
-    return cdtool("signature", "forecast", files.signature, *logs, *more, "-m", files.machine, *table)
-
-
 def _write_protocol(files: Folder, peaks: Sequence[float]) -> Outcome:
     write_rig(files.path, [half_sine(peak) for peak in peaks])
     return cdtool("protocol", "write", write_protocol(files.path), "-o", files.path / "p.html")
@@ -177,7 +169,6 @@ GATE_RUN, ARM_RUN = (
     _simulate("gate", "--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0),
     _simulate("arm", "--free", 1, "--holdout", 0, "--stiff", 0, "--soft", 0),
 )
-SEASON = _simulate("season", "--runs", 1)
 VIOLATED = '[limits]\n"*.*.missed" = { max = -1 }\n'
 
 DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
@@ -242,11 +233,6 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("signature check", 0): lambda f: cdtool("signature", "check", f.signature, *f.free(11), "-m", f.machine),
     ("signature check", 2): lambda f: cdtool("signature", "check", f.signature, f.absent, "-m", f.machine),
     ("signature check", 3): lambda f: cdtool("signature", "check", f.signature, *f.free(11), f.empty, "-m", f.machine),
-    ("signature forecast", 0): lambda f: _forecast(f),
-    ("signature forecast", 2): lambda f: cdtool(
-        "signature", "forecast", f.signature, *f.free(3), "-m", f.machine, "--false-alarm-budget", "1/100op"
-    ),
-    ("signature forecast", 3): lambda f: _forecast(f, f.empty),
     ("signature update", 0): lambda f: _update(f, f.gate / "holdout" / "01.csv"),
     ("signature update", 2): lambda f: _update(f, f.absent),
     ("signature update", 3): lambda f: _update(f, f.gate / "holdout" / "01.csv", f.empty),
@@ -267,8 +253,6 @@ DRIVEN: dict[tuple[str, int], Callable[[Folder], Outcome]] = {
     ("simulate gate", 2): GATE_RUN[1],
     ("simulate arm", 0): ARM_RUN[0],
     ("simulate arm", 2): ARM_RUN[1],
-    ("simulate season", 0): SEASON[0],
-    ("simulate season", 2): SEASON[1],
     ("study sensors", 0): lambda _: cdtool(
         "study", "sensors", "-m", GATE / "machine.toml", "--speed", 0.2, "--stiffness", 5e5
     ),

@@ -70,7 +70,7 @@ def test_an_uncut_log_of_two_strokes_gets_a_hint_how_to_cut_it(tmp_path, more):
     file, log = benchmark_of(tmp_path, two_strokes(), more)
     scored, detected = cdtool("benchmark", file), cdtool("detect", log, "-b", file)
     for done in (scored, detected):
-        told = 'not assessable: cut it with operations = "motion" in the benchmark file, or --operations motion'
+        told = 'not assessable: cut it with operations = "motion" in the benchmark file, or detect --operations motion'
         assert (told in done.err) == (not more)
         assert done.err.count("cut it with") <= 1
     assert ("1 not assessable" in scored.out) == (not more)

@@ -128,3 +128,16 @@ def test_a_log_that_is_not_cut_keeps_the_limits_of_its_first_seconds_and_monitor
     assert 10.0 <= whole.verdict.alarms[0].time < 10.2, "unknown friction changes sign"
     (both,) = detections("whole", "two")
     assert 9.0 <= both.verdict.alarms[0].time < 9.2, "unknown friction ends with the motion"
+
+
+@pytest.mark.parametrize("limits", ["15", "[15]"])
+def test_a_limit_set_by_hand_needs_no_runs_to_learn_from(gate_folder, tmp_path, limits):
+    file = gate_folder / "by_hand.toml"
+    text = BENCHMARK.format(learn="").replace('name = "baseline", warm_up = 0.8', f'name = "limit", limits = {limits}')
+    file.write_text(text.replace('["gm", "feekf"]', '["gm"]'), encoding="utf-8")
+    done = cdtool("benchmark", file, "-o", tmp_path / "r.json")
+    assert done.status == 0, done.err
+    rows = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))["contacts"]
+    assert {(row["outcome"], row["limit"]) for row in rows} == {("detected", -15.0)}
+    done = cdtool("detect", gate_folder / rows[0]["recording"], "--benchmark", file)
+    assert done.status == 0 and "set by hand" in one_line(done.out), done.err

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from cdtool.report.protocol.names import protocol_names
 from tests.command import Outcome, cdtool
 from tests.synthetic.force_rig import half_sine, write_protocol, write_rig
 
@@ -128,12 +129,25 @@ def test_the_exit_status_is_that_of_the_verdict(flaws, status, word, rig, tmp_pa
     assert (made.status, f"protocol: {word}" in made.out) == (status, True), made.out + made.err
 
 
-def test_a_fail_exits_with_1(tmp_path):
+def test_a_failed_protocol_is_the_first_sentence_everywhere_and_exits_with_1(tmp_path):
     write_rig(tmp_path, [half_sine(peak) for peak in (700.0, 710.0, 720.0)])
-    made = cdtool(
-        "benchmark", tmp_path / "benchmark.toml", "-p", write_protocol(tmp_path), "-o", tmp_path / "protocol.html"
+    benchmark = tmp_path / "benchmark.toml"
+    limits = '\n[limits]\n"*.missed" = { max = 3 }\n"*.false_alarms" = { max = 9 }\n'
+    benchmark.write_text(benchmark.read_text(encoding="utf-8") + limits, encoding="utf-8")
+    targets = [tmp_path / name for name in ("protocol.html", "report.html", "report.md", "junit.xml", "results.json")]
+    options = [word for path in targets for word in ("-o", path)]
+    made = cdtool("benchmark", benchmark, "-p", write_protocol(tmp_path), *options)
+    fail = "est protocol: fail: 1 of 1 measuring points do not pass"
+    assert made.status == 1 and made.out.startswith(f"t{fail}; all 2 limits are met")
+    document, html, markdown, junit, results = (path.read_text(encoding="utf-8") for path in targets)
+    assert fail.partition("fail: ")[2] in document
+    assert f'<p class="verdict bad"><strong>T{fail}; all 2' in html
+    assert (
+        markdown.startswith(f"# Collision detection: t{fail}; all 2") and f'"failure" message="t{fail}; all 2' in junit
     )
-    assert made.status == 1 and "protocol: fail" in made.out
+    assert json.loads(results)["conclusion"]["headline"].startswith(f"t{fail}; all 2")
+    again = cdtool("report", targets[-1])
+    assert (again.status, again.out.splitlines()[0]) == (1, made.out.splitlines()[0])
 
 
 def test_a_protocol_and_other_reports_are_written_together_and_only_their_own_files_replaced(rig, tmp_path):
@@ -146,6 +160,29 @@ def test_a_protocol_and_other_reports_are_written_together_and_only_their_own_fi
     (tmp_path / "gate-protocol.html").write_text("written by hand", encoding="utf-8")
     refused = cdtool("benchmark", rig / "benchmark.toml", "-p", path, *targets)
     assert refused.status == 2 and "contains no test protocol of cdtool" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("names", "protocols"),
+    [
+        (["prot.pdf"], ["prot.pdf"]),
+        (["gate 7.HTML", "report.html", "results.json"], ["gate 7.HTML"]),
+        (["latency.pdf", "prot.html"], ["prot.html"]),
+        (["protocol.pdf", "gate.html"], ["protocol.pdf"]),
+        (["report.html", "latency.pdf"], []),
+    ],
+)
+def test_with_p_every_pdf_or_html_is_the_protocol_unless_one_has_its_name(names, protocols):
+    documents, others = protocol_names([Path(name) for name in names], is_wanted=True)
+    assert [path.name for path in documents] == protocols
+    assert [path.name for path in others] == [name for name in names if name not in protocols]
+    assert protocol_names([Path("prot.pdf")], is_wanted=False)[0] == []
+
+
+def test_with_p_the_protocol_may_have_any_name(rig, tmp_path):
+    made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "prot.html")
+    assert (made.status, "written: " in made.out) == (0, True)
+    assert "<title>Test protocol" in (tmp_path / "prot.html").read_text(encoding="utf-8")
 
 
 def test_a_protocol_without_its_file_and_a_file_without_a_protocol_name_the_next_step(rig, tmp_path):
@@ -166,7 +203,7 @@ def test_without_typst_a_pdf_is_refused_before_the_benchmark_runs(rig, tmp_path,
     monkeypatch.setitem(__import__("sys").modules, "typst", None)
     made = cdtool("benchmark", rig / "benchmark.toml", "-p", write_protocol(rig), "-o", tmp_path / "protocol.pdf")
     assert made.status == 2 and made.out == ""
-    assert "pip install 'cdtool[pdf]'" in made.err and len(made.err.splitlines()) == 1
+    assert "pip install '.[pdf]'" in made.err and len(made.err.splitlines()) == 1
 
 
 def test_a_pdf_has_every_number_of_the_results_that_the_protocol_shows(rig, tmp_path):

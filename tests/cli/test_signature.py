@@ -8,16 +8,15 @@ from pathlib import Path
 import pytest
 
 from tests.command import Outcome, cdtool
+from tests.synthetic.ageing import write_ageing_gate
 
 
 @pytest.fixture(scope="module")
 def seasons(tmp_path_factory) -> Path:
     """30 runs each: no change, friction increased by half, an obstruction growing at 0.9 m."""
     folder = tmp_path_factory.mktemp("seasons")
-    changes = {"quiet": (), "friction": ("--friction-change", 0.5), "stone": ("--obstruction-growth", 8)}
-    for name, change in changes.items():
-        done = cdtool("simulate", "season", "--runs", 30, *change, "--seed", 3, "-o", folder / name)
-        assert done.status == 0, done.err
+    for name, change in {"quiet": {}, "friction": {"friction": 1.5}, "stone": {"obstruction": 8.0}}.items():
+        write_ageing_gate(folder / name, 30, 3, **change)
     return folder
 
 

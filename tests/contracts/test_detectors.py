@@ -247,12 +247,9 @@ def test_several_joints_are_what_each_is_alone_and_their_order_does_not_matter(n
     both = detector.signal(pair(a, b, ("x", "y")), machine)
     swapped = detector.signal(pair(b, a, ("y", "x")), machine)
     one = detector.signal(cut(a, a["speed"].time[n - 1]), alone)
-    names = both.channels or (("", "x"), ("", "y"))
-    of_x = [i for i, (_, joint) in enumerate(names) if joint == "x"]
-    np.testing.assert_array_equal(both.values[:, of_x], one.values[:n])
-    there = [(swapped.channels or (("", "y"), ("", "x"))).index(item) for item in names]
-    np.testing.assert_array_equal(both.values, swapped.values[:, there])
-    np.testing.assert_array_equal(both.status, swapped.status[:, there])
+    np.testing.assert_array_equal(both.values[:, :1], one.values[:n])
+    np.testing.assert_array_equal(both.values, swapped.values[:, ::-1])
+    np.testing.assert_array_equal(both.status, swapped.status[:, ::-1])
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -266,8 +263,6 @@ def test_the_order_of_a_robots_joints_does_not_matter(name, tmp_path):
     detector = DETECTORS.load(name)()
     one, other = detector.signal(recording, straight), detector.signal(permuted, mixed)
     columns = slice(None) if one.joints == WHOLE_MACHINE else order
-    if one.channels:
-        columns = [one.joints.index(name) for name in other.joints]
     scale = np.abs(one.values).max()
     np.testing.assert_allclose(other.values, one.values[:, columns], rtol=1e-9, atol=1e-9 * scale)
     np.testing.assert_array_equal(other.status, one.status[:, columns])
@@ -313,9 +308,6 @@ def test_at_rest_it_finds_nothing_or_says_that_it_cannot_judge(name, subject):
     if name in ("energy", "friction_ekf"):
         assert (signal.status[4000:] == Status.NOT_APPLICABLE).all()
         assert "not applicable" in signal.why_not()
-    elif signal.channels:
-        moving = [i for i, (channel, _) in enumerate(signal.channels) if channel in ("speed", "acceleration")]
-        np.testing.assert_array_equal(signal.values[4000:, moving], 0.0)
     elif name in DETECTORS.table:
         expected = torque if name == "pure_torque" else 0.0
         assert signal.valid[4000:].all()

@@ -37,11 +37,9 @@ def test_each_joint_has_its_own_gains(name, axes):
     signal = detector(**own).signal(recording, axes)
     for j in (0, 1):
         alone = detector(**{gain: values[j] for gain, values in own.items()}).signal(recording, axes)
-        names = signal.channels or tuple(("", joint) for joint in axes.joints)
-        columns = [i for i, (_, joint) in enumerate(names) if joint == axes.joints[j]]
-        np.testing.assert_array_equal(signal.values[:, columns], alone.values[:, columns])
-        np.testing.assert_array_equal(signal.status[:, columns], alone.status[:, columns])
-    assert np.abs(signal.values - shared.signal(recording, axes).values)[:, columns].max() > 0.0
+        np.testing.assert_array_equal(signal.values[:, j], alone.values[:, j])
+        np.testing.assert_array_equal(signal.status[:, j], alone.status[:, j])
+    assert np.abs(signal.values - shared.signal(recording, axes).values)[:, 1].max() > 0.0
 
 
 @pytest.mark.parametrize("name", NAMES)

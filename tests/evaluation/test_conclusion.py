@@ -8,11 +8,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from markupsafe import escape
 
 from cdtool.evaluation.evaluated import Evaluated, evaluate
-from cdtool.evaluation.limits import LimitRule
+from cdtool.evaluation.limits import LimitRule, unchecked
 from cdtool.evaluation.results import (
     SCHEMA_VERSION,
+    CalibrationResult,
     ConclusionResult,
     ContactResult,
     ExposureResult,
@@ -22,6 +24,7 @@ from cdtool.evaluation.results import (
     Skipped,
 )
 from cdtool.evaluation.results_file import migrated, read_results, to_json
+from cdtool.notebook.benchmark_result import BenchmarkResult
 from cdtool.report.html.page import to_html
 from cdtool.report.markdown.report import to_markdown
 from cdtool.report.writers.base import Report
@@ -137,21 +140,92 @@ def test_force_misses_and_unassessable_contacts_count_the_same_everywhere(name, 
     made, outcome, status, words, tone, failures, errors = CASES[name]
     evaluated = evaluate(made, [MET])
     conclusion = evaluated.results.conclusion
-    assert (conclusion.outcome, conclusion.exit_status) == (outcome, status)
+    assert conclusion.outcome == outcome
     assert words in conclusion.headline and "all 1 limits" not in conclusion.headline
+    junit = assert_same_everywhere(evaluated, tone, status, tmp_path)
+    # The conclusion is a case of its own.
+    assert (int(junit.attrib["failures"]), int(junit.attrib["errors"])) == (failures + (tone == "bad"), errors)
+
+
+def assert_same_everywhere(evaluated: Evaluated, tone: str, status: int, folder: Path) -> ElementTree.Element:
+    """Check that screen, HTML, Markdown, JUnit, JSON and Python open with one sentence in one colour."""
+    conclusion, head = evaluated.results.conclusion, evaluated.results.conclusion.headline
     html, markdown, junit, stored = reports(evaluated)
-    head = conclusion.headline
-    assert f'<p class="verdict {tone}"><strong>{head[:1].upper()}{head[1:]}</strong>' in html
+    assert (conclusion.tone, conclusion.exit_status) == (tone, status)
+    shown = str(escape(f"{head[:1].upper()}{head[1:]}"))
+    assert f'<p class="verdict {tone}"><strong>{shown}</strong>' in html
     assert markdown.startswith(f"# Collision detection: {head}\n")
-    assert stored["outcome"] == outcome and stored["exit_status"] == status and stored["headline"] == head
-    assert (int(junit.attrib["failures"]), int(junit.attrib["errors"])) == (failures, errors)
-    file = tmp_path / "results.json"
+    assert (stored["tone"], stored["exit_status"], stored["headline"]) == (tone, status, head)
+    first = junit.find("testsuite/testcase")
+    assert first.get("name") == "conclusion" and first.findtext("system-out").splitlines()[0] == head
+    assert [item.tag for item in first][:-1] == {"bad": ["failure"], "unknown": ["skipped"]}.get(tone, [])
+    assert (int(junit.attrib["failures"]) > 0) == (status == 1)
+    result = BenchmarkResult(evaluated)
+    assert result.headline == head and head[:40] in repr(result) and str(escape(head)) in result._repr_html_()
+    file = folder / "results.json"
     file.write_text(to_json(evaluated.results), encoding="utf-8")
     done = cdtool("report", file)
-    assert done.status == status
-    assert " ".join(done.out.split()).startswith(head)
+    assert done.status == status and " ".join(done.out.split()).startswith(head)
     for reason in conclusion.reasons:
         assert " ".join(reason.split()) in " ".join(done.out.split())
+    return junit
+
+
+FREE = {"holdout": ["momentum"], "false_alarms": {("momentum", "holdout"): 24}}
+LOST_PART = (RecordingFinding("a.csv", "its end is cut off", "loss"),)
+SET = (CalibrationResult("momentum", "1/5op", 5.5, 40, 1.0, 7),)
+ABSENT = unchecked([LimitRule("gm.missed", "gm", "*", "missed", largest=0)], ["momentum"], "benchmark.toml")
+# Results, limits, protocol, colour, exit status, and the whole sentence.
+WORST = {
+    "a failed protocol before limits that are met": (
+        results([40.0] * 4), [MET], ("fail", "test protocol: fail: limits exceeded at 1 of 2 points", "edge: 512 N"),
+        "bad", 1, "test protocol: fail: limits exceeded at 1 of 2 points; the limit is met",
+    ),
+    "an incomplete protocol before limits that are met": (
+        results([40.0] * 4), [MET], ("incomplete", "test protocol: incomplete"),
+        "unknown", 4, "test protocol: incomplete; the limit is met",
+    ),
+    "a protocol that passes": (
+        results([40.0] * 4), [], ("pass", "test protocol: pass"),
+        "good", 0, "test protocol: pass; no limits are set",
+    ),
+    "false alarms before what is not assessable": (
+        replace(results([NOT_ASSESSABLE] * 3, **FREE), detectors=("momentum",)), [], (),
+        "unknown", 3,
+        "24 false alarms without a limit; nothing could be assessed in 1 of 2 pairs of detector and group; "
+        "no limits are set",
+    ),
+    "a limit decides about false alarms": (
+        results([40.0] * 3, **FREE), [LimitRule("*.false_alarms", "*", "*", "false_alarms", largest=30)], (),
+        "good", 0, "all 2 limits are met",
+    ),
+    "false alarms within a budget": (
+        replace(results([40.0] * 3, holdout=["momentum"], false_alarms={("momentum", "holdout"): 8}), calibration=SET),
+        [], (), "", 0, "no limits are set",
+    ),
+    "false alarms above a budget": (
+        replace(results([40.0] * 3, **FREE), calibration=SET), [], (), "unknown", 0,
+        "more false alarms than the budget: 24 of 40 runs alarm where 1/5op allows 8 "
+        "(chance below 0.1 %); no limits are set",
+    ),
+    "limits of a detector that was not run": (
+        replace(results([40.0] * 3), findings=tuple(ABSENT)), [], (), "", 0,
+        "1 of 1 limits are set for detectors that were not run (gm): not checked",
+    ),
+    "what was lost before limits that are met": (
+        replace(results([40.0] * 3), findings=LOST_PART, skipped=(Skipped("b.csv", "empty"),)), [MET], (), "unknown", 3,
+        "1 entry left out; data lost in 1 recording; the limit is met",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WORST)
+def test_every_surface_opens_with_the_worst_fact(name, tmp_path: Path):
+    made, limits, protocol, tone, status, sentence = WORST[name]
+    evaluated = evaluate(made, limits)
+    evaluated = evaluated.with_protocol(*protocol) if protocol else evaluated
+    assert evaluated.results.conclusion.headline == sentence
+    assert_same_everywhere(evaluated, tone, status, tmp_path)
 
 
 def test_limits_met_are_not_a_pass_while_contacts_fail_at_3600_n():

@@ -152,4 +152,4 @@ def test_without_pyarrow_one_line_says_what_to_install(tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(UsageError, match="Parquet needs pyarrow") as refused:
         check_outputs([tmp_path / "results.parquet"])
-    assert "pip install 'cdtool[store]'" in str(refused.value.hint)
+    assert "pip install '.[store]'" in str(refused.value.hint)

@@ -58,7 +58,8 @@ SENTENCES: list[tuple[Fact, str]] = [
         clocks.BackwardStamps(3, 20, (3, 4, 5), "line", clocks.ClockRestart()),
         (
             "3 time stamps run backward (line 3, 4, 5), dropped (15 % of the rows); the clock starts again "
-            "there, or has jumped ahead before: cut the log there (--operations clock-reset), or correct its stamps"
+            "there, or has jumped ahead before: cut the log there (operations "
+            '= "clock-reset" in the benchmark file, or detect --operations clock-reset), or correct its stamps'
         ),
     ),
     (
@@ -506,27 +507,37 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         channels.UnitContradicted("v [mm/s]", "mm/s", 0, "m/s", 1000.0, "unit"),
         (
-            "the header says 'v [mm/s]', the machine file m/s (a factor of 1000): write unit = \"mm/s\" if "
-            "the header is right"
+            "the header says 'v [mm/s]', the machine file m/s (a factor of 1000), not assessable: write "
+            'unit = "mm/s" if the header is right, else unit_confirmed = true'
         ),
     ),
     (
         channels.UnitContradicted("i [A]", "A", 2, "N m", 0.0, "unit and scale", "N m per A"),
         (
-            "the header says 'i [A]' and 2 more so, the machine file N m: write unit = \"A\" with a scale in "
-            "N m per A if the header is right"
+            "the header says 'i [A]' and 2 more so, the machine file N m, not assessable: write unit = \"A\" "
+            "with a scale in N m per A if the header is right, else unit_confirmed = true"
         ),
     ),
     (
         channels.UnitContradicted("M [N m]", "N m", 0, "A", 0.0, "unit without scale"),
         (
-            "the header says 'M [N m]', the machine file A: write unit = \"N m\" without that scale if the "
-            "header is right"
+            "the header says 'M [N m]', the machine file A, not assessable: write unit = \"N m\" without that "
+            "scale if the header is right, else unit_confirmed = true"
         ),
     ),
     (
-        channels.UnitContradicted("T [K]", "K", 0, "N m", 0.0, "other column"),
-        "the header says 'T [K]', the machine file N m: is it another column?",
+        channels.UnitContradicted("T [kN]", "kN", 0, "N m", 0.0, "other column"),
+        (
+            "the header says 'T [kN]', the machine file N m, not assessable: map another column, or write "
+            "unit_confirmed = true if it is this one"
+        ),
+    ),
+    (
+        channels.UnitContradicted("F (raw)", "raw", 0, "N", 0.0, "no unit"),
+        (
+            "the header says 'F (raw)', the machine file N, which the header does not confirm: write "
+            "unit_confirmed = true if that is right"
+        ),
     ),
     (
         channels.DerivedSpeed(50.0),
@@ -748,14 +759,14 @@ SENTENCES: list[tuple[Fact, str]] = [
         scoring.LogNotCut(4, (3,)),
         (
             "contains 4 strokes in one operation, and stroke 3 is not assessable: cut it with operations = "
-            '"motion" in the benchmark file, or --operations motion'
+            '"motion" in the benchmark file, or detect --operations motion'
         ),
     ),
     (
         scoring.LogNotCut(4, (2, 3)),
         (
             "contains 4 strokes in one operation, and 2 of them are not assessable: cut it with operations = "
-            '"motion" in the benchmark file, or --operations motion'
+            '"motion" in the benchmark file, or detect --operations motion'
         ),
     ),
     (
@@ -764,8 +775,16 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (scoring.LearnedFromIt(), "the signature was learned from this log: the absence of alarms is no evidence"),
     (scoring.PlotsLeftOut(7), "7 more operations with a miss or a false alarm have no trigger plot"),
-    (scoring.LimitsUnchecked(1, 2), "1 of 2 limits are set for detectors that were not run: not checked"),
+    (scoring.LimitsUnchecked(1, 2, "gm"), "1 of 2 limits are set for detectors that were not run (gm): not checked"),
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
+    (
+        scoring.SpeedsPooled("limit", "forward at 0.2 m/s", "forward at 0.3 m/s"),
+        (
+            "the threshold limit pools runs forward at 0.2 m/s and forward at 0.3 m/s: its limits are too wide for one "
+            'of them; learn and score each speed in a benchmark file of its own, or set threshold = "signature", which '
+            "has limits by speed"
+        ),
+    ),
     (
         scoring.SingleSpeed("forward at 0.2 m/s"),
         (

@@ -135,7 +135,7 @@ def test_without_h5py_the_error_states_what_to_install_or_how_to_save(tmp_path, 
     with pytest.raises(RecordingError) as fault:
         Mat().columns(path)
     assert fault.value.message == f"{path}: is a MATLAB 7.3 (HDF5) file, and h5py is not installed"
-    assert fault.value.hint == "pip install 'cdtool[hdf5]'; or save it in MATLAB with save(name, ..., '-v7')"
+    assert fault.value.hint == "pip install '.[hdf5]'; or save it in MATLAB with save(name, ..., '-v7')"
 
 
 def test_a_dataset_in_other_files_is_not_followed(tmp_path):

@@ -22,9 +22,7 @@ LONGEST_LINE = 300
 _TRIGGERS = (
     "recording,time_s,detector,blind_until_s\nstiff/01.csv,6.1,plc,\nsoft/01.csv,,plc,\nstiff/02.csv,1.0,plc,2.0\n"
 )
-_AMBIENT = "recording,date,temperature_c\nfree/01.csv,2025-07-01T08:00,21.5\nfree/03.csv,2025-07-02,\n"
 _EXPECTED = "date,temperature_c\n2025-10-01,7.5\n2025-10-02T12:00,8\n"
-_FORECAST = "gate.json free/01.csv free/03.csv -m machine.toml --ambient ambient.csv --false-alarm-budget 1/10op"
 _LABELS = "recording,start_s,end_s,kind,uncertainty_s\nstiff/01.csv,6.0,6.5,hard,0.01\nstiff/02.csv,6.0,6.4,,\n"
 _LIMITS = """[own]
 title = "own"
@@ -150,9 +148,6 @@ _COMMANDS: tuple[tuple[str, str], ...] = (
     ("score triggers.csv -b labelled.toml", "labels.csv"),
     ("signature show gate.json", "gate.json"),
     ("signature check gate.json free/03.csv -m machine.toml", "gate.json"),
-    (f"signature forecast {_FORECAST}", "gate.json"),
-    (f"signature forecast {_FORECAST}", "ambient.csv"),
-    (f"signature forecast {_FORECAST} --expected expected.csv", "expected.csv"),
     ("signature update gate.json free/03.csv -m machine.toml", "gate.json"),
     ("study sensors -m machine.toml --study study.toml", "study.toml"),
     ("study sensors -m machine.toml --study study.toml", "machine.toml"),
@@ -248,7 +243,6 @@ def make_bench(folder: Path) -> None:
     (folder / "plan.toml").write_text(_PLAN)
     (folder / "model.toml").write_text((folder / "machine.toml").read_text() + _MODEL)
     (folder / "triggers.csv").write_text(_TRIGGERS)
-    (folder / "ambient.csv").write_text(_AMBIENT)
     (folder / "expected.csv").write_text(_EXPECTED)
     (folder / "own.toml").write_text(_LIMITS)
     (folder / "six.urdf").write_text(six_joint_urdf())

@@ -147,7 +147,7 @@ def test_a_solver_that_is_missing_is_named_with_its_extra(robot: UrdfRobot, monk
     monkeypatch.setitem(sys.modules, "cvxpy", None)
     with pytest.raises(ConfigurationError, match="not installed") as caught:
         consistent_fit(fit)
-    assert "cdtool[identify]" in caught.value.hint
+    assert ".[identify]" in caught.value.hint
     assert "\n" not in str(caught.value)
 
 

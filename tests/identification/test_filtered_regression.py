@@ -241,3 +241,14 @@ def test_samples_between_those_of_a_jittered_clock_do_not_hide_the_noise():
     signal = np.interp(clock[1:-1] + 1e-3, stamps, 1.0 * clock)
     # The mean of two neighbours, each with the error of its stamp times the speed of 1 m/s.
     assert white_noise(signal) == pytest.approx(1e-4 / math.sqrt(3.0) / math.sqrt(2.0), rel=0.2)
+
+
+@pytest.mark.parametrize("loss", [Loss.HUBER, Loss.SOFT_L1])
+def test_rounding_errors_do_not_choose_the_robust_weights(loss):
+    regressors = np.column_stack((np.arange(1.0, 201.0), np.ones(200)))
+    exact = regressors @ [3.0, 2.0]
+    rounded = exact * (1.0 + 1e-16 * np.random.default_rng(1).standard_normal(200).cumsum())
+    for force in (exact, rounded):
+        np.testing.assert_allclose(fit_linear(regressors, force, loss=loss).weights, 1.0, atol=1e-3)
+        outliers = fit_linear(regressors, np.where(np.arange(200) % 5 == 0, force + 100.0, force), loss=loss)
+        np.testing.assert_allclose(outliers.coefficients, [3.0, 2.0], rtol=1e-3)

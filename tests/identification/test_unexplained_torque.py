@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdtool.identification.unexplained_torque import without_unexplained
+from cdtool.identification.robot_dynamics import RobotParameters, identify_robot
+from cdtool.identification.unexplained_torque import _outside, without_unexplained
 from tests.identification.robot_motion import coloured, fourier, planar_arm
 
 ARM = planar_arm(coulomb_slope=50.0)
@@ -30,3 +31,12 @@ def test_noise_is_no_reason() -> None:
     found = without_unexplained(runs, ARM, 0.1)
     assert found.share == 0.0
     assert found.runs[0] is runs[0]
+
+
+def test_rounding_errors_are_no_reason() -> None:
+    run = fourier(3, 2, 15.0, 0.01).run(ARM, np.zeros((1500, 2)))
+    fit = identify_robot([run], ARM, RobotParameters(half_width=0.1))
+    torques = fit.equations.rows @ fit.base.values
+    random = np.random.default_rng(1).standard_t(2, len(torques))
+    rounded = replace(fit, equations=replace(fit.equations, torques=torques * (1.0 + 1e-16 * random)))
+    assert not _outside(rounded).any()

@@ -202,6 +202,16 @@ def test_a_damaged_file_leaves_the_log_without_a_cell(tmp_path, content):
     assert len(facts(recording, AbsentFile)) == 1
 
 
+def test_a_file_in_another_unit_than_the_machine_file_says_is_a_loss(tmp_path):
+    write_log(tmp_path)
+    write_cell(tmp_path, 0.0)
+    path = tmp_path / "cell_03.csv"
+    path.write_text(path.read_text(encoding="utf-8").replace("F", "F [kN]", 1), encoding="utf-8")
+    recording = read(tmp_path, TRIGGER)
+    assert "force" not in recording
+    assert "'F [kN]', the machine file N (a factor of 1000)" in facts(recording, AbsentFile)[0].reason
+
+
 def test_the_log_itself_is_not_its_load_cell(tmp_path):
     write_log(tmp_path)
     recording = read(tmp_path, "time_offset = 0.0", cell=CELL.replace("cell_{stem}.csv", "{name}"))

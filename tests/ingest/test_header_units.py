@@ -1,4 +1,4 @@
-"""A header's unit that contradicts the machine file, in kind or by a factor, is reported; a matching one is not."""
+"""A header's unit that contradicts the machine file makes its channel not assessable; a matching one does not."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from cdtool.channels import ChannelSource
 from cdtool.columns import Column
 from cdtool.findings.channels import UnitContradicted
 from cdtool.findings.clocks import ClockUnitContradicted
+from cdtool.formats.column_names import split_unit
 from cdtool.ingest.header_units import channel_unit_findings
 from cdtool.ingest.reading import read_recording
 
@@ -64,13 +65,13 @@ def findings_of_log(log, machine, machine_table, channel, header, stated):
     ],
     ids=lambda value: value if isinstance(value, str) and "[machine]" not in value else "",
 )
-def test_a_header_that_contradicts_the_machine_file_is_a_warning(
+def test_a_header_that_contradicts_the_machine_file_is_a_loss(
     log, machine, kind, channel, header, stated, ratio, advice, scale
 ):
     (finding,) = findings_of_log(log, machine, kind, channel, header, stated)
     in_file = stated.split('"')[1]
     fact = UnitContradicted(f"x [{header}]", header, 0, in_file, pytest.approx(ratio, rel=1e-3), advice, scale)
-    assert finding.fact == fact and finding.severity == "warning"
+    assert finding.fact == fact and finding.severity == "loss"
 
 
 @pytest.mark.parametrize(
@@ -87,7 +88,16 @@ def test_a_header_that_contradicts_the_machine_file_is_a_warning(
         (ROTARY, "torque", "mA", 'unit = "mA", scale = 0.5'),
         (ROTARY, "torque", "Nm", 'unit = "1", scale = 1'),
         (ROTARY, "torque", "counts", 'unit = "1", scale = 0.1'),
-        (ROTARY, "torque", "bananas", 'unit = "N m"'),
+        (ROTARY, "torque", "%", 'unit = "N m", scale = 0.23'),
+        (ROTARY, "torque", "A", 'unit = "N m", scale = -0.056'),
+        (ROTARY, "position", "count", 'unit = "rad", scale = 0.0015'),
+        (LINEAR, "force", "V", 'unit = "N", scale = 200'),
+        (LINEAR, "force", "kN", 'unit = "N", scale = 1000'),
+        (LINEAR, "force", "kN", 'unit = "N", unit_confirmed = true'),
+        (LINEAR, "force", "lbs", 'unit = "lbf"'),
+        (LINEAR, "force", "Kilopond", 'unit = "kgf"'),
+        (LINEAR, "force", "raw", 'unit = "N", unit_confirmed = true'),
+        (LINEAR, "speed", "Meter pro Sekunde", 'unit = "m/s"'),
         (ROTARY, "torque", "", 'unit = "N m"'),
         (ROTARY, "label", "V", "scale = 1"),
         (ROTARY, "trigger", "mV", "scale = 0.2"),
@@ -96,6 +106,60 @@ def test_a_header_that_contradicts_the_machine_file_is_a_warning(
 )
 def test_a_header_with_a_matching_or_unknown_unit_is_not_reported(log, machine, kind, channel, header, stated):
     assert findings_of_log(log, machine, kind, channel, header, stated) == []
+
+
+@pytest.mark.parametrize(
+    ("channel", "header", "severity"),
+    [
+        ("force", "filtered", "note"),
+        ("force", "N*10", "note"),
+        ("contact_pressure", "filtered", "loss"),
+        ("torque", "actual", "note"),
+    ],
+)
+def test_a_text_that_is_no_unit_is_reported(log, machine, channel, header, severity):
+    unit = {"force": "N", "torque": "N", "contact_pressure": "kPa"}[channel]
+    (finding,) = findings_of_log(log, machine, LINEAR, channel, header, f'unit = "{unit}"')
+    assert finding.fact == UnitContradicted(f"x [{header}]", header, 0, unit, 0.0, "no unit")
+    assert finding.severity == severity
+
+
+@pytest.mark.parametrize(
+    ("column", "fits"),
+    [
+        ("F_kN", False),
+        ("Kraft in daN", False),
+        ("Kraft [kN] gefiltert", False),
+        ("Kraft [N] (gefiltert)", True),
+        ("Kraft (1)", False),
+        ("wrench.force[1]", True),
+        ("F_N", True),
+        ("Kraft Newton", True),
+        ("Fz_max", True),
+    ],
+)
+def test_the_name_of_a_force_may_state_its_unit(column, fits):
+    force = ChannelSource("force", (column,), unit="N", stated="N")
+    found = channel_unit_findings(force, [Column(column, np.empty(0), unit=split_unit(column)[1])])
+    assert not found if fits else found[0].fact.header == column
+
+
+@pytest.mark.parametrize(
+    ("channel", "header", "stated"),
+    [
+        ("speed", "mm/s", "m/s"),
+        ("torque", "kN", "N"),
+        ("acceleration", "g", "m/s2"),
+        ("position", "in", "m"),
+        ("force", "lbf", "N"),
+    ],
+)
+def test_a_channel_whose_unit_is_contradicted_has_no_value(log, machine, channel, header, stated):
+    rows = "".join(f"{0.01 * k:.2f};{k}\n" for k in range(30))
+    text = f'[channels]\ntime = {{ column = "t", unit = "s" }}\n{channel} = {{ column = "x", unit = "{stated}" }}\n'
+    recording = read_recording(log(f"t [s];x [{header}]\n{rows}"), machine(text, LINEAR))
+    assert channel not in recording or np.isnan(recording[channel].values).all()
+    assert [item.severity for item in unit_findings(recording, channel)] == ["loss"]
 
 
 def test_the_unit_1_is_only_compared_if_the_machine_file_states_a_share():

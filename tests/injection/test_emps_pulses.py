@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -15,25 +13,14 @@ import pytest
 from cdtool.axis_model.parameters import AxisModel
 from cdtool.machine_file import MachineFile
 from tests.data_folder import data, needs_data
+from tests.project.pages import benchmark_script
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "emps_pulses.py"
 RECORDINGS = ("emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat")
 
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    """The script as a module; it imports modules from its own folder."""
-    kept = list(sys.path)
-    sys.path.insert(0, str(SCRIPT.parent))
-    try:
-        spec = importlib.util.spec_from_file_location("emps_pulses", SCRIPT)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["emps_pulses"] = module
-        spec.loader.exec_module(module)
-    finally:
-        sys.path[:] = kept
-    return module
+    return benchmark_script("emps_pulses")
 
 
 @pytest.fixture(scope="module")

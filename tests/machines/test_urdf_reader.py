@@ -228,7 +228,7 @@ def test_without_pinocchio_the_extra_to_install_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pinocchio", None)
     fault = refused(write(tmp_path, *ARM))
     assert "pinocchio, which is not installed" in fault.message
-    assert fault.hint == "pip install 'cdtool[urdf]'"
+    assert fault.hint == "pip install '.[urdf]'"
 
 
 def test_a_missing_file_is_named(tmp_path):

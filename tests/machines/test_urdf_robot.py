@@ -110,7 +110,7 @@ def test_a_negative_mass_of_the_urdf_is_reported_with_its_link(tmp_path):
 
 def test_without_pinocchio_the_extra_to_install_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pinocchio", None)
-    assert refused(tmp_path).hint == "pip install 'cdtool[urdf]'"
+    assert refused(tmp_path).hint == "pip install '.[urdf]'"
 
 
 def test_a_machine_file_may_describe_a_robot_whose_meshes_are_absent(tmp_path):

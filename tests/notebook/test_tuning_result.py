@@ -18,9 +18,9 @@ def tuned():
 
 
 def test_it_is_one_line_and_a_frame_with_a_row_per_detector_and_group(tuned):
-    assert repr(tuned).startswith("TuningResult(momentum with limit at 1/2op: stiff ")
+    assert repr(tuned).startswith("TuningResult(1 detector: ") and "momentum with limit at 1/2op: stiff " in repr(tuned)
     assert tuned.summary().group.tolist() == ["stiff", "soft"] and tuned.best.detector == "momentum"
-    assert "<caption>Tuned at 1/2op" in tuned._repr_html_()
+    assert "<caption>Tuned: " in tuned._repr_html_()
     assert tuned.skipped.columns.tolist() == ["recording", "reason"] and dict(tuned.unusable) == {}
 
 

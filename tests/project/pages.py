@@ -52,8 +52,24 @@ def check_detector_page(detector: Mapping[str, Any], text: str) -> None:
 
 def docs_script(name: str) -> ModuleType:
     """A script of docs/ as a module; docs is not a package."""
-    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    return script_at(DOCS / f"{name}.py")
+
+
+def benchmark_script(name: str) -> ModuleType:
+    """A script of benchmarks/ as a module; benchmarks is not a package."""
+    return script_at(ROOT / "benchmarks" / f"{name}.py")
+
+
+def script_at(path: Path) -> ModuleType:
+    """A script as a module under its own name, which dataclasses look up; it can import from its folder."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec and spec.loader
-    sys.modules[name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
+    module = importlib.util.module_from_spec(spec)
+    kept = list(sys.path)
+    sys.path.insert(0, str(path.parent))
+    sys.modules[path.stem] = module
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path[:] = kept
+    return module

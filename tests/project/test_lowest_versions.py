@@ -1,12 +1,17 @@
-"""The lower bounds of pyproject.toml: each dependency has one, none is withdrawn, and CI installs exactly these."""
+"""The dependencies of pyproject.toml: every import has one, and CI installs lower bounds that are not withdrawn."""
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
+from importlib.metadata import packages_distributions
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / ".ci" / "lowest_versions.py"
@@ -40,13 +45,49 @@ def test_no_lower_bound_is_a_withdrawn_or_failing_version():
     assert tuple(map(int, pins()["typer"].split("."))) >= (0, 19)
 
 
-def test_every_dependency_is_imported():
-    names = {"mcap-ros2-support": "mcap_ros2"}
-    text = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "cdtool").rglob("*.py"))
-    unused = [
-        name for name in pins() if not re.search(rf"^\s*(?:from|import) {names.get(name, name)}\b", text, re.MULTILINE)
-    ]
-    assert not unused
+def imports(tree: ast.AST, place: str = "module") -> Iterator[tuple[str, str]]:
+    """Yield (top-level module, "module", "function" or "typing") of each import below a node, also by name."""
+    for node in ast.iter_child_nodes(tree):
+        match node:
+            case ast.Import(names=names):
+                yield from ((each.name.partition(".")[0], place) for each in names)
+            case ast.ImportFrom(module=str(name)):
+                yield name.partition(".")[0], place
+            case ast.Call(func=ast.Name(id="import_module" | "library"), args=[ast.Constant(value=str(name)), *_]):
+                yield name.partition(".")[0], place
+        is_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+        is_typing = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        yield from imports(node, "typing" if is_typing else "function" if is_function else place)
+
+
+def imported() -> Iterator[tuple[str, str, str]]:
+    """Yield (file, distribution, place) of each import of another package in cdtool/."""
+    installed = {"pinocchio": ["pin"], **packages_distributions()}  # pin puts it where no record of files names it
+    ours = {"cdtool", "_typeshed", *sys.stdlib_module_names}  # _typeshed is known to type checkers alone
+    for path in sorted((ROOT / "cdtool").rglob("*.py")):
+        for name, place in imports(ast.parse(path.read_text(encoding="utf-8"))):
+            if name not in ours:
+                yield str(path.relative_to(ROOT)), installed.get(name, [name])[0].lower(), place
+
+
+def test_every_import_is_of_a_declared_dependency_and_every_dependency_is_imported():
+    required, allowed = (set(map(str.lower, pins(*extras))) for extras in ((), ("all",)))
+    found = list(imported())
+    assert [each for each in found if each[1] not in (required if each[2] == "module" else allowed)] == []
+    assert required == {name for _, name, _ in found} & required
+
+
+@pytest.mark.parametrize(
+    ("source", "place"),
+    [
+        ("import click.termui", "module"),
+        ("if TYPE_CHECKING:\n    from click import style", "typing"),
+        ("def f():\n    if x:\n        from click import style", "function"),
+        ("def f():\n    return import_module('click')", "function"),
+    ],
+)
+def test_an_import_is_found_wherever_it_stands(source, place):
+    assert list(imports(ast.parse(source))) == [("click", place)]
 
 
 def test_ci_installs_the_lower_bounds_and_runs_the_main_job():

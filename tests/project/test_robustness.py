@@ -39,7 +39,7 @@ def test_the_page_is_that_of_its_results():
     for cells in (simulated.cells for simulated in machines.values()):
         assert set(cells) <= set(DETECTORS.names())
         for rules in cells.values():
-            assert set(rules) <= {*script.OPTIONS, script.OWN, *THRESHOLDS.names()}
+            assert set(rules) <= {*script.OPTIONS, *THRESHOLDS.names()}
             assert all(set(states) == set(script.STATES) for states in rules.values())
 
 
@@ -70,7 +70,7 @@ def test_the_files_select_the_thresholds():
             assert read.get("signature", {}).get("adaptive_level") == (6 if name == script.FOLLOWING else None)
             assert read.get("signature", {}).get("speed_range") == (True if name == script.RANGE else None)
             assert len(read["learn"]["logs"]) == (3 if name == script.RANGE else 1)
-    assert "conditions" not in tomllib.loads(script.benchmark_text(arm, script.OWN, []))
+    assert "conditions" not in tomllib.loads(script.benchmark_text(arm, "signature", []))
 
 
 @pytest.mark.parametrize(

@@ -55,9 +55,9 @@ class S3Server:
     """A server on a free port; `stop` ends it at once."""
 
     def __init__(self) -> None:
-        pytest.importorskip("s3fs", reason="s3fs is not installed: pip install 'cdtool[remote]'")
+        pytest.importorskip("s3fs", reason="s3fs is not installed: pip install '.[remote]'")
         if any(find_spec(name) is None for name in ("moto", "flask")):
-            pytest.skip("no S3 server: pip install 'cdtool[s3test]'")
+            pytest.skip("no S3 server: pip install '.[s3test]'")
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]

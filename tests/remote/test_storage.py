@@ -88,7 +88,7 @@ def test_without_fsspec_one_line_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "fsspec.registry", None)
     done = cdtool("info", "s3://bucket/a.csv")
     assert done.err.splitlines() == [
-        "error: s3://bucket/a.csv: reading a URL needs fsspec, which is not installed (pip install 'cdtool[remote]')"
+        "error: s3://bucket/a.csv: reading a URL needs fsspec, which is not installed (pip install '.[remote]')"
     ]
 
 

@@ -60,6 +60,7 @@ def rule(figure: str, largest: float, detector: str = "momentum", group: str = "
 def test_every_recording_is_a_case_of_every_detector(evaluated):
     root = read(evaluated)
     assert [suite.get("name") for suite in root] == [
+        "conclusion",
         "left out",
         "friction_ekf.stiff",
         "momentum.stiff",
@@ -68,7 +69,7 @@ def test_every_recording_is_a_case_of_every_detector(evaluated):
         "friction_ekf.holdout",
         "momentum.holdout",
     ]
-    assert [len(suite) for suite in root] == [1, 4, 4, 30, 30, 40, 40]
+    assert [len(suite) for suite in root] == [1, 1, 4, 4, 30, 30, 40, 40]
 
 
 def test_a_case_shows_the_outcome_of_each_contact(results):
@@ -99,7 +100,7 @@ def test_a_recording_that_was_left_out_is_an_error(evaluated):
 
 def test_a_limit_is_a_case_and_what_violates_it_fails_with_it(results):
     root = read(evaluate(results, [rule("missed", 0), rule("mean_ms", 80), rule("false_alarms", 0, group="holdout")]))
-    suite = root[0]
+    suite = root[1]
     assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("limits", "3", "2")
     violated = case(root, "limits", "momentum.stiff.missed (momentum, stiff)").find("failure")
     assert violated is not None
@@ -110,7 +111,7 @@ def test_a_limit_is_a_case_and_what_violates_it_fails_with_it(results):
     failing = {
         (item.get("classname"), item.get("name")): failure.get("message")
         for item in root.iter("testcase")
-        if item.get("classname") != "limits" and (failure := item.find("failure")) is not None
+        if item.get("classname") not in ("conclusion", "limits") and (failure := item.find("failure")) is not None
     }
     assert failing == {
         ("momentum.stiff", "stiff/03.csv"): "contact 1 is missed (momentum.stiff.missed: at most 0)",
@@ -140,9 +141,9 @@ def test_there_are_failures_exactly_where_a_limit_is_not_met(results, figure, la
 
 def test_nothing_scored_is_one_error_and_never_an_empty_file():
     root = read(evaluate(Results({}, (), (), (), (), ())))
-    assert (root.get("tests"), root.get("errors")) == ("1", "1")
+    assert (root.get("tests"), root.get("errors")) == ("2", "1")
     left_out = read(evaluate(Results({}, ("gm",), ("stiff",), (), (), (), skipped=(Skipped("a.csv", "empty"),))))
-    assert (left_out.get("tests"), left_out.get("errors")) == ("2", "2")
+    assert (left_out.get("tests"), left_out.get("errors")) == ("3", "2")
 
 
 def test_what_is_lost_of_a_recording_is_an_error_and_a_warning_is_none(results):
@@ -169,7 +170,7 @@ def test_hostile_names_are_text_in_a_file_that_parses(results, kind):
     name = HOSTILE[kind]
     root = read(named(results, name))
     suites = {suite.get("name") for suite in root}
-    assert {"limits", "force", "left out", "damaged"} < suites and len(suites) == 5
+    assert {"conclusion", "limits", "force", "left out", "damaged"} < suites and len(suites) == 6
     assert not any(
         re.search("[\x00-\x1f\u202e\u2067]", value) for item in root.iter() for value in item.attrib.values()
     )

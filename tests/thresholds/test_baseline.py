@@ -168,3 +168,9 @@ def test_without_a_speed_it_is_an_error_that_names_the_channel():
     _, signal = run_of(np.full(10, 0.5), np.zeros(10))
     with pytest.raises(RecordingError, match="speed"):
         FittedBaseline(1.0, 8.0).evaluate(Recording("run", "", ("axis",), {}), signal)
+
+
+def test_rounding_errors_are_no_spread():
+    rounded = 5.0 * (1.0 + 1e-15 * np.random.default_rng(2).standard_normal(400))
+    status, lower, upper = evaluated(np.full(400, 0.4), rounded)
+    assert not np.any(status == Status.VALID) and np.isnan(lower[-1]) and np.isnan(upper[-1])

@@ -13,12 +13,11 @@ from cdtool.detectors.momentum import Momentum
 from cdtool.errors import SignatureError, UsageError
 from cdtool.operations import operations_of
 from cdtool.pipeline import judge, run_detector
-from cdtool.simulation.gate_model import GateParameters
 from cdtool.simulation.gate_recordings import as_recording
-from cdtool.simulation.season import Season
 from cdtool.thresholds.fitted_signature import FittedSignature
 from cdtool.thresholds.guarded_update import CAP, RESERVE, check_complete, guarded, largest_move
 from cdtool.thresholds.signature import Signature
+from tests.synthetic.ageing import GATE, ageing_run
 from tests.thresholds.strokes import TIME, N, noise_runs, signal, stroke
 
 CLEAN = stroke()
@@ -139,21 +138,19 @@ def test_a_cap_or_reserve_that_is_not_above_0_is_refused(wrong):
 
 def test_a_slowly_growing_obstruction_is_not_learned_while_a_plain_update_learns_it(gate):
     """Each run resists a little more at 0.9 m; no run but an alarmed one is kept from either update."""
-    new, season = GateParameters(), Season(80, obstruction_growth=1.0, obstruction_at=0.9)
     detector, activation = Momentum(), Activation()
 
     def operation(run, name):
-        (cut,) = operations_of(gate.referred_to_load(as_recording(run, name, new)))
+        (cut,) = operations_of(gate.referred_to_load(as_recording(run, name, GATE)))
         return cut, run_detector(cut, gate, detector)
 
-    still = Season(20)
-    pairs = [operation(still.run(number, 3, new), f"free{number}") for number in range(1, 21)]
+    pairs = [operation(ageing_run(number, 3), f"free{number}") for number in range(1, 21)]
     first = Signature(sides="one").fit([(cut.recording.without_ground_truth(), item) for cut, item in pairs])
     plain = held = first
     alarms = {"plain": [], "guarded": []}
     refused = 0
     for number in range(1, 81):
-        cut, item = operation(season.run(number, 7, new), f"season{number}")
+        cut, item = operation(ageing_run(number, 7, obstruction=number - 1.0), f"season{number}")
         bare = cut.recording.without_ground_truth()
         if judge(cut, "", item, (plain,), activation).verdict.outcome == "alarm":
             alarms["plain"].append(number)

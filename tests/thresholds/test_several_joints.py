@@ -10,7 +10,6 @@ import pytest
 from cdtool.detection import Signal, Status
 from cdtool.recording import Recording, Series
 from cdtool.thresholds import THRESHOLDS
-from cdtool.thresholds.base import judges_whole_machine
 from tests.thresholds.strokes import TIME, N, stroke
 
 JOINTS = ("shoulder", "elbow")
@@ -30,11 +29,7 @@ def arm_signal(rng: np.random.Generator) -> Signal:
     return Signal(TIME, values, np.zeros((N, 2), dtype=np.uint8), "N m", True, JOINTS)
 
 
-def fitted_class(name: str) -> type:
-    return THRESHOLDS.load(name).fitted[0]
-
-
-@pytest.mark.parametrize("name", [name for name in THRESHOLDS.names() if not judges_whole_machine(fitted_class(name))])
+@pytest.mark.parametrize("name", THRESHOLDS.names())
 def test_each_joint_is_judged_as_if_it_were_alone(name):
     rng = np.random.default_rng(0)
     recording = arm_stroke()

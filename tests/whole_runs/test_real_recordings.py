@@ -95,3 +95,37 @@ def test_a_missing_inertia_is_reported_by_the_detector_that_needs_it():
     log = UR10E_LOGS / "link4.csv.gz"
     done = run("detect", log, "-m", EXAMPLES / "ur10e.toml", "-d", "gm", "--limit", "30")
     assert done.status == 2 and "load_inertia" in done.err
+
+
+@needs_data("ur_collisions/onsets.csv")
+@pytest.mark.parametrize("stated", [True, False], ids=["uncertainty stated", "uncertainty not stated"])
+def test_all_collisions_of_a_jittering_arm_are_found(tmp_path, stated):
+    """Labels between two samples: an alarm of the sample just before one is that of its contact."""
+    folder = DATA / "ur_collisions"
+    rows = (folder / "onsets.csv").read_text(encoding="utf-8").splitlines()
+    kept = rows if stated else [row.rpartition(",")[0] for row in rows]
+    (tmp_path / "labels.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
+    (tmp_path / "machine.toml").write_text(
+        """
+[machine]
+type = "rotary_axis"
+name = "base of a UR arm"
+joints = ["base"]
+coordinates = "load"
+load_inertia = 0.0
+[channels]
+time = { column = 0, unit = "ms" }
+position = { column = 1, unit = "deg" }
+torque = { column = 13, unit = "A", scale = 1.0 }
+""",
+        encoding="utf-8",
+    )
+    logs = f'from = "0.5s"\nlogs = ["{folder.as_posix()}/Drift*.csv"]'
+    (tmp_path / "benchmark.toml").write_text(
+        'machine = "machine.toml"\ndetectors = ["pt"]\nthreshold = "limit"\noperations = "motion"\n'
+        f'[learn]\nuntil = "onset"\n{logs}\n[impacts.drift]\n{logs}\n[onset]\nlabels = "labels.csv"\n',
+        encoding="utf-8",
+    )
+    result = cdtool.benchmark(tmp_path / "benchmark.toml")
+    assert list(result.contacts.outcome) == ["detected"] * 16 and len(result.false_alarms) == 0
+    assert result.contacts.clipped.sum() == 3

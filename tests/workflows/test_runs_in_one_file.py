@@ -144,7 +144,7 @@ def test_a_run_without_its_cut_and_a_folder_for_plots_are_understood(folder, tmp
     log = f"{folder / 'all.csv'}#stiff_03"
     options = ("-m", folder / "machine.toml", "-d", "gm", "--limit", "400")
     refused = command("detect", log, *options)
-    assert refused.status == 2 and "state how it is cut, e.g. --operations column:NAME" in one_line(refused.err)
+    assert refused.status == 2 and "state how it is cut, as detect --operations column:NAME" in one_line(refused.err)
     drawn = command("detect", log, *options, "--operations", "column:run_id", "--plot", tmp_path / "plots")
     assert drawn.status == 0 and len(list((tmp_path / "plots").iterdir())) == 1
 

@@ -82,7 +82,8 @@ class BuildComparison:
     """All tests of two builds, the verdict over them, and other differences.
 
     `relevant_change`: the smallest change that matters. `inconclusive`: rows in which some test could not have shown
-    it, whatever else they show. `asked` tests were corrected together. `only_old`, `only_new`: detectors, groups, or
+    it, whatever else they show. `later`: rows in which the new build is later on the same contacts by a relevant
+    change, or misses more of them. `asked` tests were corrected together. `only_old`, `only_new`: detectors, groups, or
     a detector in a group present in only one file. `changed`: settings under test that differ. `notes`: recordings
     without a partner.
     """
@@ -98,6 +99,7 @@ class BuildComparison:
     only_old: tuple[str, ...]
     only_new: tuple[str, ...]
     notes: tuple[str, ...]
+    later: int = 0
 
     __repr__ = short_repr
     __eq__ = equal_by_values
@@ -167,6 +169,9 @@ def compare_builds(
     )
     verdict = _verdict(rows)
     words = overall_words(verdict, rows, count, significance, relevant_change)
+    later = sum(row.is_later(relevant_change) for row in rows)
+    if later and verdict in (INCONCLUSIVE, NOTHING_SHOWN):
+        words = f"later on the same contacts in {later} of {counted(len(rows), 'row')}; about other recordings {words}"
     only_old = tuple(_alone(old, new, builds))
     return BuildComparison(
         verdict=verdict,
@@ -180,6 +185,7 @@ def compare_builds(
         only_old=only_old,
         only_new=tuple(_alone(new, old, builds[::-1])),
         notes=tuple(pairing_words(pairings)),
+        later=later,
     )
 
 

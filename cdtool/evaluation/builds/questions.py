@@ -18,9 +18,8 @@ from typing import Literal
 import numpy as np
 
 from cdtool.evaluation.results import ContactResult
-from cdtool.evaluation.statistics.bootstrap import RESAMPLES
 from cdtool.evaluation.statistics.interval import Interval
-from cdtool.evaluation.statistics.paired import fisher_p, mcnemar_p, paired_difference, unpaired_difference
+from cdtool.evaluation.statistics.paired import RESAMPLES, fisher_p, mcnemar_p, paired_difference, unpaired_difference
 from cdtool.evaluation.statistics.rates import (
     binomial_at_most,
     binomial_increase_at_most,
@@ -41,6 +40,8 @@ Labels = Mapping[str, str]
 _MOST = 10_000
 _COMPLETE_UNPAIRED = 0.05
 POWER = 0.8
+# Clocks and interpolation leave traces far below a microsecond or a millinewton: they are no change [ms, N].
+LEAST_CHANGE = 5e-4
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,6 @@ def ask_mean(
     means = (spread_of(*before), spread_of(*after))
     differences: list[float] = []
     if paired:
-        # Clocks and interpolation leave traces far below a microsecond or a millinewton: they are no change.
         differences = [round(b - a, 3) for a, b in zip(before[0], after[0], strict=True)]
         found = paired_difference(differences, before[1], level)
         detectable = _paired_detectable(spread_of(differences, before[1]))

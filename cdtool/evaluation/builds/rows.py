@@ -10,6 +10,7 @@ from typing import Final, Literal
 
 from cdtool.evaluation.builds.pairs import Pairing, pairs_of_contacts
 from cdtool.evaluation.builds.questions import (
+    LEAST_CHANGE,
     Asked,
     Figure,
     Labels,
@@ -74,7 +75,9 @@ class BuildRow:
     """One detector in one group.
 
     `old_contacts` and `new_contacts` are all that the files hold, `pairs` those compared one by one (0 where not
-    paired); in `one_not_assessable` of them one build could not assess the contact, which counts there alone.
+    paired); in `one_not_assessable` of them one build could not assess the contact, which counts there alone. What
+    happened on the pairs: `later_ms` and `earlier_ms` are the shortest and the longest change of so many contacts, by
+    which the new build is later or earlier; `newly_missed` and `newly_detected` count the others.
     """
 
     detector: str
@@ -86,6 +89,12 @@ class BuildRow:
     one_not_assessable: int
     questions: tuple[Question, ...] = ()
     words: str = ""
+    later: int = 0
+    later_ms: tuple[float, float] | None = None
+    earlier: int = 0
+    earlier_ms: tuple[float, float] | None = None
+    newly_missed: int = 0
+    newly_detected: int = 0
 
     __repr__ = short_repr
 
@@ -99,6 +108,13 @@ class BuildRow:
             if outcome in found:
                 return outcome
         return NOTHING_SHOWN
+
+    def is_later(self, relevant_change: float) -> bool:
+        """Whether the new build misses more of the pairs, or is later on most and by this share of the old mean."""
+        if self.newly_missed > self.newly_detected:
+            return True
+        latency = self.question("latency_ms")
+        return bool(latency and self.later > self.earlier and latency.change.value >= relevant_change * latency.old)
 
     @property
     def inconclusive(self) -> bool:
@@ -183,7 +199,31 @@ def ask(
             ask_false_alarms(*watched, same_logs),
         ]
     apart = sum((a.outcome == "not_assessable") != (b.outcome == "not_assessable") for a, b in pairs)
-    return BuildRow(detector, group, paired, len(old), len(new), len(pairs), apart), asked
+    late, early = _changes(pairs, 1.0), _changes(pairs, -1.0)
+    outcomes = [(a.outcome, b.outcome) for a, b in pairs]
+    row = BuildRow(
+        detector,
+        group,
+        paired,
+        len(old),
+        len(new),
+        len(pairs),
+        apart,
+        later=len(late),
+        later_ms=(min(late), max(late)) if late else None,
+        earlier=len(early),
+        earlier_ms=(min(early), max(early)) if early else None,
+        newly_missed=outcomes.count(("detected", "missed")),
+        newly_detected=outcomes.count(("missed", "detected")),
+    )
+    return row, asked
+
+
+def _changes(pairs: Sequence[tuple[ContactResult, ContactResult]], sign: float) -> list[float]:
+    """Return by how much the latency of each pair grew (sign 1) or fell (-1) [ms], those with less left out."""
+    known = [(a.latency_ms, b.latency_ms) for a, b in pairs]
+    changes = [sign * (b - a) for a, b in known if a is not None and b is not None]
+    return [change for change in changes if change > LEAST_CHANGE]
 
 
 def answer(

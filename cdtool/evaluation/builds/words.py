@@ -22,14 +22,29 @@ def row_words(row: BuildRow, asked: int) -> str:
 
     `asked`: the number of tests that were corrected together.
     """
-    words = [_SHOWN[item.figure](item) for item in row.questions if item.outcome in ("worse", "better")]
+    shown = [_SHOWN[item.figure](item) for item in row.questions if item.outcome in ("worse", "better")]
+    words = [*shown, *_on_the_same(row)]
     if row.inconclusive:
         opened = ", ".join(_open(item, asked) for item in _unresolved(row))
-        words.append(f"otherwise {INCONCLUSIVE}" if words else f"{INCONCLUSIVE}: {opened}")
-    words = words or [f"{NOTHING_SHOWN} ({_would_have_been(row)})"]
+        words.append(f"otherwise {INCONCLUSIVE}" if shown else f"{INCONCLUSIVE}: {opened}")
+    elif not shown:
+        words.append(f"{NOTHING_SHOWN} ({_would_have_been(row)})")
     if row.one_not_assessable:
         words.append(f"{row.one_not_assessable} of {row.pairs} contacts not assessable in one of the builds")
     return "; ".join(words)
+
+
+def _on_the_same(row: BuildRow) -> list[str]:
+    """Describe what happened on the contacts that both files contain: a fact, whatever it says about others."""
+    ways = ((row.later, row.later_ms, "later"), (row.earlier, row.earlier_ms, "earlier"))
+    parts = [f"{count} {way} by {_range(*ends)} ms" for count, ends, way in ways if ends]
+    parts += [f"{row.newly_missed} newly missed"] if row.newly_missed else []
+    parts += [f"{row.newly_detected} no longer missed"] if row.newly_detected else []
+    return [f"on the same {counted(row.pairs, 'contact')}: {', '.join(parts)}"] if parts else []
+
+
+def _range(least: float, most: float) -> str:
+    return figure(least) if figure(least) == figure(most) else f"{figure(least)} to {figure(most)}"
 
 
 def overall_words(

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from cdtool.activation import Activation
-from cdtool.detection import Alarm, Evidence
+from cdtool.detection import Alarm
 from cdtool.errors import UsageError
 from cdtool.evaluation.explanation.cause import Cause, Event
 from cdtool.evaluation.explanation.diagnosis import diagnose_alarm, diagnose_contact
@@ -41,7 +41,7 @@ class AlarmExplanation:
     in progress when the recording began, since its onset is not recorded. `moved` are the channels in the order in
     which they moved; `inputs` names those that the detector needs. `cause` is the likely one, derived without load cell
     and labels. `runs`: number of impact-free runs that the channels were compared with; without any, `absent` is the
-    reason, and the log's own past was used. `evidence`: what a statistic of several columns was based on; else None.
+    reason, and the log's own past was used.
     """
 
     operation: str
@@ -60,7 +60,6 @@ class AlarmExplanation:
     cause: Cause
     runs: int = 0
     absent: Absence | None = None
-    evidence: Evidence | None = None
 
     __repr__ = short_repr
 
@@ -247,21 +246,7 @@ def explain_alarm(
         cause=diagnosis.cause,
         runs=diagnosis.runs,
         absent=diagnosis.absent,
-        evidence=_evidence(detection, alarm.time),
     )
-
-
-def _evidence(detection: Detection, time: float) -> Evidence | None:
-    """Return what the statistic was based on at a time [s], if its threshold explains it."""
-    judgement, signal = detection.judgement, detection.signal
-    if judgement is None or signal is None:
-        return None
-    found = (
-        threshold.explained(judgement.recording, judgement.signal, time)
-        for threshold in judgement.thresholds
-        if hasattr(threshold, "explained")
-    )
-    return next((item for item in found if item is not None), None)
 
 
 def explain_miss(

@@ -18,11 +18,11 @@ from cdtool.recording import REFERENCES, Contact
 _ABSENT = {
     Absence.BY_HAND: (
         "limits set by hand are not learned from runs",
-        "learn a signature with cdtool learn-signature and give it with --signature",
+        "learn a signature with cdtool learn-signature and give it to cdtool detect --signature",
     ),
     Absence.PER_RUN: (
         "the limits are those of the run's own first seconds, and nothing was learned",
-        "learn a signature with cdtool learn-signature and give it with --signature",
+        "learn a signature with cdtool learn-signature and give it to cdtool detect --signature",
     ),
     Absence.OLDER_FILE: (
         "the signature file has no normal motion",
@@ -78,8 +78,8 @@ def words(explanation: Explanation) -> list[str]:
     'alarm at ... s, ... ms after the contact (onset at ... s, load cell)'
     """
     if isinstance(explanation, AlarmExplanation):
-        crossing = [*_crossing(explanation), *_evidence(explanation)]
-        return [_headline(explanation), *crossing, *_cause_words(explanation), *_movement(explanation)]
+        cause = _cause_words(explanation)
+        return [_headline(explanation), *_crossing(explanation), *cause, *_movement(explanation)]
     return [_miss(explanation), *_approaches(explanation), *_movement(explanation)]
 
 
@@ -113,17 +113,6 @@ def _crossing(item: AlarmExplanation) -> list[str]:
         f"{item.joint}: {item.alarm.side} its {limit} limit, {values}. Last exit from the band {since}{waited} "
         f"(debounce: {_consecutive(item.debounce)} outside{skipped})."
     ]
-
-
-def _evidence(item: AlarmExplanation) -> list[str]:
-    """Return which channels and which template decided, for a statistic of several channels."""
-    evidence = item.evidence
-    if evidence is None:
-        return []
-    if not evidence.columns:
-        return ["Decided by the signature of the start phase: the motion was not settled yet."]
-    moved = ", ".join(f"{column} {size:+.1f}" for column, size in zip(evidence.columns, evidence.moved, strict=True))
-    return [f"Decided by a template of {1e3 * evidence.length:.0f} ms; innovations over it, in spreads: {moved}."]
 
 
 def _miss(item: MissExplanation) -> str:

@@ -59,6 +59,7 @@ class ForceProfile:
     no requirement, with `measuring_source`: the lowest sample rate [Hz], the shortest record after the onset [s], and
     the stiffness of the obstacle, which is the spring of the force meter [N/mm]. `pressures`, with `pressure_source`:
     the allowed pressures on the areas of the body region, for a test protocol; empty: pressure is not limited.
+    `permissible`: False of a region that nothing may touch: no contact passes, whatever its force.
     """
 
     name: str
@@ -74,6 +75,7 @@ class ForceProfile:
     measuring_source: str = ""
     pressures: tuple[PressureLimit, ...] = ()
     pressure_source: str = ""
+    permissible: bool = True
 
     @property
     def warning(self) -> str:
@@ -83,7 +85,9 @@ class ForceProfile:
     @property
     def described(self) -> dict[str, Any]:
         """Return what determines the verdict on a force, for provenance: without what only a test protocol uses."""
-        return {name: value for name, value in asdict(self).items() if name not in (*_MEASURING, *_PRESSURE)}
+        # As files of earlier versions have it: without what is so of nearly every region.
+        beside = (*_MEASURING, *_PRESSURE, *(("permissible",) if self.permissible else ()))
+        return {name: value for name, value in asdict(self).items() if name not in beside}
 
     def pressure_limit(self, area: str = "") -> PressureLimit | None:
         """Return the limit of an area; without one the lowest of all areas, and None of a profile without pressures.
@@ -189,6 +193,7 @@ def _profile(name: str, table: Table) -> ForceProfile:
         measuring_source=table.text("measuring_source", ""),
         pressures=_pressures(table),
         pressure_source=table.text("pressure_source", ""),
+        permissible=table.flag("permissible", True),
     )
     _check_pressures(profile, table)
     table.finish()

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -175,7 +175,8 @@ def assess_force(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
         One verdict per step: fail if a sample is above the limit, whatever else is missing. Otherwise not assessable if
         the record ends before or inside the step, if samples are missing in which the force may have been above the
         limit, if the contact may have begun earlier and the force is then too high, or if the load cell saturated below
-        the limit. The last step is assessed up to the end of the record.
+        the limit. The last step is assessed up to the end of the record. No step of a profile that is not `permissible`
+        passes: it fails.
 
     Notes
     -----
@@ -194,6 +195,12 @@ def assess_force(curve: ForceTimeCurve, profile: ForceProfile) -> ForceVerdict:
     ([('dynamic', 'fail'), ('static', 'pass'), ('residual', 'pass')], 1.125, 0.0)
     """
     steps = tuple(_judge_step(curve, step, profile.ends(i)) for i, step in enumerate(profile.steps))
+    if not profile.permissible:
+        reason = "contact with this region of the body is not permissible, whatever its force"
+        steps = tuple(
+            replace(item, outcome="fail", time_budget=0.0, reason=reason) if item.outcome == "pass" else item
+            for item in steps
+        )
     return ForceVerdict(profile.name, steps, curve.end)
 
 
@@ -319,6 +326,9 @@ def _judge_point(step: ForceStep, tests: Sequence[StepVerdict], average_of: int)
         shown = f"{force:.{digits_beside(force, step.at_most_n)}g}"
         reason = f"{word} of {len(tests)} peaks {shown} N where {step.at_most_n:g} N are allowed"
         return PointStep(step, "fail", force, above, reason)
+    forbidden = next((test for test in tests if test.outcome == "fail" and not test.peak > step.at_most_n), None)
+    if forbidden:
+        return PointStep(step, "fail", force, above, forbidden.reason)
     unassessable = next((test for test in tests if test.outcome == "not_assessable"), None)
     if unassessable:
         return PointStep(step, "not_assessable", force, above, unassessable.reason)

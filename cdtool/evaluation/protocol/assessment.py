@@ -313,11 +313,18 @@ def _reason(kind: ReasonKind, point: MeasuringPoint, **values: str | float) -> R
     return Reason(kind, {"point": point.name, **values}, due="before_test" if kind in _BEFORE_TEST else "test_day")
 
 
-_BEFORE_TEST = (ReasonKind.NO_PROFILE, ReasonKind.TOO_FEW_PLANNED, ReasonKind.WRONG_STIFFNESS)
+_BEFORE_TEST = (
+    ReasonKind.NO_PROFILE,
+    ReasonKind.NOT_PERMISSIBLE,
+    ReasonKind.TOO_FEW_PLANNED,
+    ReasonKind.WRONG_STIFFNESS,
+)
 
 
 def _of_plan(point: MeasuringPoint, profile: ForceProfile) -> Iterator[Reason]:
-    """Yield how the plan of a point contradicts its profile."""
+    """Yield how the plan of a point contradicts its profile, or that nothing may touch this region of the body."""
+    if not profile.permissible:
+        yield _reason(ReasonKind.NOT_PERMISSIBLE, point, profile=profile.name)
     if 0 < point.repetitions < profile.average_of:
         planned, needed = point.repetitions, profile.average_of
         yield _reason(ReasonKind.TOO_FEW_PLANNED, point, planned=planned, needed=needed, profile=profile.name)
@@ -371,7 +378,7 @@ def _copies(point: MeasuringPoint, item: Repetition, earlier: Sequence[Repetitio
 
 def _exceeded(point: MeasuringPoint, verdict: PointVerdict, profile: ForceProfile) -> Iterator[Reason]:
     for step in verdict.steps:
-        if step.outcome == "fail":
+        if step.outcome == "fail" and step.force > step.step.at_most_n:
             yield _reason(ReasonKind.POINT_EXCEEDS, point, **_compared(step, verdict, profile))
 
 

@@ -19,6 +19,7 @@ class ReasonKind(Enum):
     """What is wrong; the value is its name in the tables of sentences."""
 
     POINT_EXCEEDS = "point_exceeds"
+    NOT_PERMISSIBLE = "not_permissible"
     NO_VALUE = "no_value"
     NO_POINT = "no_point"
     NO_FORCE_INSTRUMENT = "no_force_instrument"
@@ -66,8 +67,9 @@ class ReasonKind(Enum):
 
     @property
     def outcome(self) -> Outcome:
-        """Return what it leads to: a force or pressure above its limit fails, everything else is incomplete."""
-        return "fail" if self in (ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS) else "incomplete"
+        """Return what it leads to: a force or pressure above its limit, or a contact where none may be, fails."""
+        failing = (ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS, ReasonKind.NOT_PERMISSIBLE)
+        return "fail" if self in failing else "incomplete"
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ def correlation(a: FloatArray, b: FloatArray) -> float:
     Returns
     -------
     float
-        From -1 to 1; NaN if a series is constant or has fewer than two values.
+        From -1 to 1; NaN if a series is constant, but for rounding errors, or has fewer than two values.
 
     Notes
     -----
@@ -36,10 +36,11 @@ def correlation(a: FloatArray, b: FloatArray) -> float:
     if len(a) < 2:
         return math.nan
     pair = np.array((a, b), dtype=np.float64)
+    rounding = 4.0 * np.finfo(np.float64).eps * np.abs(pair).max(axis=1)
     pair -= np.add.reduce(pair, axis=1, keepdims=True) / len(a)
     products = np.dot(pair, pair.T)
     products *= 1.0 / (len(a) - 1)
     (of_a, shared), (_, of_b) = products.tolist()
-    if not (of_a > 0.0 and of_b > 0.0):
+    if not (math.sqrt(of_a) > rounding[0] and math.sqrt(of_b) > rounding[1]):
         return math.nan
     return float(max(-1.0, min(shared / math.sqrt(of_a) / math.sqrt(of_b), 1.0)))

@@ -14,13 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import UsageError
-from cdtool.evaluation.statistics.bootstrap import BATCH, RESAMPLES, bca, bca_bounds, resampled_mean
 from cdtool.evaluation.statistics.clusters import MOST_CLUSTERS, Clusters, IntArray, clusters_of
-from cdtool.evaluation.statistics.interval import Interval, check_level
+from cdtool.evaluation.statistics.interval import Interval
 from cdtool.evaluation.statistics.rates import check_count
-from cdtool.evaluation.statistics.small_sample import FEWEST, too_few
+from cdtool.evaluation.statistics.spread import difference_interval, mean_interval, spread_of
 from cdtool.recording import FloatArray
 
+# Sign patterns or divisions drawn if there are too many to try all.
+RESAMPLES = 9999
+# Drawn numbers held at a time: some ten megabytes, whatever the number of values.
+BATCH = 2**20
 # Up to so many clusters every sign pattern is tried.
 MOST_ENUMERATED = 13
 
@@ -53,7 +56,7 @@ class Difference:
 def paired_difference(
     differences: npt.ArrayLike, clusters: Iterable[Hashable], level: float = 0.95, seed: int = 0
 ) -> Difference:
-    """Return the mean of paired differences with its BCa interval, a sign-flip test and Wilcoxon's signed-rank test.
+    """Return the mean of paired differences with Student's interval, a sign-flip test and Wilcoxon's signed-rank test.
 
     Parameters
     ----------
@@ -65,7 +68,7 @@ def paired_difference(
     level : float
         Confidence level.
     seed : int
-        Seed of the interval, and of the test with more than 13 clusters.
+        Seed of the test with more than 13 clusters.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def paired_difference(
     """
     labels = list(clusters)
     groups = clusters_of(differences, labels)
-    mean = bca(differences, labels, "mean", level, seed=seed)
+    mean = mean_interval(differences, labels, level)
     n, k = len(groups.values), len(groups)
     if k < 2:
         return Difference(mean, math.nan, math.nan, n, k)
@@ -110,7 +113,7 @@ def unpaired_difference(
     level: float = 0.95,
     seed: int = 0,
 ) -> Difference:
-    """Return mean(a) - mean(b) of two independent sets with its BCa interval, permutation test and Mann-Whitney's test.
+    """Return mean(a) - mean(b) of two independent sets: Welch's interval, permutation test, Mann-Whitney's test.
 
     Parameters
     ----------
@@ -121,7 +124,7 @@ def unpaired_difference(
     level : float
         Confidence level.
     seed : int
-        Seed of the interval, and of the test if there are more than 9999 divisions.
+        Seed of the test if there are more than 9999 divisions.
 
     Returns
     -------
@@ -146,23 +149,13 @@ def unpaired_difference(
     >>> difference.mean.value, round(difference.p, 4)
     (-10.0, 0.0286)
     """
-    check_level(level)
-    all_of_a, all_of_b = clusters_of(a, clusters_a), clusters_of(b, clusters_b)
+    labels_a, labels_b = list(clusters_a), list(clusters_b)
+    all_of_a, all_of_b = clusters_of(a, labels_a), clusters_of(b, labels_b)
     n, k = len(all_of_a.values) + len(all_of_b.values), len(all_of_a) + len(all_of_b)
-    first, second = (side.merged(MOST_CLUSTERS, seed) for side in (all_of_a, all_of_b))
-    mean_a, mean_b = resampled_mean(first), resampled_mean(second)
-
-    def difference(*drawn: IntArray, axis: int = -1) -> FloatArray:
-        return mean_a(drawn[0], axis=axis) - mean_b(drawn[1], axis=axis)
-
-    fewest = min(len(first), len(second))
-    value = float(difference(np.arange(len(first)), np.arange(len(second)))) if fewest else math.nan
-    low, high = math.nan, math.nan
-    if fewest >= FEWEST:
-        low, high = bca_bounds((len(first), len(second)), difference, n, level, RESAMPLES, seed)
-    mean = Interval(value, low, high, level, too_few(fewest) if fewest else "")
-    if fewest < 2:
+    mean = difference_interval(spread_of(a, labels_a), spread_of(b, labels_b), level)
+    if min(len(all_of_a), len(all_of_b)) < 2:
         return Difference(mean, math.nan, math.nan, n, k)
+    first, second = (side.merged(MOST_CLUSTERS, seed) for side in (all_of_a, all_of_b))
     from scipy import stats
 
     means = _means(all_of_a), _means(all_of_b)

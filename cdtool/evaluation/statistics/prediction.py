@@ -168,29 +168,6 @@ def tail(deviation: npt.ArrayLike, gumbel_share: float = GUMBEL_SHARE) -> FloatA
     return np.exp(log_tail)
 
 
-def deviation_for(chance: float, gumbel_share: float = GUMBEL_SHARE) -> float:
-    """Return the deviation that is exceeded with that chance: the inverse of `tail`.
-
-    Parameters
-    ----------
-    chance : float
-        The chance.
-    gumbel_share : float
-        The share of the variance that is modelled as Gumbel.
-
-    Returns
-    -------
-    float
-        The distance from the mean, in standard deviations.
-
-    Examples
-    --------
-    >>> round(deviation_for(0.01), 2)
-    2.66
-    """
-    return float(np.interp(-math.log(chance), -_log_tail(gumbel_share), _TABLE))
-
-
 def _chance(t: float, n: int, share: float) -> float:
     mean, std = _samples(n, share)
     return float(tail(mean + t * std, share).mean())

@@ -1,9 +1,8 @@
 """Intervals for few contacts: none for a mean below ten recordings, an exact one for the median of six or more.
 
-Conventions: the 95 % bootstrap interval of a mean contains the true mean in about 80 of 100 tests with four contacts,
-and in 47 if 15 % of the contacts are slow: in half of the tests none of the four is slow (docs/statistics.md). An
-interval that does not have its stated coverage is not given. The interval of the median between two order statistics
-holds for any distribution.
+Conventions: if 15 % of all contacts are slow, the 95 % interval of the mean of four contains the true mean in 49 of 100
+tests: in half of the tests none of the four is slow (docs/statistics.md). An interval that does not have its stated
+coverage is not given. The interval of the median between two order statistics holds for any distribution.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta, timezone
+from decimal import Decimal
 from pathlib import Path, PurePosixPath
 from typing import Literal, get_args
 
@@ -24,7 +25,7 @@ from cdtool.errors import ConfigurationError, RecordingError, nearest
 from cdtool.evaluation.truth.named_rows import NamedRow, read_named_rows
 from cdtool.findings import Finding
 from cdtool.findings.truth import KindsExcluded, LabelsWithoutZone
-from cdtool.recording import Contact, Recording
+from cdtool.recording import MEASURED, Contact, Recording
 
 _OPTIONAL = ("kind", "uncertainty_s")
 # Units of numbers, per second.
@@ -95,6 +96,10 @@ class Labels:
 
     def _placed(self, label: Contact, line: str, recording: Recording) -> Contact:
         """Return a label as a contact on the recording's clock."""
+        if math.isnan(label.uncertainty):
+            steps = (recording[name].period for name in MEASURED if name in recording and len(recording[name]) > 1)
+            doubt = max(label.resolution, 0.5 * max(steps, default=0.0))
+            label = replace(label, uncertainty=doubt, resolution=math.nan)
         if self.clock == "row":
             return _at_row(label, line, recording)
         shift = recording.origin if self.clock == "source" else 0.0
@@ -160,7 +165,7 @@ def read_labels(
         contacts = found.setdefault(row.recording, [])
         start, end = (_moment(row, column, form, offset, zoned) for column in columns)
         if start is not None:
-            contacts.append((_contact(row, start, start if end is None else end), row.where))
+            contacts.append((_contact(row, start, start if end is None else end, form), row.where))
     if len(zoned) > 1:
         raise ConfigurationError(f"{zoned[False]}: a date without a zone, {zoned[True]} has one", "give all a zone")
     if zone and form != "time":
@@ -239,14 +244,29 @@ def _offset(path: Path, zone: str) -> timezone:
     return timezone(timedelta(minutes=-minutes if match["sign"] == "-" else minutes))
 
 
-def _contact(row: NamedRow, start: float, end: float) -> Contact:
-    uncertainty = row.seconds("uncertainty_s") or 0.0
+def _contact(row: NamedRow, start: float, end: float, form: str) -> Contact:
+    """Return a label as a contact; of one that states no uncertainty, `resolution` is its last printed digit [s]."""
+    uncertainty = row.seconds("uncertainty_s")
+    if uncertainty is None:
+        uncertainty, digit = math.nan, _last_digit(row.text(f"start_{form}"), form)
+    else:
+        digit = math.nan
     if end < start or uncertainty < 0.0:
         raise row.fault(
             f"start {start:.10g} s, end {end:.10g} s, uncertainty {uncertainty:g} s",
             "the end must be after the start, and the uncertainty not negative",
         )
-    return Contact(start, end, uncertainty, found_by="label file", kind=row.text("kind"))
+    return Contact(start, end, uncertainty, found_by="label file", kind=row.text("kind"), resolution=digit)
+
+
+def _last_digit(text: str, form: str) -> float:
+    """Return what the last printed digit of a label stands for [s]; 0 for the number of a row."""
+    if form == "row":
+        return 0.0
+    if form == "time":
+        fraction = _FRACTION.search(text)
+        return 10.0 ** -len(fraction[1]) if fraction else 1.0
+    return 10.0 ** min(int(Decimal(text).as_tuple().exponent), 0) / _UNITS[form]
 
 
 def _excluded(path: Path, found: Mapping[str, list[tuple[Contact, str]]], not_contacts: Collection[str]) -> int:

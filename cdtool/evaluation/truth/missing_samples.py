@@ -2,8 +2,8 @@
 
 Conventions: times in s. A step between two samples is a hole if it is longer than 5 ms and than the clock makes it with
 one sample lost: 2.5 periods, or with jitter one period and 1.1 times the step that one in 20 exceeds. 5 ms is the
-interval of a force meter of 200 Hz, the slowest that door standards allow (EN 12445): samples that are closer together
-hide nothing from it.
+interval of a force meter of 200 Hz, the slowest that door standards allow (EN 12453:2017, annex C: rise and fall within
+5 ms): samples that are closer together hide nothing from it.
 """
 
 from __future__ import annotations

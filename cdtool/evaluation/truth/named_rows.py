@@ -19,18 +19,19 @@ from cdtool.plain_text import counted, first_of
 
 
 @dataclass(frozen=True)
-class TableRow:
-    """One row: its cells by column, and file and line for messages."""
+class NamedRow:
+    """One row about a recording: its cells by column, and file and line for messages."""
 
     where: str
     cells: Mapping[str, str]
+    recording: str
 
     def text(self, name: str) -> str:
         """Return a cell without the blanks around it; empty if the column is missing."""
         return self.cells.get(name, "").strip()
 
-    def number(self, name: str, unit: str) -> float | None:
-        """Return a finite number, None if the cell is empty; raises ConfigurationError. `unit`: in words."""
+    def seconds(self, name: str) -> float | None:
+        """Return a finite number of seconds, None if the cell is empty; raises ConfigurationError."""
         text = self.text(name)
         if not text:
             return None
@@ -39,32 +40,16 @@ class TableRow:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise self.fault(f"{name} is '{text}'", f"give a number of {unit}")
+            raise self.fault(f"{name} is '{text}'", "give a number of seconds")
         return value
-
-    def seconds(self, name: str) -> float | None:
-        """Return a finite number of seconds, None if the cell is empty; raises ConfigurationError."""
-        return self.number(name, "seconds")
 
     def fault(self, problem: str, hint: str) -> ConfigurationError:
         """Return an error about this row."""
         return ConfigurationError(f"{self.where}: {problem}", hint)
 
 
-@dataclass(frozen=True)
-class NamedRow(TableRow):
-    """One row about a recording."""
-
-    recording: str
-
-
 def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[NamedRow]:
     """Return the rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
-    return [_named(row) for row in read_table_rows(path, required, optional, what)]
-
-
-def read_table_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[TableRow]:
-    """Return the rows of a file that is not about recordings; otherwise as `read_named_rows`."""
     content = read_bytes(path, ConfigurationError)
     try:
         text = content.decode("utf-8-sig")
@@ -151,18 +136,15 @@ def _check_header(path: Path, header: Sequence[str], required: Sequence[str], kn
             raise ConfigurationError(f"{path} line 1: column '{name}' is missing", f"use {','.join(known)}")
 
 
-def _row(path: Path, line: int, header: Sequence[str], cells: Sequence[str]) -> TableRow:
+def _row(path: Path, line: int, header: Sequence[str], cells: Sequence[str]) -> NamedRow:
     where = f"{path} line {line}"
     if len(cells) != len(header):
         raise ConfigurationError(
             f"{where}: {counted(len(cells), 'cell')} under {counted(len(header), 'column')}",
             "give one cell per column, empty without a value; decimals with a point",
         )
-    return TableRow(where, dict(zip(header, cells, strict=True)))
-
-
-def _named(row: TableRow) -> NamedRow:
-    name = row.text("recording").replace("\\", "/")
+    by_column = dict(zip(header, cells, strict=True))
+    name = by_column.get("recording", "").strip().replace("\\", "/")
     if not name:
-        raise row.fault("no recording is named", "give its path in column recording")
-    return NamedRow(row.where, row.cells, PurePosixPath(name).as_posix())
+        raise ConfigurationError(f"{where}: no recording is named", "give its path in column recording")
+    return NamedRow(where, by_column, PurePosixPath(name).as_posix())

@@ -85,12 +85,12 @@ def _step(shown: Shown, item: JointDrift) -> str:
     return f"step of {step.height:+.2g} spreads at run {step.run + 1} ({item.runs[step.run].name})"
 
 
-def slope_words(slope: Interval, unit: str = "run") -> str:
-    """Format a slope in spreads per unit, with as many decimals as its first two digits need."""
+def slope_words(slope: Interval) -> str:
+    """Format a slope in spreads per run, with as many decimals as its first two digits need."""
     largest = max(abs(slope.value), abs(slope.low), abs(slope.high), 1e-9)
     decimals = max(1 - math.floor(math.log10(largest)), 0)
     value, low, high = (f"{x:z.{decimals}f}" for x in (slope.value, slope.low, slope.high))
-    return f"{float(value):+.{decimals}f} spreads per {unit} (95 %: {low} to {high})"
+    return f"{float(value):+.{decimals}f} spreads per run (95 %: {low} to {high})"
 
 
 def _left(runs: Interval) -> str:

@@ -11,9 +11,8 @@ from cdtool.units import find_unit
 # Units without a factor to SI in cdtool, and words for units.
 _UNIT_WORDS = frozenset(
     (
-        *("volt", "volts", "ampere", "amperes", "amp", "amps", "second", "seconds", "msec", "newton", "newtons"),
-        *("degree", "degrees", "hz", "khz", "mhz", "°c", "degc", "k", "w", "kw", "bar", "mbar", "pa", "kpa", "l/min"),
-        *("ohm", "-", "db", "lsb", "inc", "incr", "digit", "digits"),
+        *("msec", "hz", "khz", "mhz", "°c", "degc", "k", "w", "kw", "l/min", "ohm", "-", "db", "lsb", "incr", "digit"),
+        "digits",
     )
 )
 _TYPES = frozenset(

@@ -31,7 +31,7 @@ DOUBLE, SINGLE, UINT64, INT64, UINT32, INT32, BOOL, SINT64, SINT32 = range(9)
 # A row of `levels` for each level of nesting: the message's end, its first and last token, and the next one.
 DEEPEST, LEVEL = 32, 4
 
-_1, _7, _8 = map(np.uint64, (1, 7, 8))
+_1, _8 = map(np.uint64, (1, 8))
 _LOW = np.uint64(0xFFFFFFFF)
 _Words = npt.NDArray[np.uint64]
 _BYTES = "Array(uint8, 1, 'C', readonly=True)"

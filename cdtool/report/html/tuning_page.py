@@ -36,7 +36,7 @@ APPARENT_NOTE = (
 
 def tuning_html(tuning: Tuning) -> str:
     """Return the page: the same text for the same input."""
-    best = tuning.detectors[0]
+    tone, headline = tuning.verdict
     sections = [
         PageSection(
             "Detectors",
@@ -56,9 +56,9 @@ def tuning_html(tuning: Tuning) -> str:
     return SectionsPage(
         "Tuning",
         f"Detectors of {visible(tuning.setup.machine_file.machine.name)} at {tuning.options.budget} false alarms",
-        visible(f"{best.detector} with {best.choice.rule.name}: {_means(best.honest)}"),
+        visible(headline),
         visible(f"From {counted(len(tuning.runs.operations), 'impact-free run')} and contacts: {contacts}."),
-        "good" if tuning.is_nested else "unknown",
+        tone,
         (f"minimised: {_GOALS[tuning.options.goal]}", f"seed {tuning.options.seed}"),
         tuple(section for section in sections if section.tables or section.images or section.note),
     ).html()
@@ -70,10 +70,6 @@ def injected_words(tuning: Tuning) -> str:
     if not names:
         return ""
     return f"The contacts of {', '.join(map(visible, names))} were computed (injected), not measured. "
-
-
-def _means(figures: ChoiceResults) -> str:
-    return ", ".join(f"{name} {number(item.mean_ms)} ms" for name, item in figures.groups.items())
 
 
 def _detectors_table(tuning: Tuning) -> Table:

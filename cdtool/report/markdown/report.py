@@ -71,11 +71,9 @@ def _head(model: Model) -> str:
         parts.append(f"**{model.tables['not_met'].title}:** {'; '.join(failing)}.")
     if model.reasons:
         reasons = "; ".join(map(escape, model.first_reasons(_REASONS_NAMED)))
-        parts.append(f"**Force, missed contacts, not assessable:** {reasons}.")
+        parts.append(f"**Reasons:** {reasons}.")
     if "attention" in model.tables:
         parts.append(_worst(model))
-    if model.left_out:
-        parts.append(f"**{model.left_out}**, listed below.")
     return "\n\n".join([*parts, NO_CERTIFICATE])
 
 

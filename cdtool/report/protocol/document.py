@@ -90,10 +90,22 @@ def protocol_document(protocol: Protocol) -> Document:
     )
 
 
+def protocol_statement(protocol: Protocol) -> tuple[str, ...]:
+    """Return outcome, sentence and reasons of a protocol in English, for the screen and `Evaluated.with_protocol`."""
+    words, outcome = words_of("en"), protocol.verdict.outcome
+    reasons = [sentence for _, sentences in _reasons(protocol, words) for sentence in sentences]
+    return outcome, f"test protocol: {outcome}: {_verdict_text(protocol, words).removesuffix('.')}", *reasons
+
+
+def _verdict_text(protocol: Protocol, words: Words) -> str:
+    points = protocol.points
+    failed = sum(point.outcome == "fail" for point in points)
+    return words(f"verdict.{protocol.verdict.outcome}_text", points=len(points), failed=failed)
+
+
 def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
     verdict, points = protocol.verdict, protocol.points
-    failed = sum(point.outcome == "fail" for point in points)
-    text = words(f"verdict.{verdict.outcome}_text", points=len(points), failed=failed)
+    text = _verdict_text(protocol, words)
     is_open = verdict.outcome == "fail" and verdict.of("incomplete")
     if is_open:
         text += " " + words("verdict.open_items", count=len(words.reasons(verdict, "incomplete")))

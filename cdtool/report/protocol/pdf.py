@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from cdtool.errors import OutputError, UsageError
+from cdtool.errors import OutputError, UsageError, installing
 from cdtool.report.protocol.blocks import Document
 from cdtool.report.protocol.html import page_file
 
@@ -20,7 +20,7 @@ def check_typst() -> None:
         import typst  # noqa: F401
     except ImportError as fault:
         raise UsageError(
-            "a protocol as PDF needs typst", "pip install 'cdtool[pdf]', or write -o protocol.html and print it"
+            "a protocol as PDF needs typst", f"{installing('pdf')}, or write -o protocol.html and print it"
         ) from fault
 
 
@@ -50,7 +50,7 @@ def to_pdf(document: Document) -> bytes:
     except Exception as fault:
         raise OutputError(
             f"typst cannot typeset the protocol: {fault}",
-            "update it, pip install -U 'cdtool[pdf]', or write -o protocol.html",
+            f"update it, {installing('pdf')} --upgrade, or write -o protocol.html",
         ) from fault
     return bytes(made)
 

@@ -42,7 +42,3 @@ def median_range(item: Agreement) -> str:
 
 def _injected(item: Agreement) -> Cell:
     return Cell(median_range(item), key=key_of(item.injected_ms[0]))
-
-
-def _real(item: Agreement) -> Cell:
-    return Cell(milliseconds(item.real_ms), key=key_of(item.real_ms))

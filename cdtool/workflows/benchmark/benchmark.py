@@ -15,12 +15,11 @@ from cdtool.detectors.base import Detector
 from cdtool.evaluation.evaluated import Evaluated, evaluate
 from cdtool.evaluation.explanation.normal_choice import NormalMotions
 from cdtool.evaluation.false_alarm_budget import Budget
+from cdtool.evaluation.limits import LimitRule, unchecked
 from cdtool.evaluation.results import RecordingFinding, Results, Skipped
 from cdtool.evaluation.sweep import MULTIPLES
 from cdtool.evaluation.traces.trace import Trace
-from cdtool.findings import Finding
-from cdtool.findings.scoring import LimitsUnchecked
-from cdtool.kernel_warm_up import compile_loaded
+from cdtool.kernel_warm_up import compile_package
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges
 from cdtool.recording import FloatArray
@@ -143,17 +142,17 @@ def benchmark(
 
 @dataclass(frozen=True)
 class BenchmarkWork:
-    """A benchmark file with the options of the command; `limits` is the number of limits in the file."""
+    """A benchmark file with the options of the command; `limits` are those in the file."""
 
     setup: BenchmarkFile
-    limits: int
+    limits: tuple[LimitRule, ...]
     every_detector: bool
 
     @classmethod
     def of(cls, file: str | Path | BenchmarkFile, detectors: Sequence[str], budget: str | None) -> BenchmarkWork:
         """Read a benchmark file unless it has been read; raises as `benchmark`."""
         setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
-        limits = len(setup.limits)
+        limits = setup.limits
         setup = with_detectors(setup, detectors) if detectors else setup
         setup = replace(setup, budget=Budget.parse(budget)) if budget is not None else setup
         refuse_limits_by_hand(setup)
@@ -167,14 +166,11 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     learned = store.learned(teaching) if store else teaching.learned
     setup = with_only(setup, learned.about.detectors)
     seconds = perf_counter() - begin
-    left_out: list[RecordingFinding] = []
-    if len(setup.limits) < work.limits:
-        unchecked = Finding(LimitsUnchecked(work.limits - len(setup.limits), work.limits))
-        left_out.append(RecordingFinding.of(str(setup.path), unchecked))
     factors = sweep_factors(setup, learned.thresholds)
     gathered = Gathering(setup, setup.detectors, factors, learned.about.sources)
     gathered.skipped += (*setup.not_injected, *learned.about.skipped)
-    gathered.findings += [*measured, *learned.about.findings, *left_out]
+    gathered.findings += [*measured, *learned.about.findings]
+    gathered.findings += unchecked(work.limits, setup.detectors, str(setup.path))
     gathered.skipped += [
         Skipped(name, f"{group}: not tested by injected contacts: {reason}")
         for group, item in setup.impacts.items()
@@ -188,7 +184,7 @@ def _run(work: BenchmarkWork, workers: Workers, store: StoreOfRun | None, progre
     beside_logs = _digest_beside_logs(gathered, learned, provenance, stored.determinants.normals) if stored else ""
     found = stored.finished(beside_logs, provenance) if stored else None
     if found is None:
-        compile_loaded()
+        compile_package()
         gathered.score(lambda: _scoring(setup, learned, teaching, factors), logs, workers, progress, stored, plan)
         gathered.skipped += _labels_without_run(setup, gathered.scored)
         provenance["units"] |= gathered.units

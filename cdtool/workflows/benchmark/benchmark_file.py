@@ -30,7 +30,6 @@ from cdtool.plain_text import counted, digits
 from cdtool.remote.remote_path import joined, location
 from cdtool.tables import Table, read_toml
 from cdtool.thresholds.base import Threshold, is_per_run
-from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -118,10 +117,6 @@ class BenchmarkFile:
     inject: InjectSection | None = None
     not_injected: tuple[Skipped, ...] = ()
     force_limits: Path | None = None
-
-    def rule_of(self, detector: str) -> Threshold:
-        """Return the rule that a detector's signal is judged by: `rule`, unless the detector has its own."""
-        return rule_for(DETECTORS.load(detector), self.rule)
 
     @property
     def limits_by_hand(self) -> tuple[float, ...]:
@@ -282,7 +277,8 @@ def read_benchmark_file(
     if found.runs and (machine_file.columns.beside or machine_file.topics.beside):
         hint = "write each run to a log of its own, or map a channel of the log"
         raise root.fault("operations", "cannot divide a channel that is in a file of its own into runs", hint)
-    needs_runs = learning and not all(is_per_run(rule_for(DETECTORS.load(name), rule)) for name in names)
+    by_hand = bool(getattr(rule, "limits", ()))
+    needs_runs = learning and not by_hand and not is_per_run(rule)
     learn_table = root.table("learn", required=needs_runs)
     guard = _guard(learn_table)
     split = Split(learn_table.choice("split", [item.value for item in Split], Split.RECORDING.value))
@@ -342,6 +338,8 @@ def read_benchmark_file(
         raise root.fault("points", "there is no force profile to check them against", "set [force] profile")
     refuse_limits_by_hand(benchmark)
     _refuse_overlap(benchmark)
+    if learning:
+        _refuse_unknown_locations(benchmark)
     return benchmark
 
 
@@ -589,6 +587,17 @@ def _refuse_overlap(benchmark: BenchmarkFile) -> None:
                 f"{benchmark.path}: {path} is scored {where}", "list a recording in one group only, under one path"
             )
         scored[true] = name
+
+
+def _refuse_unknown_locations(benchmark: BenchmarkFile) -> None:
+    """Raise ConfigurationError if limits by location are learned only up to the contacts, where none is learned."""
+    rule, scored = benchmark.rule, set(resolve_all(_scored(benchmark.impacts)))
+    if benchmark.guard is None or "position" not in rule.needs or not scored.issuperset(resolve_all(benchmark.learn)):
+        return
+    raise ConfigurationError(
+        f"{benchmark.path}: learn.until is onset: the threshold {rule.name} would know no limit where the contacts are",
+        'add impact-free logs to [learn], or set threshold = "limit"',
+    )
 
 
 def _ends_early(benchmark: BenchmarkFile, log: Path) -> bool:

@@ -108,10 +108,10 @@ class Determinants:
         common = [setup.activation, setup.watched, hold]
         return {
             name: digest_of(
-                rule_to_dict(setup.rule_of(name)),
+                rule_to_dict(setup.rule),
                 common,
                 setup.machine_file.detector(name),
-                [fitted_to_dict(setup.rule_of(name), item) for item in self.learned.thresholds.get(name, ())],
+                [fitted_to_dict(setup.rule, item) for item in self.learned.thresholds.get(name, ())],
                 self.learned.about.unusable.get(name),
                 self.factors.get(name),
             )
@@ -201,7 +201,7 @@ def learned_key(setup: BenchmarkFile, sources: Mapping[Path, Sources], detectors
         code_version(),
         how_logs_are_read(setup),
         [[name, setup.machine_file.detector(name)] for name in detectors],
-        [rule_to_dict(setup.rule_of(name)) for name in detectors],
+        rule_to_dict(setup.rule),
         str(setup.budget),
         setup.activation,
         setup.watched,

@@ -13,6 +13,7 @@ from functools import cache
 from types import GenericAlias
 from typing import Any, get_type_hints
 
+from cdtool.bounded_loading import parse_own_json
 from cdtool.evaluation.comparison import Comparison
 from cdtool.evaluation.evaluated import Evaluated
 from cdtool.evaluation.results import ConclusionResult, Results
@@ -88,7 +89,7 @@ class FinishedRun:
                     parts[name] = text
             if not parts:
                 return None
-            head = json.loads(parts[_HEAD])
+            head = parse_own_json(parts[_HEAD])
             held: dict[str, Any] = {name: rows if name in head["rows"] else tuple(rows) for name, rows in known.items()}
             results = Results(
                 provenance={**provenance, **{name: head[name] for name in _FROM_LOGS if name in head}},

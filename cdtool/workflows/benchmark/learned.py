@@ -7,24 +7,24 @@ the runs themselves are needed (`Teaching`).
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
 from typing import Any
 
+from cdtool.bounded_loading import parse_own_json
 from cdtool.detectors import DETECTORS
 from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
 from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut
-from cdtool.kernel_warm_up import compile_loaded
+from cdtool.kernel_warm_up import compile_package
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.remote.remote_path import location
 from cdtool.thresholds.base import FittedThreshold, Threshold
 from cdtool.thresholds.normal_motion import NormalMotion
-from cdtool.thresholds.signature import ENOUGH_RUNS
 from cdtool.thresholds.stored import fitted_from_dict, fitted_to_dict
 from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile, with_only
 from cdtool.workflows.benchmark.learned_thresholds import LearnedThresholds, learn_thresholds, that_can_run
@@ -68,12 +68,12 @@ class Learned:
     seconds: float = 0.0
     lasts: bool = True
 
-    def to_text(self, rule_of: Callable[[str], Threshold]) -> str:
-        """Return it as JSON; `rule_of` returns the rule of a detector."""
+    def to_text(self, rule: Threshold) -> str:
+        """Return it as JSON; `rule` is that of the thresholds."""
         values = {
             "about": encoded(self.about, AboutLearning),
             "thresholds": {
-                name: [fitted_to_dict(rule_of(name), item) for item in items] for name, items in self.thresholds.items()
+                name: [fitted_to_dict(rule, item) for item in items] for name, items in self.thresholds.items()
             },
             "ranges": self.ranges.all.to_dict(),
             "ranges_without": {name: item.to_dict() for name, item in self.ranges.by_name.items()},
@@ -83,15 +83,15 @@ class Learned:
         return json.dumps(values, separators=(",", ":"))
 
     @classmethod
-    def of_text(cls, text: str, rule_of: Callable[[str], Threshold]) -> Learned:
+    def of_text(cls, text: str, rule: Threshold) -> Learned:
         """Return what `to_text` wrote; raises ValueError for anything else."""
         try:
-            values = json.loads(text)
+            values = parse_own_json(text)
             ranges = {name: PlausibleRanges.from_dict(item) for name, item in values["ranges_without"].items()}
             return cls(
                 decoded(values["about"], AboutLearning),
                 {
-                    name: tuple(fitted_from_dict(rule_of(name), item) for item in items)
+                    name: tuple(fitted_from_dict(rule, item) for item in items)
                     for name, items in values["thresholds"].items()
                 },
                 LearnedRanges(PlausibleRanges.from_dict(values["ranges"]), ranges),
@@ -151,7 +151,7 @@ class Teaching:
     @cached_property
     def _read(self) -> tuple[Runs, float]:
         """Return the runs, and the time that it took to read them [s]."""
-        compile_loaded()
+        compile_package()
         begin = perf_counter()
         runs = load_runs(self.setup.learn, self.setup.machine_file, self.setup.run_reading(self.workers))
         return runs, perf_counter() - begin
@@ -164,18 +164,9 @@ class Teaching:
         if not self.every_detector:
             return used, []
         used, left_out = that_can_run(used, self._runs.operations, machine_file.machine)
-        for item in [item for item in used if self._has_too_few_runs(item)]:
-            used.remove(item)
-            reason = f"its own threshold {item.own_threshold} needs {ENOUGH_RUNS} impact-free runs"
-            left_out.append(RecordingFinding.of(item.name, Finding(DetectorLeftOut(reason))))
         broken = DETECTORS.broken_plugins().items()
         left_out += [RecordingFinding.of(name, Finding(DetectorLeftOut(str(fault)))) for name, fault in broken]
         return used, left_out
-
-    def _has_too_few_runs(self, detector: Any) -> bool:
-        """Return whether a detector's own threshold cannot be learned from the runs, whatever their classes are."""
-        has_own = self.setup.rule_of(detector.name) is not self.setup.rule
-        return has_own and len(self._runs.operations) < ENOUGH_RUNS and not self.setup.signature.force
 
     @cached_property
     def _fitted(self) -> LearnedThresholds:

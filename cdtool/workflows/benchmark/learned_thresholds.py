@@ -58,13 +58,11 @@ def learn_thresholds(
     runs. Raises SignatureError if nothing can be learned, UsageError if there are too few runs for the budget.
     """
     learned = LearnedThresholds({}, [], [], [], {}, set(), {})
-    of_run = [item for item in detectors if is_per_run(setup.rule_of(item.name))]
+    of_run = is_per_run(setup.rule) or (setup.limits_by_hand and not setup.learn)
     if of_run and not setup.budget:
-        learned.thresholds.update((detector.name, (setup.rule_of(detector.name).fit([]),)) for detector in of_run)
-        detectors = [item for item in detectors if item not in of_run]
-        if not detectors:
-            learned.unused.update(operation.name for operation in operations)
-            return learned
+        learned.thresholds.update((detector.name, (setup.rule.fit([]),)) for detector in detectors)
+        learned.unused.update(operation.name for operation in operations)
+        return learned
     if of_run and not setup.learn:
         raise UsageError(f"a false-alarm budget of {setup.budget} is set on runs", "add impact-free logs: [learn] logs")
     left_out = LeftOut()
@@ -137,20 +135,14 @@ class _Learning:
             return _OfDetector(None, reason=fault.message)
         except NoUsableRunError as fault:
             return _OfDetector(None, reason=fault.reason, is_unusable=True)
-        except SignatureError as fault:
-            # Its own threshold may need what the others' does not: it does not stop them.
-            if setup.rule_of(detector.name) is setup.rule or len(setup.detectors) == 1:
-                raise
-            return _OfDetector(None, reason=fault.message)
         return _OfDetector(made, unusable, pairs if self.keeps_pairs else [])
 
 
 def _learn(setup: BenchmarkFile, detector: str, pairs: Sequence[Pair], left_out: Sequence[Skipped] = ()) -> _Made:
     """Learn one detector's thresholds from runs; a budget sets their safety factor on the same runs."""
-    rule = setup.rule_of(detector)
-    fit = fitting(rule)
+    fit = fitting(setup.rule)
     fitted = with_left_out(fit, left_out)(pairs)
-    findings = fitted.findings(rule, detector)
+    findings = fitted.findings(setup.rule, detector)
     if not setup.budget:
         return _Made(fitted.thresholds, fitted.skipped, fitted.creeping, findings)
     made = calibrate(setup.budget, detector, kept(pairs, fitted), fit, setup.activation, setup.split)

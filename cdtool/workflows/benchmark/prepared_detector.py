@@ -126,11 +126,12 @@ def prepare_benchmark(
     many = counted(len(used), "impact-free run")
     classes = len(fitted.thresholds[instance.name])
     many += f" of {classes} classes of motion" if classes > 1 else ""
-    origin = "from each run itself" if is_per_run(setup.rule_of(instance.name)) else f"learned from {many}"
-    described = f"threshold '{setup.rule_of(instance.name).name}' of {setup.path.name}, {origin}"
+    origin = "from each run itself" if is_per_run(setup.rule) else f"learned from {many}"
+    origin = "set by hand" if setup.limits_by_hand else origin
+    described = f"threshold '{setup.rule.name}' of {setup.path.name}, {origin}"
     hashes = {item.recording.digest: item.whole.name for item in used}
     run = _running(ThresholdsByLog.of(setup, fitted), instance, fitted.unusable)
-    normals = normals_for(used, setup.rule_of(instance.name))
+    normals = normals_for(used, setup.rule)
     return PreparedBenchmark(
         setup,
         instance.name,

@@ -62,12 +62,12 @@ class StoreOfRun:
         if entry is None:
             return None
         try:
-            return Learned.of_text(entry.content, setup.rule_of)
+            return Learned.of_text(entry.content, setup.rule)
         except ValueError:
             return None
 
     def _add(self, key: str, setup: BenchmarkFile, learned: Learned) -> None:
-        text = learned.to_text(setup.rule_of)
+        text = learned.to_text(setup.rule)
         self.store.add(
             [Entry(key, "learned", setup.path.name, "", text, seconds=learned.seconds, version=code_version())]
         )

@@ -52,11 +52,17 @@ def injected_logs(
         return found
     folder = joined(setup.path.parent, section.folder)
     if folder.exists() and not _may_replace(folder):
-        raise OutputError(f"{folder}: exists and holds other files", "set another [inject] folder, or remove it")
+        other = "contacts that cdtool inject made with other settings" if (folder / _DIGEST).exists() else "other files"
+        raise OutputError(f"{folder}: exists and holds {other}", "set another [inject] folder, or remove it")
     with replaced_folder(folder, _may_replace) as part:
         write_injected(section, setup.machine_file, setup.onset, part, setup.path.parent, workers, progress)
-        (part / _DIGEST).write_text(_digest(setup, section) + "\n", encoding="utf-8", newline="\n")
+        mark_as_made(part, setup, section)
     return read_injected(folder)
+
+
+def mark_as_made(folder: Path, setup: BenchmarkFile, section: InjectSection) -> None:
+    """Write what the recordings of a folder depend on, so that `cdtool benchmark` uses them until that changes."""
+    (folder / _DIGEST).write_text(_digest(setup, section) + "\n", encoding="utf-8", newline="\n")
 
 
 def made_before(setup: BenchmarkFile, section: InjectSection) -> InjectedLogs | None:
@@ -118,4 +124,5 @@ def _stated(obstacle: NamedObstacle, assumption: Assumption, cases: Sequence[Inj
 
 def _may_replace(folder: Path) -> bool:
     """Return whether a folder is empty or made by `cdtool benchmark`; one of `cdtool inject` belongs to the user."""
-    return folder.is_dir() and ((folder / _DIGEST).is_file() or not any(folder.iterdir()))
+    is_made = (folder / _DIGEST).is_file() and not (folder / "benchmark.toml").exists()
+    return folder.is_dir() and (is_made or not any(folder.iterdir()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from cdtool.evaluation.force.curve import ForceTimeCurve, force_time_curve
 from cdtool.evaluation.results import ContactResult, FalseAlarmResult, RecordingFinding, Skipped
 from cdtool.evaluation.truth.matching import match
 from cdtool.findings import Finding
+from cdtool.findings.channels import UnitContradicted
 from cdtool.findings.scoring import LogNotCut, NoForce, OnsetUnseen, PeakUnseen
 from cdtool.findings.truth import InProgress
 from cdtool.operations import Operation, motion_spans
@@ -189,11 +190,17 @@ def _pooled(found: Sequence[Sequence[Detection]]) -> dict[str, list[Alarm]]:
 def force_curves(
     recording: Recording, contacts: Sequence[Contact], mass_before_cell: float
 ) -> tuple[dict[int, ForceTimeCurve], list[Finding]]:
-    """Return the force over each contact that has an onset, by its number; a contact without a force is reported."""
+    """Return the force over each contact that has an onset, by its number; a contact without a force is reported.
+
+    If the header does not confirm the unit of the force, no contact has one.
+    """
     found: dict[int, ForceTimeCurve] = {}
     missing: list[Finding] = []
     if "force" not in recording:
         return found, missing
+    for item in recording.findings:
+        if item.channel == "force" and isinstance(item.fact, UnitContradicted):
+            return found, [replace(item, severity="warning")]
     ends = [*(contact.start for contact in contacts[1:]), float("inf")]
     for number, (contact, until) in enumerate(zip(contacts, ends, strict=False), 1):
         if contact.in_progress:

@@ -22,7 +22,7 @@ from time import monotonic, sleep
 from typing import Any
 from urllib.parse import urlsplit
 
-from cdtool.errors import CdtoolError, UsageError, WorkerError
+from cdtool.errors import CdtoolError, UsageError, WorkerError, installing
 from cdtool.plain_text import one_line, shorten
 from cdtool.workflows.execution.environment import difference, environment
 from cdtool.workflows.execution.interruption import without_interruption
@@ -234,7 +234,7 @@ def session_of(cluster: str, jobs: int, inputs: Iterable[Path] = ()) -> Iterator
         import dask
         import distributed
     except ImportError:
-        raise UsageError("--cluster needs the package distributed", "pip install 'cdtool[cluster]'") from None
+        raise UsageError("--cluster needs the package distributed", installing("cluster")) from None
     sights = [Sight.of(path) for path in dict.fromkeys([Path.cwd(), *inputs]) if path.exists()]
     with ExitStack() as stack:
         stack.enter_context(_silent())

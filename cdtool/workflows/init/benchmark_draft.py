@@ -108,7 +108,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         raise RecordingError(f"none of {counted(len(logs), 'log')} can be read{reason}", "check with cdtool info")
     impacts = [log for log in known if log.contacts]
     free = [log for log in known if log.contacts == 0]
-    usable, others = _detectors(first, machine_file, len(free) >= ENOUGH_RUNS)
+    usable, others = _detectors(first, machine_file)
     unknown = [log for log in known if log.contacts is None]
     beside: dict[str, str] = {}
     if not impacts and unknown:
@@ -142,18 +142,13 @@ def _noise(recording: Recording) -> float:
     return _NORMAL_MAD * float(np.median(np.abs(steps))) / math.sqrt(2.0) if len(steps) else math.nan
 
 
-def _detectors(recording: Recording, machine_file: MachineFile, has_runs: bool) -> tuple[list[str], list[str]]:
-    """Return the detectors that run on a log, and those that have their channels but not the machine's parameters.
-
-    One with its own threshold needs impact-free runs and a position to learn from.
-    """
+def _detectors(recording: Recording, machine_file: MachineFile) -> tuple[list[str], list[str]]:
+    """Return the detectors that run on a log, and those that have their channels but not the machine's parameters."""
     usable, others = [], []
     (operation,) = operations_of(recording, "whole")
     for name in DETECTORS.names():
         detector = machine_file.detector(name)
         if not set(detector.needs) <= set(recording.channels):
-            continue
-        if hasattr(detector, "own_threshold") and not (has_runs and "position" in recording):
             continue
         try:
             run_detector(operation, machine_file.machine, detector)
@@ -236,8 +231,8 @@ def _comments(unknown: Sequence[_Log], folder: Path) -> list[str]:
 
 
 def _label_file(logs: Sequence[_Log], folder: Path) -> str:
-    rows = [f"{relative_name(log.path, folder)},," for log in logs]
-    return "\n".join(["recording,start_s,end_s", *rows]) + "\n"
+    rows = [f"{relative_name(log.path, folder)},,," for log in logs]
+    return "\n".join(["recording,start_s,end_s,uncertainty_s", *rows]) + "\n"
 
 
 def _paths(logs: Sequence[_Log], folder: Path) -> str:

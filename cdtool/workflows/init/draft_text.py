@@ -30,6 +30,7 @@ class Clock:
     why: str = ""
     check: str = ""
     rate: float | None = None
+    nanoseconds: str = ""
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,7 @@ def _time(clock: Clock) -> list[str]:
         return _commented("time = { rate_hz = 1000.0 }", f"CHECK: a placeholder: {clock.why}")
     column = clock.column if isinstance(clock.column, int) else _text(clock.column)
     scale = f"unit = {_text(clock.unit)}" if clock.rate is None else f"rate_hz = {clock.rate:.5g}"
+    scale += f", nanoseconds = {_text(clock.nanoseconds)}" if clock.nanoseconds else ""
     return _commented(f"time = {{ column = {column}, {scale} }}", _marked(f"guessed: {clock.why}", clock.check))
 
 

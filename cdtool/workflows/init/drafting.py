@@ -18,7 +18,7 @@ from cdtool.findings.tables import UnreadCells
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.source import Format, Source
-from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts
+from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts, with_nanoseconds
 from cdtool.log_names import log_stem
 from cdtool.machine_file import read_machine_file
 from cdtool.remote.remote_path import location
@@ -32,7 +32,7 @@ from cdtool.workflows.init.draft_text import Clock, Draft, UnreadWord, draft_tex
 from cdtool.workflows.init.machine_side import side_of
 from cdtool.workflows.init.speed_ratio import Ratio, ratio_of
 from cdtool.workflows.init.streams import Channels, streams_of
-from cdtool.workflows.init.table_clock import TableClock, seconds, table_clock
+from cdtool.workflows.init.table_clock import TableClock, seconds, split_stamp, table_clock
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
 from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
@@ -251,6 +251,9 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     found = choose_format(path)
     source, words = _with_words(path, found, csv)
     topics = has_topics(found)
+    stamp = None if topics else split_stamp(source)
+    if stamp:
+        source = with_nanoseconds(source, *stamp)
     clock, times = (None if topics else table_clock(source)) or (None, None)
     streams = streams_of(source, times.time if times else None, times.column if times else None, topics)
     if not streams:
@@ -269,6 +272,8 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     doubt = _doubt(channels, clock, ratio) if side.gear is None else ""
     assumed = next((item.fact.sentence() for item in source.findings if isinstance(item.fact, ClockUnitAssumed)), "")
     time = Clock("time", "s", "the file's own clock", assumed) if own else _clock(clock, ratio, doubt)
+    if stamp and time.column == stamp[0]:
+        time = replace(time, why="seconds and nanoseconds of one stamp, by their names", nanoseconds=stamp[1])
     evidence = Evidence(channels, side, ratio, unit, clock is None or bool(clock.told), types)
     left, low_pass = unmapped_columns(channels), propose_low_pass(channels, _in_seconds(time, clock, topics or own))
     return Draft(

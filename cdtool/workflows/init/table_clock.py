@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from cdtool.units import find_unit
 from cdtool.workflows.init.quantity_words import is_clock, is_counter, name_in_group, word_for, words
 from cdtool.workflows.init.units_in_names import unit_in_name
 
+_NANOSECONDS = re.compile(r"(?<![a-z])n(?:ano)?s(?:ecs?|econds?)?$", re.IGNORECASE)
 _UNITS = ("s", "ms", "us", "ns", "min")
 # Sampling rates [Hz] that logs of a machine usually have, and those that are possible.
 _USUAL, _POSSIBLE = (20.0, 20e3), (0.5, 500e3)
@@ -89,6 +91,19 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     if named and clock.unlikely(named) < 2 * _RARE:
         return replace(clock, unit=named, told="the unit in its name", written=True), found
     return replace(clock, unit=min(clock.units() or (unit,), key=clock.unlikely)), found
+
+
+def split_stamp(source: Source) -> tuple[str, str] | None:
+    """Return the columns of a stamp of seconds and of the nanoseconds within each, by their names; None without."""
+    for name, column in source.columns.items():
+        ending = _NANOSECONDS.search(name)
+        if ending is None or column.values.ndim != 1 or not np.nanmax(column.values, initial=0.0) < 1e9:
+            continue
+        whole = re.compile(re.escape(name[: ending.start()]) + "s(?:ecs?|econds?)?", re.IGNORECASE)
+        for other in filter(whole.fullmatch, source.columns):
+            if not np.nanmax(source.columns[other].values % 1.0, initial=0.0):
+                return other, name
+    return None
 
 
 def seconds(unit: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ _RAW = ("A", "V", "1", "count")
 # Message types with SI units by the ROS convention (REP 103).
 _SI_PACKAGES = ("sensor_msgs", "geometry_msgs", "nav_msgs", "control_msgs", "trajectory_msgs")
 _MOTION = ("position", "speed")
+_MASS = re.compile(r"(kg|lbs?|lbm|oz|kilogramm?e?|pounds?|ounces?)\b(?![- ]?(f|kraft))", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,8 @@ class Evidence:
         if quantity == "torque":
             return _of_torque(stream, accepted, self.channels.joints)
         largest = float(np.nanmax(np.abs(stream.values)))
-        return Logged(
-            accepted[0], "", check=f"the unit is not stated; values reach {largest:.3g}: {others(accepted[0])}?"
-        )
+        why = f"the header says '{stream.unit}', which is no unit" if stream.unit else "the unit is not stated"
+        return Logged(accepted[0], "", check=f"{why}; values reach {largest:.3g}: {others(accepted[0])}?")
 
     def _differs(self, channel: str) -> bool:
         """Whether one is a current and the other a torque: a set torque next to a measured current."""
@@ -81,7 +82,8 @@ class Evidence:
 
     def _told(self, channel: str, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
         if si in accepted:
-            return Logged(unit, "stated in the log", check=self._contradicted(channel))
+            weight = "a mass: is it its weight, 1 kg = 9.81 N?" if _MASS.search(unit) else ""
+            return Logged(unit, "stated in the log", check=weight or self._contradicted(channel))
         if si in _RAW:
             return _raw(unit, accepted[0], self.channels.joints, "stated in the log")
         return Logged(unit, "stated in the log", check=f"with this type and these coordinates it is {accepted[0]}")

@@ -50,6 +50,7 @@ _TAILS = {
 # A unit that begins with a capital letter, without a separator, is written out: it has at least this many letters.
 _CAMEL, _WRITTEN_OUT = re.compile(r"(?<=[a-z])(?=[A-Z])"), 4
 _SEPARATOR = re.compile(r"[\W_]+")
+_INSIDE = re.compile(r"\s[\[(]([^\[\]()]{2,})[\])](?=\s)")
 # Units of other quantities: temperature, power, frequency, pressure, resistance, energy.
 _FOREIGN = frozenset(
     ("°c", "degc", "celsius", "℃", "k", "°f", "w", "kw", "va", "hz", "khz", "bar", "mbar", "pa", "kpa", "mpa", "ohm",
@@ -145,7 +146,12 @@ def _measures(quantity: str, unit: str) -> bool:
 
 
 def _split(name: str) -> tuple[str, str, str]:
-    """Return (the name before the ending, the ending, its unit); empty texts without such an ending."""
+    """Return (the name before the ending, the ending, its unit); empty texts without such an ending.
+
+    A unit in brackets within the name counts as its ending: `Kraft [kN] gefiltert`.
+    """
+    if (inside := _INSIDE.search(name)) and find_unit(inside[1]):
+        return name.replace(inside[0], ""), inside[0], inside[1]
     parts = [part for part in _SEPARATOR.split(name) if part]
     found = _tail(parts, 3) or _tail(parts, 2) or _after_slash(name) or _tail(parts, 1)
     return found or _written_out(name) or (name, "", "")
@@ -159,9 +165,11 @@ def _written_out(name: str) -> tuple[str, str, str] | None:
 
 
 def _tail(parts: list[str], count: int) -> tuple[str, str, str] | None:
-    """Return the split of a name whose last parts are a unit: `_mm_s`, `_ms`."""
+    """Return the split of a name whose last parts are a unit: `_mm_s`, `_ms`; of forces and torques any: `_daN`."""
     tail = "_".join(parts[-count:])
     unit = _CAPITALS.get(tail) or _TAILS.get(tail.lower(), "")
+    if not unit and len(tail) > 1 and (known := find_unit(tail)) and known.si in ("N", "N m"):
+        unit = tail
     if unit and (len(parts) > count or tail.lower() == "rpm"):
         return "_".join(parts[:-count]), tail, unit
     return None

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.axis_model.parameters import AxisModel
+from cdtool.bounded_loading import parse_json, read_bytes
 from cdtool.columns import Column
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.evaluation.results import Skipped
@@ -376,9 +377,9 @@ def read_injected(folder: Path) -> InjectedLogs:
     """Return the recordings of a folder from its manifest; raises ConfigurationError for a wrong one."""
     path = folder / MANIFEST
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = parse_json(read_bytes(path, ConfigurationError, hint="delete the folder"))
         cases = tuple(InjectedCase(**{**item, "doubts": tuple(item["doubts"])}) for item in values["cases"])
         skipped = tuple(Skipped(**item) for item in values["skipped"])
-    except (OSError, ValueError, KeyError, TypeError) as fault:
+    except (ValueError, KeyError, TypeError) as fault:
         raise ConfigurationError(f"{path}: is no manifest of injected recordings", "delete the folder") from fault
     return InjectedLogs(folder, cases, skipped)

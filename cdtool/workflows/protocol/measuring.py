@@ -27,7 +27,7 @@ from cdtool.workflows.benchmark.benchmark_file import BenchmarkFile
 from cdtool.workflows.benchmark.scoring import LogToScore, logs_to_score
 from cdtool.workflows.contacts.matched_log import force_curves
 from cdtool.workflows.protocol.protocol_file import ProtocolFile
-from cdtool.workflows.runs import find_logs, resolve_all
+from cdtool.workflows.runs import absent_truth, find_logs, resolve_all
 
 # A record that begins within this time [s] before a contact may show no rest at all: a slow contact begins with it.
 _EARLY = 0.6
@@ -211,7 +211,8 @@ def _measured(read: LogToScore, profile: ForceProfile, mass: float) -> tuple[lis
     unmeasured = [Unmeasured(recording.name, "in_progress") for contact in read.contacts if contact.in_progress]
     unmeasured += [Unmeasured(recording.name, "no_force", str(problem)) for problem in problems]
     if "force" not in recording:
-        unmeasured.append(Unmeasured(recording.name, "no_force", "no load cell"))
+        why = next(map(str, absent_truth(recording)), "no load cell")
+        unmeasured.append(Unmeasured(recording.name, "no_force", why))
     return repetitions, unmeasured
 
 

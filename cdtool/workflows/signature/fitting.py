@@ -13,14 +13,15 @@ from cdtool.dynamics import Machine
 from cdtool.errors import CdtoolError, SignatureError
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.findings.finding import Finding
-from cdtool.findings.scoring import CreepNotLearned, SingleSpeed
+from cdtool.findings.scoring import CreepNotLearned, SingleSpeed, SpeedsPooled
+from cdtool.motion import MotionClass
 from cdtool.motion.speed_range import in_ranges
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector_on_each
 from cdtool.plain_text import counted
-from cdtool.thresholds.base import FittedThreshold, Threshold
+from cdtool.thresholds.base import FittedThreshold, Threshold, is_per_run
+from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.contract import checked_fit
-from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.signature.grouping import by_class
@@ -54,14 +55,18 @@ class Fitted:
     creeping: tuple[Skipped, ...] = ()
 
     def findings(self, rule: Threshold, detector: str) -> tuple[RecordingFinding, ...]:
-        """Return the creeping strokes, and each motion that `speed_range` cannot serve, learned at a single speed."""
+        """Return the creeping strokes, and the speeds that a rule without classes of motion pools.
+
+        With `speed_range`, each motion that it cannot serve, as it was learned at a single speed.
+        """
         reasons = Counter(item.reason for item in self.creeping)
         creeping = tuple(
             RecordingFinding.of(detector, Finding(CreepNotLearned(count, reason), severity="note"))
             for reason, count in reasons.items()
         )
         if not getattr(rule, "speed_range", False):
-            return creeping
+            pooled = () if getattr(rule, "by_class", False) or is_per_run(rule) else _pooled(rule, self.used)
+            return (*creeping, *(RecordingFinding.of(detector, Finding(fact)) for fact in pooled))
         motions = [motion for item in self.thresholds if (motion := getattr(item, "motion", None))]
         single = [motions[numbers[0]].described for numbers in in_ranges(motions) if len(numbers) == 1]
         return (*creeping, *(RecordingFinding.of(detector, Finding(SingleSpeed(motion))) for motion in single))
@@ -70,6 +75,19 @@ class Fitted:
     def used(self) -> tuple[Operation, ...]:
         """Return all operations that were learned from."""
         return tuple(operation for operations in self.learned_from for operation in operations)
+
+
+def _pooled(rule: Threshold, operations: Sequence[Operation]) -> list[SpeedsPooled]:
+    """Return the slowest and the fastest runs of each motion whose speeds are those of two classes."""
+    motions = [item.motion for item in operations if "speed" in item.recording and item.motion.direction]
+    kinds: dict[tuple[int, int], list[MotionClass]] = {}
+    for motion in sorted(motions, key=lambda motion: motion.nominal_speed):
+        kinds.setdefault((motion.joint, motion.direction), []).append(motion)
+    return [
+        SpeedsPooled(rule.name, kind[0].described, kind[-1].described)
+        for kind in kinds.values()
+        if not kind[0].matches(kind[-1], SPEED_TOLERANCE)
+    ]
 
 
 Fit = Callable[[Sequence[Pair]], Fitted]
@@ -137,7 +155,7 @@ def fit_operations(
 ) -> Fitted:
     """Learn the rule from impact-free operations of a machine with a detector; raises SignatureError."""
     pairs, skipped = signals_of(operations, machine, detector, watched, unread)
-    fitted = fitting(for_machine(rule_for(detector, rule), machine))(pairs)
+    fitted = fitting(for_machine(rule, machine))(pairs)
     return replace(fitted, skipped=(*skipped, *fitted.skipped))
 
 
@@ -174,9 +192,9 @@ def _fit_classes(rule: Threshold, pairs: Sequence[Pair]) -> Fitted:
     creeping: list[Skipped] = []
     learned = sorted((item for of_class in used for item in of_class), key=lambda item: item.motion.nominal_speed)
     speeds = {id(item.whole): item.motion.nominal_speed for item in learned}  # the highest of each log
-    for fault, operations in refused:
+    for failure, operations in refused:
         is_creep = all(item.motion.nominal_speed < _CREEP * speeds.get(id(item.whole), 0.0) for item in operations)
-        reason = f"runs {operations[0].motion.described}: {fault.message}"
+        reason = f"runs {operations[0].motion.described}: {failure.message}"
         (creeping if is_creep else skipped).extend(Skipped(item.name, reason) for item in operations)
     return Fitted(tuple(fitted), tuple(used), tuple(skipped), tuple(creeping))
 

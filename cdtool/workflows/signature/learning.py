@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from cdtool.activation import Activation, ActivationSettings
-from cdtool.detection import WHOLE_MACHINE
 from cdtool.detectors.base import Detector
 from cdtool.errors import UsageError
 from cdtool.evaluation.false_alarm_budget import Budget
@@ -25,7 +24,6 @@ from cdtool.same_values import equal_by_values
 from cdtool.signature_file import FactorOrigin, LearnedRun, SignatureFile
 from cdtool.signature_store import read_signature, write_signature
 from cdtool.thresholds.base import Threshold
-from cdtool.thresholds.own_rule import rule_for
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
@@ -170,13 +168,7 @@ def learn(logs: Sequence[str | Path], options: LearningOptions) -> Learned:
     budget = Budget.parse(options.false_alarm_budget) if options.false_alarm_budget is not None else None
     check_joints(joints, machine_file.machine)
     instance = machine_file.detector(options.detector)
-    rule = Signature() if options.rule is None else options.rule
-    wanted = for_machine(rule_for(instance, rule), machine_file.machine)
-    if not isinstance(rule, Signature) and wanted.name != rule.name:
-        raise UsageError(
-            f"{instance.name} has its own threshold {wanted.name}, {rule.name} cannot assess its signal",
-            f"leave the threshold out, or give {wanted.name}",
-        )
+    wanted = for_machine(Signature() if options.rule is None else options.rule, machine_file.machine)
     _refuse_by_hand(wanted, budget)
     paths = [location(log) for log in several_logs(logs)]
     part = _part(paths, options)
@@ -220,7 +212,7 @@ def learned_from_runs(
         detector=instance.name,
         gains=asdict(instance),
         unit=instance.unit(machine_file.machine),
-        joints=WHOLE_MACHINE if pairs[0][1].channels else pairs[0][1].joints,
+        joints=pairs[0][1].joints,
         rule=rule,
         origin=origin,
         activation=setting.activation,

@@ -18,6 +18,7 @@ from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origi
 
 import numpy as np
 
+from cdtool.bounded_loading import parse_own_json
 from cdtool.findings import Fact
 
 T = TypeVar("T")
@@ -45,7 +46,7 @@ def decoded(text: str | bytes, kind: type[T]) -> T:
     """Return the value of a type that `encoded` made; raises ValueError for anything else."""
     plan = _plan(kind)  # type: ignore[arg-type]  # types are hashable
     try:
-        values = json.loads(text)
+        values = parse_own_json(text)
         made: T = plan.decode(values) if plan.decode else values
     except (TypeError, KeyError, IndexError, AttributeError, ImportError) as fault:
         raise ValueError(f"not an encoded {kind.__name__}: {fault}") from fault

@@ -20,7 +20,7 @@ from cdtool.file_locks import lock_handle, remove_locked
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
 
-_SUFFIX = ".journal"
+JOURNAL_SUFFIX = ".journal"
 # JSON has no tab: it is escaped in texts.
 _BETWEEN = "\t"
 
@@ -52,7 +52,7 @@ class Journal:
 def _locked_file(folder: Path) -> tuple[Path, IO[bytes]]:
     """Create a journal; another run may take it over before it is locked."""
     while True:
-        path = folder / f"{secrets.token_hex(8)}{_SUFFIX}"
+        path = folder / f"{secrets.token_hex(8)}{JOURNAL_SUFFIX}"
         file = path.open("xb")
         if _lock(file.fileno()) and path.exists():
             return path, file
@@ -69,11 +69,11 @@ def left_behind(folder: Path) -> Iterator[tuple[Path, list[Entry]]]:
 
     Each is locked until the next one is asked for, and then removed.
     """
-    for path in sorted(folder.glob(f"*{_SUFFIX}")):
+    for path in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
         with suppress(OSError), path.open("r+b") as file:
             if not _lock(file.fileno()) or not path.exists():
                 continue
-            yield path, list(_entries(file.read()))
+            yield path, list(entries_in(file.read()))
             file.truncate(0)  # where it is closed before it is removed, another run may open it meanwhile
             remove_locked(path, file.close)
 
@@ -85,7 +85,8 @@ def _line(entry: Entry) -> bytes:
     return b"%08x %s\n" % (zlib.crc32(text), text)
 
 
-def _entries(content: bytes) -> Iterator[Entry]:
+def entries_in(content: bytes) -> Iterator[Entry]:
+    """Yield the entries in the content of a journal."""
     for line in content.split(b"\n"):
         check, _, text = line.partition(b" ")
         if check == b"%08x" % zlib.crc32(text):

@@ -26,13 +26,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.bounded_loading import read_bytes
-from cdtool.errors import ConfigurationError, UsageError
+from cdtool.bounded_loading import parse_json, parse_own_json, read_bytes
+from cdtool.errors import ConfigurationError, UsageError, installing
 from cdtool.files import write_bytes, write_text
 from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.store.encoding import decoded, encoded
 from cdtool.workflows.store.entry import Entry
-from cdtool.workflows.store.journal import Journal, left_behind
+from cdtool.workflows.store.journal import JOURNAL_SUFFIX, Journal, entries_in, left_behind
 from cdtool.workflows.store.sources import SourceFile
 from cdtool.workflows.store.text_column import text_column
 
@@ -57,7 +57,7 @@ _PLAIN = ("key", "kind", "recording", "sources", "failed")
 class Store:
     """The store in a folder, which is created if it does not exist; raises ConfigurationError for another folder.
 
-    Without `writes` nothing is created, and entries that are added are dropped.
+    Without `writes` nothing is created, entries that are added are dropped, and journals are read like parts.
     """
 
     def __init__(self, folder: Path, *, writes: bool = True) -> None:
@@ -75,7 +75,8 @@ class Store:
             for _, entries in left_behind(folder):
                 if entries:
                     write_part(folder, entries)
-        self._all_parts = sorted((folder / "parts").glob("*.parquet"))
+        journals = () if writes else folder.glob(f"*{JOURNAL_SUFFIX}")
+        self._all_parts = [*sorted((folder / "parts").glob("*.parquet")), *sorted(journals)]
         self._index = _Index(self._all_parts)
 
     @property
@@ -234,20 +235,25 @@ def require_pyarrow() -> None:
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError as fault:
-        raise UsageError("--store needs pyarrow", "install it: pip install 'cdtool[store]'") from fault
+        raise UsageError("--store needs pyarrow", f"install it: {installing('store')}") from fault
 
 
 def write_part(folder: Path, entries: Sequence[Entry]) -> Path:
     """Write entries to a new part of a store, and return it."""
     import pyarrow as pa
 
-    columns: dict[str, list[Any]] = {name: [getattr(item, name) for item in entries] for name in _NAMES}
-    columns["recording"] = [encodable(name) for name in columns["recording"]]
-    columns["sources"] = [encoded(item, tuple[SourceFile, ...]) if item else _NO_SOURCES for item in columns["sources"]]
+    columns = _columns(entries)
     arrays = [
         _numbers(columns[name]) if name in ("seconds", "failed") else text_column(columns[name]) for name in _NAMES
     ]
     return _write_table(folder / "parts", pa.table(arrays, names=list(_NAMES)))
+
+
+def _columns(entries: Sequence[Entry]) -> dict[str, list[Any]]:
+    columns: dict[str, list[Any]] = {name: [getattr(item, name) for item in entries] for name in _NAMES}
+    columns["recording"] = [encodable(name) for name in columns["recording"]]
+    columns["sources"] = [encoded(item, tuple[SourceFile, ...]) if item else _NO_SOURCES for item in columns["sources"]]
+    return columns
 
 
 def _numbers(values: Sequence[float]) -> Any:
@@ -272,11 +278,13 @@ def _write_table(folder: Path, table: Any) -> Path:
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]] | None:
-    """Return columns of a part; None if the file is gone or damaged."""
+    """Return columns of a part or journal; None if the file is gone or damaged."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
+        if path.suffix == JOURNAL_SUFFIX:
+            return _columns(list(entries_in(path.read_bytes())))
         # `read_table` would import pandas.
         with pq.ParquetFile(pa.BufferReader(path.read_bytes()), page_checksum_verification=True) as file:
             table = file.read(columns=list(names))
@@ -330,7 +338,7 @@ def read_runs(folder: Path) -> list[tuple[Path, RunRecord]]:
     for path in (folder / "runs").glob("*.parquet"):
         try:
             metadata = pq.read_schema(pa.BufferReader(path.read_bytes())).metadata or {}
-            found.append((path, RunRecord(**json.loads(metadata[b"run"]))))
+            found.append((path, RunRecord(**parse_own_json(metadata[b"run"]))))
         except (OSError, pa.ArrowException, KeyError, TypeError, ValueError):
             continue
     return sorted(found, key=lambda item: item[1].ended, reverse=True)
@@ -382,7 +390,7 @@ def _create(folder: Path) -> None:
 
 def _values(mark: Path) -> Mapping[str, Any]:
     try:
-        values = json.loads(read_bytes(mark, ConfigurationError))
+        values = parse_json(read_bytes(mark, ConfigurationError))
     except ValueError:
         return {}
     return values if isinstance(values, dict) else {}

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from cdtool.bounded_loading import parse_own_json
 from cdtool.errors import OutputError
 from cdtool.tuning.candidate import Candidate, Measured
 
@@ -36,12 +37,12 @@ class Journal:
         found: dict[str, Measured] = {}
         try:
             with self.path.open(encoding="utf-8") as file:
-                if json.loads(file.readline()).get("search") != self._key:
+                if parse_own_json(file.readline()).get("search") != self._key:
                     return {}
                 for line in file:
                     if not line.endswith("\n"):
                         break
-                    key, values = json.loads(line)
+                    key, values = parse_own_json(line)
                     found[key] = Measured.from_dict(values)
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             pass

@@ -238,6 +238,7 @@ def tuning_summary(tuning: Tuning) -> dict[str, Any]:
         "seed": options.seed,
         "split": tuning.setup.split.value,
         "contacts": dict(tuning.groups),
+        "verdict": tuning.verdict[1],
         "checked_on_others": tuning.is_nested,
         "detectors": [_tuned_values(item) for item in tuning.detectors],
         "unusable": dict(tuning.unusable),

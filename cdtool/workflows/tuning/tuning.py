@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdtool.activation import DEBOUNCE_TIME, Activation
-from cdtool.detectors import DETECTORS
 from cdtool.errors import CdtoolError, SignatureError, UsageError, nearest
+from cdtool.evaluation.conclusion import Severity, Statement, worst_first
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.frames import rows_as_frame
 from cdtool.evaluation.results import RecordingFinding, Skipped
 from cdtool.html_table import html_table
-from cdtool.kernel_warm_up import compile_loaded
+from cdtool.kernel_warm_up import compile_package
 from cdtool.motion.applicable import HOLD
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector, signal_of_log
+from cdtool.plain_text import counted
 from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.thresholds import THRESHOLDS
@@ -173,6 +174,26 @@ class Tuning:
     __repr__ = short_repr
     __eq__ = equal_by_values
 
+    @property
+    def verdict(self) -> tuple[str, str]:
+        """Return colour and sentence of the best detector: the worst fact first, as page, screen and Python show it."""
+        best = self.detectors[0]
+        found, groups = best.honest, best.honest.groups
+        means = ", ".join(f"{name} {item.mean_ms:.3g} ms" for name, item in groups.items())
+        words = f"{best.detector} with {best.choice.rule.name} at {self.options.budget}: {means}"
+        statements = [Statement(Severity.MET, f"{words} on recordings not used for the choice")]
+        if best.nested is None:
+            statements = [Statement(Severity.APPARENT, f"apparent, on the recordings used for the choice: {words}")]
+        counts = (
+            (Severity.WITHOUT_LIMIT, "missed", sum(item.missed for item in groups.values())),
+            (Severity.NOT_ASSESSABLE, "not assessable", sum(item.not_assessable for item in groups.values())),
+        )
+        statements += [Statement(kind, f"{counted(count, 'contact')} {what}") for kind, what, count in counts if count]
+        hours = sum(item.recording.duration for item in self.runs.operations) / 3600.0
+        if excess := self.options.budget.excess((found.alarming, found.free), (found.alarming, hours)):
+            statements.append(Statement(Severity.OVER_BUDGET, f"more false alarms than the budget: {excess}"))
+        return worst_first(statements)[:2]
+
     def summary(self) -> pd.DataFrame:
         """Return a row per detector and group, the best detector first: what was achieved, and what the file has."""
         order = {"detector": [item.detector for item in self.detectors], "group": list(self.groups)}
@@ -185,9 +206,7 @@ class Tuning:
         for row in tuned_rows(self.detectors):
             counts = (f"{row.missed} of {row.contacts}", f"{row.alarming} of {row.operations}")
             rows.append((row.detector, row.group, row.threshold, row.mean_ms, row.default_mean_ms, *counts))
-        apparent = "apparent: on the recordings used for the choice"
-        what = "on recordings not used for the choice" if self.is_nested else apparent
-        return html_table(f"Tuned at {self.options.budget}, results {what}", headings, rows)
+        return html_table(f"Tuned: {self.verdict[1]}", headings, rows)
 
 
 def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> Tuning:
@@ -226,7 +245,7 @@ def tune_detectors(file: str | Path | BenchmarkFile, options: TuningOptions) -> 
     refuse_limits_by_hand(replace(setup, budget=options.budget))
     setup = _with_impacts(setup, options.impacts, workers, progress)
     with workers.ready():
-        compile_loaded()
+        compile_package()
         read = read_recordings(setup, options.budget, options.seed, workers, progress)
         if options.goal is Goal.FORCE and not np.isfinite(read.recordings.peak_of).any():
             raise UsageError("objective is 'force', but no log has the force of its contact", "map the load cell")
@@ -303,7 +322,7 @@ class _TuningOf:
         recordings, signals, skipped = self._usable()
         period = float(np.median([signal.period for _, signal in signals[0]]))
         debounces, activations = self._activations(period)
-        rule = for_machine(self.setup.rule_of(self.name), self.setup.machine_file.machine)
+        rule = for_machine(self.setup.rule, self.setup.machine_file.machine)
         default = Candidate.of(self._detector, rule)
         measuring = self._measuring(recordings, activations)
         measuring.remember(default, signals)
@@ -391,27 +410,15 @@ class _TuningOf:
         return [own, *others], (given, *(replace(given, debounce=count) for count in others))
 
     def _rules(self, default: Threshold, channels: set[str]) -> list[Threshold]:
-        """Return the rules to try: every registered one, the benchmark file's with its own settings.
-
-        A detector that has its own rule is judged by no other.
-        """
-        if hasattr(self._detector, "own_threshold"):
-            return rules_to_try([default], channels)
+        """Return the rules to try: every registered one, the benchmark file's with its own settings."""
         machine, setup = self.setup.machine_file.machine, self.setup
         signature = replace(setup.signature, adaptive_level=0.0, speed_range=False)
         rules: list[Threshold] = []
         for name in self.options.thresholds or THRESHOLDS.usable_names():
             rule = THRESHOLDS.load(name)
-            if name in self._own_rules:
-                continue
             made = setup.signature if name == "signature" else with_context(rule(), setup.signature.sides, signature)
             rules.append(default if name == default.name else for_machine(made, machine))
         return rules_to_try(rules, channels)
-
-    @property
-    def _own_rules(self) -> set[str]:
-        """Return the names of rules that belong to one detector."""
-        return {getattr(DETECTORS.load(name), "own_threshold", "") for name in DETECTORS.usable_names()}
 
     def _measuring(self, recordings: TuningRecordings, activations: tuple[Activation, ...]) -> Measuring:
         setup = self.setup
@@ -447,18 +454,17 @@ class _TuningOf:
     def _result(
         self, found: Searched, objective: Objective, measure: _MeasuresAll, debounces: list[int], words: list[str]
     ) -> TunedDetector:
-        seed = self.options.seed
         gains = movable_gains(self._detector, found.default)
         default = found.subsets[0].default
         default_reason = found.measured[found.default.key].reason
         default_nested = None
         if len(found.subsets) > 1 and not default_reason:
             by_default = measure.pooled([default] * (len(found.subsets) - 1), corrects=False)
-            default_nested = held_out_results(objective, by_default, seed)
-        best, chosen, made, rejected = _checked_choice(found, objective, measure, default_nested, seed)
-        nested, correction = held_out_results(objective, made, seed), made.multiplier if made else 1.0
+            default_nested = held_out_results(objective, by_default)
+        best, chosen, made, rejected = _checked_choice(found, objective, measure, default_nested)
+        nested, correction = held_out_results(objective, made), made.multiplier if made else 1.0
         why = "" if nested else self._why_not_nested(objective.recordings, measure.held_out(chosen))
-        apparent = apparent_results(objective, found, best, seed)
+        apparent = apparent_results(objective, found, best)
         assert apparent is not None, "the best candidate can be used"
         measured = found.measured[best.candidate.key]
         unusable: dict[str, str] = {}
@@ -476,7 +482,7 @@ class _TuningOf:
             correction=correction,
             apparent=apparent,
             nested=nested,
-            default_apparent=None if default_reason else apparent_results(objective, found, default, seed),
+            default_apparent=None if default_reason else apparent_results(objective, found, default),
             default_nested=default_nested,
             default_reason=default_reason,
             sensitivities=sensitivities_of(found, best, debounces, gains),
@@ -492,7 +498,7 @@ class _TuningOf:
 
 
 def _checked_choice(
-    found: Searched, objective: Objective, measure: _MeasuresAll, default: ChoiceResults | None, seed: int
+    found: Searched, objective: Objective, measure: _MeasuresAll, default: ChoiceResults | None
 ) -> tuple[Scored, list[Scored], Pooled | None, list[Rejection]]:
     """Return the choice, those without each fold, what these give on it, and the kinds of rules that were rejected.
 
@@ -509,7 +515,7 @@ def _checked_choice(
         if default is None or nested is None or best.candidate.key == found.default.key:
             return best, chosen, nested, rejected
         of_choice = measure.pooled([best] * len(chosen), corrects=True)
-        results = [held_out_results(objective, made, seed) for made in (nested, of_choice)]
+        results = [held_out_results(objective, made) for made in (nested, of_choice)]
         checked = [item for item in results if item is not None]
         ratios = np.max([item.costs / default.costs for item in checked], axis=0)
         if all(objective.is_acceptable(item.costs, default.costs) for item in checked):

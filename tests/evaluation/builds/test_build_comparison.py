@@ -59,7 +59,8 @@ def test_no_change_shown_states_the_detectable_change():
     assert found.verdict == "no change shown" and found.asked == 1
     least = detectable_difference(30, float(np.std(noise, ddof=1)), 0.8, 0.95)
     assert asked(found, "latency_ms").detectable == pytest.approx(least, rel=1e-3)
-    assert row_of(found).words == f"no change shown (a change of {least:.1f} ms would have been shown)"
+    assert row_of(found).words.startswith("on the same 30 contacts: ") and not found.later
+    assert row_of(found).words.endswith(f"; no change shown (a change of {least:.1f} ms would have been shown)")
 
 
 def test_a_change_of_the_size_said_to_be_shown_is_shown_in_some_80_of_100():
@@ -234,9 +235,10 @@ def test_a_stricter_level_shows_less():
 def test_too_few_recordings_to_show_anything_are_reported(unpaired, n):
     other = {"bytes_of": "other", "names": "x"} if unpaired else {}
     found = compare_builds(single(latencies(n)), single([x + 100.0 for x in latencies(n)], **other))
-    assert found.words == "inconclusive: this sample is too small to detect any change"
+    assert found.words.endswith("inconclusive: this sample is too small to detect any change")
+    same = "" if unpaired else "on the same 4 contacts: 4 later by 100 ms; "
     assert "too few recordings for 2 tests" in row_of(found).words
-    assert row_of(found).words.startswith("inconclusive: latency ")
+    assert row_of(found).words.startswith(f"{same}inconclusive: latency ")
     assert asked(found, "latency_ms").detectable == math.inf
 
 
@@ -417,3 +419,27 @@ def test_hostile_names_are_compared_like_any_other(name):
     outcomes = {("momentum", name): latencies()}
     found = compare_builds(build_results(outcomes, window_s={}), build_results(outcomes, window_s={}))
     assert row_of(found).group == name and found.verdict == "no change shown"
+
+
+OLD = [40.0 + number for number in range(16)]
+ON_THE_SAME = {
+    "all later": ([x + 21.0 + 70.0 * i / 15 for i, x in enumerate(OLD)], "16 later by 21.0 to 91.0 ms", True),
+    "mixed": (
+        [x + (8.0 if i < 9 else -2.0) for i, x in enumerate(OLD)],
+        "9 later by 8.0 ms, 7 earlier by 2.0 ms",
+        False,
+    ),
+    "missed": ([MISSED, *OLD[1:]], "1 newly missed", True),
+    "found": ([OLD[0] - 1.0, *OLD[1:]], "1 earlier by 1.0 ms", False),
+}
+
+
+@pytest.mark.parametrize("name", ON_THE_SAME)
+def test_what_happened_on_the_same_contacts_is_said_beside_the_inference(name):
+    new, words, later = ON_THE_SAME[name]
+    day = ["monday"] * 8 + ["tuesday"] * 8
+    found = compare_builds(single(OLD, campaigns=day), single(new, campaigns=day))
+    assert found.verdict == "inconclusive" and found.later == later
+    assert row_of(found).words.startswith(f"on the same 16 contacts: {words}; inconclusive: ")
+    start = "later on the same contacts in 1 of 1 row; about other recordings inconclusive: "
+    assert found.words.startswith(start if later else "inconclusive: ")

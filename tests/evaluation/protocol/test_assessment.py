@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from cdtool.evaluation.force.curve import ForceTimeCurve
 from cdtool.evaluation.force.limits import read_force_limits
+from cdtool.evaluation.force.verdict import averaged
 from cdtool.evaluation.protocol.assessment import Repetition, Unmeasured, assess_point, check_point, judge
 from cdtool.evaluation.protocol.plan import (
     Instrument,
@@ -46,6 +47,7 @@ METER = Instrument(
     sample_rate_hz=1000.0,
     filter="none",
 )
+FAILING = {ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS, ReasonKind.NOT_PERMISSIBLE}
 PLAN = TestPlan(
     machine=MachineParticulars("door", "A", "1", "hall", "1.0"),
     test=TestParticulars(tester="B", date=dt.date(2026, 3, 31), place="C", temperature_c=0.0),
@@ -298,7 +300,7 @@ def test_fail_beats_incomplete_and_incomplete_beats_pass_and_all_reasons_stay():
 def test_no_reason_is_ever_outvoted(kinds):
     verdict = Verdict(tuple(Reason(kind) for kind in kinds))
     assert (verdict.outcome == "pass") == (not kinds)
-    assert (verdict.outcome == "fail") == bool({ReasonKind.POINT_EXCEEDS, ReasonKind.PRESSURE_EXCEEDS} & set(kinds))
+    assert (verdict.outcome == "fail") == bool(FAILING & set(kinds))
     assert len(verdict.of("fail")) + len(verdict.of("incomplete")) == len(kinds)
 
 
@@ -383,3 +385,24 @@ def test_a_log_that_repeats_each_reading_has_the_sample_rate_of_the_cell(held, f
 def test_a_coarse_cell_under_a_steady_force_is_no_slow_cell():
     coarse = 2.0 * np.round((sine() + np.where(TIME < 3.0, 20.0, 0.0)) / 2.0)
     assert without_noise(curve(coarse)).sample_rate == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize("region", ["skull_and_forehead", "face"])
+@pytest.mark.parametrize("peak", [0.0, 5.0, 64.0, 500.0])
+def test_contact_with_the_head_never_passes_whatever_its_force(region, peak):
+    profile = read_force_limits()[f"iso_ts_15066_{region}"]
+    point = replace(POINT, repetitions=1, obstacle_stiffness_n_per_mm=profile.obstacle_stiffness_n_per_mm)
+    item = Repetition.of(("1.csv", "sha1"), 1, curve(sine(peak)), profile)
+    for made in (
+        assess_point(point, profile, [item]),
+        check_point(point, profile, 1),
+        assess_point(point, profile, []),
+    ):
+        assert made.outcome == "fail" and made.reasons[0].kind is ReasonKind.NOT_PERMISSIBLE
+    assert item.verdict.outcome == "fail" and averaged([item.verdict], profile).outcome == "fail"
+    words = "not permissible" if peak < 65.0 else "where"
+    assert words in item.verdict.reason
+    allowed = replace(profile, permissible=True)
+    assert Repetition.of(("1.csv", "sha1"), 1, curve(sine(peak)), allowed).verdict.outcome == (
+        "pass" if peak < 65.0 else "fail"
+    )

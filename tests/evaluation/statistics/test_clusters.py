@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 
 from cdtool.evaluation.statistics import clusters
-from cdtool.evaluation.statistics.bootstrap import bca
-from cdtool.evaluation.statistics.clusters import MOST_CLUSTERS, clusters_of
+from cdtool.evaluation.statistics.clusters import clusters_of
 from cdtool.evaluation.statistics.paired import paired_difference, unpaired_difference
 
 
@@ -31,17 +27,6 @@ def test_few_clusters_stay_and_the_same_seed_gives_the_same():
     many = clusters_of(np.arange(100.0), range(100))
     assert np.array_equal(many.merged(10, 1).values, many.merged(10, 1).values)
     assert not np.array_equal(many.merged(10, 1).values, many.merged(10, 2).values)
-
-
-def test_the_interval_of_more_recordings_than_are_drawn_is_that_of_all():
-    n = 2 * MOST_CLUSTERS + 500
-    values = 30.0 * np.exp(0.3 * np.random.default_rng(1).normal(size=n))
-    for statistic, error in (("mean", values.std() / math.sqrt(n)), ("median", None)):
-        found = bca(values, range(n), statistic, resamples=2000)
-        assert found.value == pytest.approx(getattr(np, statistic)(values), rel=1e-12)
-        assert found.low < found.value < found.high
-        if error:
-            assert found.high - found.low == pytest.approx(2 * 1.96 * error, rel=0.08)
 
 
 def test_a_difference_of_many_recordings_is_shown_and_none_is_not(monkeypatch):

@@ -28,3 +28,8 @@ def test_correlation_has_the_bits_of_numpy(count, seed, noise, scale):
 def test_correlation_of_a_constant_or_too_short_series_is_not_known(length):
     assert math.isnan(correlation(np.full(length, 0.5), np.arange(float(length))))
     assert math.isnan(correlation(np.arange(float(length)), np.zeros(length)))
+
+
+def test_rounding_errors_do_not_correlate():
+    rounded = 0.3 * (1.0 + 1e-16 * np.random.default_rng(1).standard_normal(50))
+    assert math.isnan(correlation(rounded, np.arange(50.0))) and math.isnan(correlation(np.arange(50.0), rounded))

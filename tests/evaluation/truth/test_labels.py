@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdtool.detection import Alarm, Signal, Verdict
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.evaluation.truth.labels import read_labels
+from cdtool.evaluation.truth.matching import match
 from cdtool.findings.truth import KindsExcluded, LabelsWithoutZone
 from cdtool.recording import Recording, Series, TableRows
 
@@ -63,6 +65,35 @@ def test_a_wrong_file_is_one_line_that_names_the_line(tmp_path, text, said):
 def log(origin: float = 0.0, rows: TableRows | None = None) -> Recording:
     time = np.arange(1000) * 0.01
     return Recording("soft/01.csv", "", ("axis",), {"speed": Series(time, time, "m/s")}, origin=origin, rows=rows)
+
+
+@pytest.mark.parametrize(
+    ("text", "uncertainty"),
+    [
+        ("start_s,end_s\n1.2530,", 0.005),  # half a sample of the log is more
+        ("start_s,end_s\n1.25,", 0.01),
+        ("start_s,end_s\n1.250,", 0.005),
+        ("start_s,end_s\n2,", 1.0),
+        ("start_s,end_s,uncertainty_s\n1.25,,0.002", 0.002),
+        ("start_s,end_s,uncertainty_s\n1.25,,0", 0.0),
+        ("start_s,end_s,uncertainty_s\n1.25,,", 0.01),
+        ("start_ms,end_ms\n1250,", 0.005),
+        ("start_ns,end_ns\n1250000000,", 0.005),
+        ("start_time,end_time\n1970-01-01T00:00:01,", 1.0),
+        ("start_time,end_time\n1970-01-01T00:00:01.25Z,", 0.01),
+        ("start_row,end_row\n125,", 0.005),
+    ],
+)
+def test_a_label_is_as_uncertain_as_its_log_or_its_last_digit(tmp_path, text, uncertainty):
+    header, row = text.split("\n")
+    labels = read_labels(write(tmp_path, f"recording,{header}\n01.csv,{row}\n"))
+    (contact,) = labels.contacts_in(log(rows=TableRows(np.arange(1000) * 0.01)))
+    assert contact.uncertainty == pytest.approx(uncertainty)
+    early = Alarm(contact.start - 0.9 * uncertainty, "axis", "above", 2.0, 1.0)
+    time = np.arange(1000) * 0.01
+    signal = Signal(time, np.zeros((1000, 1)), np.zeros((1000, 1), dtype=np.uint8), "N")
+    matching = match(Verdict("alarm", (early,), crossings=(early,)), [contact], signal)
+    assert (matching.matches[0].outcome, matching.matches[0].latency, matching.false_alarms) == ("detected", 0.0, ())
 
 
 ON_SOURCE = {
@@ -130,7 +161,7 @@ def test_a_wrong_time_is_one_line_that_names_it(tmp_path, text, settings, said):
 def test_rows_are_those_of_the_table_and_the_first_is_0(tmp_path):
     labels = read_labels(write(tmp_path, "recording,start_row,end_row\n01.csv,250,300\n"))
     (contact,) = labels.contacts_in(log(rows=TableRows(np.arange(1000) * 0.01)))
-    assert (contact.start, contact.end, contact.uncertainty) == pytest.approx((2.5, 3.0, 0.0))
+    assert (contact.start, contact.end, contact.uncertainty) == pytest.approx((2.5, 3.0, 0.005))
 
 
 def test_a_dropped_row_begins_at_the_next_one_and_widens_the_uncertainty(tmp_path):
@@ -139,7 +170,7 @@ def test_a_dropped_row_begins_at_the_next_one_and_widens_the_uncertainty(tmp_pat
     kept[245:255] = kept[990:] = False
     (contact,) = labels.contacts_in(log(rows=TableRows((np.arange(1000) * 0.01)[kept], kept)))
     assert (contact.start, contact.end) == pytest.approx((2.55, 9.89))
-    assert contact.uncertainty == pytest.approx(0.11)
+    assert contact.uncertainty == pytest.approx(0.115)
 
 
 def test_a_row_outside_the_table_or_in_a_log_without_one_is_named(tmp_path):

@@ -19,6 +19,7 @@ from cdtool.report.writers.base import Report
 from tests.report.hostile import HOSTILE
 from tests.report.html.html_case import case
 from tests.report.many import LIMITS, report_of_many
+from tests.synthetic.builds import build_results
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -262,6 +263,17 @@ def test_a_tooltip_shows_the_values_under_the_pointer(shown):
     assert lines[0].endswith("ms after the onset, undetected:")
     assert lines[1].startswith("quick: ") and lines[2].startswith("slow: ")
     assert all_of(browser, "#tooltip")[0].is_displayed()
+
+
+def test_past_the_last_alarm_a_survival_curve_says_how_many_are_undetected(shown):
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    browser = shown(to_html(Report(evaluate(build_results({("momentum", "stiff"): [40.0] * 10 + [80.0]})))))
+    plot = all_of(browser, '[data-plot="survival"]')[0]
+    browser.execute_script("arguments[0].scrollIntoView({ block: 'center' })", plot)
+    right = plot.size["width"] // 2 - 20
+    ActionChains(browser, duration=20).move_to_element_with_offset(plot, right, 0).perform()
+    assert texts(browser, "#tooltip")[0].split("\n")[1].startswith("momentum: 0.0 % ")
 
 
 @pytest.mark.parametrize("width", [400, 1400])

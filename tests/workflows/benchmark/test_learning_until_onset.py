@@ -345,3 +345,15 @@ def test_no_log_judges_itself_whatever_its_path_is_written(gate, how):
     _, learned = learned_of(setup)
     own, _ = ThresholdsByLog.of(setup, learned).without(folder / "01.csv")
     assert own["momentum"] != learned.thresholds["momentum"]
+
+
+@pytest.mark.parametrize("threshold", ["signature", "cusum", "glr", "innovation"])
+@pytest.mark.parametrize("option", [[], ["--dry-run"]])
+def test_limits_by_location_learned_up_to_the_onset_only_are_refused(gate, threshold, option):
+    """Nothing is read: no run passes a contact without one. With impact-free runs in [learn] it is accepted."""
+    head = HEAD.replace('"limit"', f'"{threshold}"')
+    (gate / "place.toml").write_text("".join([head, LEARN, ONSET, GROUPS]), encoding="utf-8")
+    done = command("benchmark", gate / "place.toml", *option)
+    assert done.status == 2 and f"the threshold {threshold} would know no limit where" in one_line(done.err)
+    assert 'set threshold = "limit"' in one_line(done.err) and not done.out
+    setup_of(gate, head, LEARN.replace('["stiff', '["free/*.csv", "stiff'), ONSET, GROUPS)

@@ -22,6 +22,7 @@ from cdtool.workflows.benchmark.dry_run import dry_run
 from cdtool.workflows.benchmark.learned import Learned, Teaching
 from cdtool.workflows.execution.workers import Workers
 from cdtool.workflows.store.store import Store
+from cdtool.workflows.store.upkeep import collect_garbage, store_status
 from cdtool.workflows.store.use import StoreUse
 
 FILE = """machine = "machine.toml"
@@ -385,7 +386,8 @@ def test_a_fleet_that_was_moved_is_known(gate, tmp_path):
     assert run(moved, tmp_path / "s") == (expected, 0)
 
 
-def test_journals_of_a_killed_run_are_taken_over(gate, tmp_path):
+def killed_run(gate):
+    """Kill a benchmark with a store after four of its logs."""
     code = (
         "import os; from pathlib import Path; import cdtool; from cdtool.workflows.store.use import StoreUse\n"
         "def progress(done, total):\n"
@@ -395,6 +397,21 @@ def test_journals_of_a_killed_run_are_taken_over(gate, tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(Path(cdtool.__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", code], check=False, cwd=gate, env=environment)
     assert done.returncode == -9
+
+
+def test_status_and_dry_run_count_what_the_journal_of_a_killed_run_holds(gate, tmp_path):
+    killed_run(gate)
+    content = {path: path.read_bytes() for path in (tmp_path / "s").rglob("*") if path.is_file()}
+    status = store_status(tmp_path / "s")
+    assert (status.recordings, status.failed, status.damaged) == (4, 0, ())
+    assert status.unused == sum(status.entries.values()) > 4
+    planned = dry_run(gate / "b.toml", store=StoreUse(tmp_path / "s"))
+    assert (len(planned.logs), planned.total) == (2, 6)
+    assert {path: path.read_bytes() for path in (tmp_path / "s").rglob("*") if path.is_file()} == content
+
+
+def test_journals_of_a_killed_run_are_taken_over(gate, tmp_path):
+    killed_run(gate)
     assert list((tmp_path / "s").glob("*.journal"))
     assert run(gate, tmp_path / "s") == (alone(gate), 2)
     assert not list((tmp_path / "s").glob("*.journal"))
@@ -406,8 +423,8 @@ def test_what_was_learned_is_restored_without_loss(made, threshold, tmp_path):
         (tmp_path / name).symlink_to(made / name)
     setup = with_detectors(read_benchmark_file(write(tmp_path, threshold)), ["momentum", "friction_ekf"])
     learned = Teaching(setup, Workers()).learned
-    restored = Learned.of_text(learned.to_text(setup.rule_of), setup.rule_of)
-    assert replace(restored, seconds=learned.seconds).to_text(setup.rule_of) == learned.to_text(setup.rule_of)
+    restored = Learned.of_text(learned.to_text(setup.rule), setup.rule)
+    assert replace(restored, seconds=learned.seconds).to_text(setup.rule) == learned.to_text(setup.rule)
     assert restored.about == learned.about
 
 
@@ -433,8 +450,6 @@ def test_a_dry_run_writes_nothing(gate, tmp_path):
 def test_the_store_states_which_entries_a_run_has_used(gate, tmp_path):
     run(gate, tmp_path / "s")
     store = Store(tmp_path / "s", writes=False)
-    from cdtool.workflows.store.upkeep import collect_garbage, store_status
-
     found = store_status(tmp_path / "s")
     assert (found.recordings, found.failed, found.unused, len(found.runs)) == (6, 0, 0, 1)
     assert found.entries["detector"] == 12

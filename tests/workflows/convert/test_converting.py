@@ -226,7 +226,7 @@ PROVENANCE = {
 def test_an_error_names_the_file_that_was_asked_for_and_not_the_temporary_one(tmp_path):
     target = tmp_path / "out.parquet"
     with pytest.raises(RecordingError, match=r"out\.parquet: no pyarrow") as told, replaced(target) as (part,):
-        raise RecordingError(f"{part}: no pyarrow", "pip install 'cdtool[parquet]'")
+        raise RecordingError(f"{part}: no pyarrow", "pip install '.[parquet]'")
     assert part.name not in str(told.value) and "pip install" in told.value.hint
     assert list(tmp_path.iterdir()) == []
 

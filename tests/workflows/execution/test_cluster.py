@@ -163,7 +163,7 @@ def test_without_the_package_one_line_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     done = cdtool("benchmark", ROOT / "sample_logs/gate/benchmark.toml", "--cluster", "local")
     assert done.status == 2
-    assert done.err == "error: --cluster needs the package distributed (pip install 'cdtool[cluster]')\n"
+    assert done.err == "error: --cluster needs the package distributed (pip install '.[cluster]')\n"
 
 
 @needs_dask

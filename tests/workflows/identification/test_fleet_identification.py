@@ -11,7 +11,6 @@ import pytest
 
 from cdtool.errors import UsageError
 from cdtool.identification.estimate import IdentificationError
-from cdtool.simulation.season import Season, write_gate_season
 from cdtool.workflows.identification.fleet_identification import (
     Division,
     DriftKind,
@@ -20,6 +19,7 @@ from cdtool.workflows.identification.fleet_identification import (
     identify_fleet,
 )
 from tests.command import cdtool as command
+from tests.synthetic.ageing import write_ageing_gate
 
 ROOT = Path(__file__).parents[3]
 GATE = ROOT / "sample_logs" / "gate"
@@ -71,8 +71,8 @@ def fleet_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     The machine file has no motor inertia: the drive is left out, which takes most of the time.
     """
     folder = tmp_path_factory.mktemp("fleet")
-    write_gate_season(folder / "gate2", Season(6, friction_change=0.5), 1)
-    write_gate_season(folder / "gate10", Season(6), 2)
+    write_ageing_gate(folder / "gate2", 6, 1, friction=1.5)
+    write_ageing_gate(folder / "gate10", 6, 2)
     (folder / "gate3" / "free").mkdir(parents=True)
     for number in (3, 4):
         shutil.copy(GATE / "stiff" / f"0{number}.csv", folder / "gate3" / "free" / f"0{number}.csv")

@@ -282,7 +282,7 @@ def test_without_the_extra_the_friction_is_identified_and_one_line_names_the_ext
     done = cdtool.identify([str(folder / "run*.csv")], folder / "machine.toml", tmp_path / "friction.toml")
     assert done.robot is not None
     assert done.robot.inertias is not None
-    assert "pip install 'cdtool[identify]'" in done.robot.inertias.refused
+    assert "pip install '.[identify]'" in done.robot.inertias.refused
     assert "\n" not in done.robot.inertias.refused
     assert any(joint.robot.form is FrictionForm.FRICTION for joint in done.joints if joint.robot)
     assert [path.name for path in tmp_path.iterdir()] == ["friction.toml"]

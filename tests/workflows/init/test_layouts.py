@@ -8,6 +8,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from cdtool.findings.channels import UnitContradicted
+from cdtool.ingest.reading import read_recording
+from cdtool.machine_file import read_machine_file
 from cdtool.workflows.init.drafting import init
 from tests.workflows.init.layouts import LAYOUTS, Truth, sealed, sealed_fourth, sealed_second, sealed_third
 from tests.workflows.init.layouts.layout import Table, table_layout
@@ -53,6 +56,18 @@ def test_the_same_holds_for_layouts_by_somebody_who_had_not_seen_the_guesser(tmp
     assert not [text for item in scores for text in item.unmarked]
     right, expected = sum(len(item.right) for item in scores), sum(len(item.expected) for item in scores)
     assert right >= 0.9 * expected
+
+
+@pytest.mark.parametrize(
+    "layouts", [LAYOUTS, sealed.LAYOUTS, sealed_second.LAYOUTS, sealed_third.LAYOUTS, sealed_fourth.LAYOUTS]
+)
+def test_the_unit_of_no_drafted_channel_is_in_doubt(tmp_path, layouts):
+    for layout in (item for item in layouts if item.name not in REFUSED):
+        log = written(layout, tmp_path)
+        init(log, tmp_path / "machine.toml", force=True)
+        found = read_recording(log, read_machine_file(tmp_path / "machine.toml")).findings
+        doubted = [item for item in found if isinstance(item.fact, UnitContradicted)]
+        assert not [item for item in doubted if item.severity == "loss" or item.channel == "force"], layout.name
 
 
 def test_a_missing_channel_is_not_replaced_by_another_one_without_a_mark(tmp_path):

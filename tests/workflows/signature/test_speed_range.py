@@ -10,6 +10,7 @@ import pytest
 import cdtool
 from cdtool.cli.signature_shown import show_file
 from cdtool.signature_store import read_signature, write_signature
+from cdtool.thresholds.limit import Limit
 from cdtool.thresholds.signature import Signature
 from tests.synthetic.door import MACHINE, write_log
 
@@ -83,6 +84,14 @@ def test_a_single_speed_is_reported_once_for_each_direction(door):
     results = cdtool.benchmark(file).results
     assert [item.kind for item in results.findings].count("single_speed") == 2
     assert [row.outcome for row in results.contacts] == ["detected"] * 3
+
+
+@pytest.mark.parametrize(("logs", "pooled"), [(["slow"], 0), (["slow", "fast"], 2)])
+def test_limits_of_two_speeds_in_one_are_reported_with_both(door, logs, pooled):
+    """Of each direction; a threshold with classes of motion does not pool them."""
+    found = [item for item in learn(door, *logs, rule=Limit()).findings if item.kind == "speeds_pooled"]
+    assert len(found) == pooled and all("0.2 m/s and" in item.reason and "0.3 m/s" in item.reason for item in found)
+    assert "speeds_pooled" not in [item.kind for item in learn(door, *logs, rule=Signature(force=True)).findings]
 
 
 def test_a_run_between_the_classes_teaches_none_of_them(door, learned):

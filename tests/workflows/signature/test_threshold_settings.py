@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,11 @@ import cdtool
 from cdtool.activation import Activation
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.signature_store import write_signature
+from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.cusum import Cusum
 from cdtool.thresholds.glr import Glr
 from cdtool.thresholds.innovation import Innovation
 from cdtool.thresholds.limit import Limit
-from cdtool.thresholds.matched_banks import MatchedBanks
 from cdtool.thresholds.signature import Signature
 from cdtool.workflows.benchmark.benchmark_file import read_benchmark_file
 from cdtool.workflows.signature.threshold_settings import rule_of
@@ -156,11 +157,22 @@ def test_a_wrong_threshold_is_one_line_that_names_its_key(door, text, said):
         read_benchmark_file(written(door, text))
 
 
-def test_an_order_may_be_given_where_none_is_the_default():
-    rule = rule_of("matched_banks", ["order=10"], {}, "one")
-    assert isinstance(rule, MatchedBanks) and rule.order == 10
+@dataclass(frozen=True)
+class InnovationOfAnyOrder(Innovation):
+    """As a plug-in may write it: a number that may be left out."""
+
+    order: int | None = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        """Accept every order."""
+
+
+def test_a_number_may_be_given_where_none_is_the_default(monkeypatch):
+    monkeypatch.setitem(THRESHOLDS.table, "innovation", f"{__name__}:InnovationOfAnyOrder")
+    rule = rule_of("innovation", ["order=10"], {}, "one")
+    assert isinstance(rule, InnovationOfAnyOrder) and rule.order == 10
     with pytest.raises(ConfigurationError, match="order: is 'ten'"):
-        rule_of("matched_banks", ["order=ten"], {}, "one")
+        rule_of("innovation", ["order=ten"], {}, "one")
 
 
 def test_a_signature_may_follow_its_runs(door):

@@ -13,8 +13,11 @@ import pytest
 import cdtool as api
 from cdtool import simulate_gate
 from cdtool.bounded_loading import parse_toml
+from cdtool.cli.tune import _show
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.log_section import LogSection, Mark
+from cdtool.notebook.tuning_result import TuningResult
+from cdtool.report.html.tuning_page import tuning_html
 from cdtool.report.tuning_files import open_folder, write_tuning
 from cdtool.signature_store import read_signature
 from cdtool.thresholds.limit import Limit
@@ -90,6 +93,28 @@ def test_the_summary_for_a_notebook_has_these_results(done):
     assert summary.default_mean_ms["soft"] == tuned.default_nested.groups["soft"].mean_ms
     assert summary.alarming.tolist() == [tuned.nested.alarming] * 2
     assert "on recordings not used for the choice" in done._repr_html_() and len(repr(done)) < 200
+
+
+VERDICTS = {
+    "within": ({"alarming": 4}, True, "good", "momentum with glr at 1/5op: stiff "),
+    "above": ({"alarming": 5}, True, "unknown", "more false alarms than the budget: 5 of 20 runs alarm where 1/5op "),
+    "apparent": ({"alarming": 0}, False, "unknown", "apparent, on the recordings used for the choice: momentum with"),
+}
+
+
+@pytest.mark.parametrize("name", VERDICTS)
+def test_every_surface_opens_with_the_worst_fact_of_a_tuning(name, done, capsys):
+    counts, nested, tone, words = VERDICTS[name]
+    best = replace(done.detectors[0].nested, free=20, **counts)
+    tuned = replace(done.detectors[0], nested=best if nested else None, apparent=best)
+    made = replace(done, options=replace(done.options, false_alarm_budget="1/5op"), detectors=(tuned,))
+    assert made.verdict[0] == tone and made.verdict[1].startswith(words)
+    _show(made, quiet=True)
+    assert " ".join(capsys.readouterr().out.split()).startswith(made.verdict[1])
+    assert f'<p class="verdict {tone}"><strong>{made.verdict[1]}</strong>' in tuning_html(made)
+    assert tuning_summary(made)["verdict"] == made.verdict[1]
+    assert repr(TuningResult(made)) == f"TuningResult(1 detector: {made.verdict[1]})"
+    assert f"<caption>Tuned: {made.verdict[1]}</caption>" in TuningResult(made)._repr_html_()
 
 
 def test_too_few_contacts_have_a_range_and_no_interval(done):

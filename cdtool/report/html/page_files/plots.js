@@ -156,7 +156,8 @@ function survivalPlan(data, panel, hidden) {
       const time = chart.valueAtPixel(x);
       const words = visible(panel, hidden).map((row) => {
         const i = stepAt(row, time);
-        if (time > row.until) return `${data.detectors[row.detector].name}: no longer monitored`;
+        const monitored = time <= row.until || row.share[row.share.length - 1] === 0;
+        if (!monitored) return `${data.detectors[row.detector].name}: no longer monitored`;
         const [share, ...band] = [row.share, row.low, row.high]
           .filter((values) => values)
           .map((values) => numberText(100 * values[i], 2));
