@@ -117,12 +117,13 @@ def _show(study: DraftedStudy, logs: list[Path], output: Path, *, quiet: bool) -
     typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(study.machine_path)}")
     if study.beside:
         typer.echo(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
-        some = " ".join(pattern if "*" in pattern else _quoted(pattern) for pattern in patterns(logs, Path()))
+        some = " ".join("*".join(part and _quoted(part) for part in item.split("*")) for item in patterns(logs, Path()))
         typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
     if study.has_detectors:
         typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
-    typer.echo("for a test protocol of the contact forces:")
-    typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
+    if not study.beside:
+        typer.echo("for a test protocol of the contact forces:")
+        typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
 
 
 def _warn(drafted: Drafted) -> None:

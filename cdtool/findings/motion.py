@@ -166,7 +166,7 @@ class AccelerometerTurned(AccelerometerFit):
 
     def sentence(self) -> str:
         """Return the fit, and the next step."""
-        return f"accelerometer{_of(self.joint)} has the opposite sign ({self.figures}): give scale = -1"
+        return f"accelerometer{_of(self.joint)} has the opposite sign ({self.figures}): reverse the sign of its scale"
 
 
 @frozen

@@ -54,6 +54,7 @@ def test_info_finds_an_accelerometer_that_is_mounted_the_other_way_round(gate_fo
     (tmp_path / "m.toml").write_text(text)
     done = cdtool("info", gate_folder / "free" / "01.csv", "--machine", tmp_path / "m.toml")
     assert "warning: acceleration: accelerometer has the opposite sign" in done.out
+    assert "reverse the sign of its scale" in done.out  # it may be -1 already
     text = text.replace('unit = "g", scale = 1', 'unit = "m/s2", scale = -1')
     (tmp_path / "m.toml").write_text(text)
     done = cdtool("info", gate_folder / "free" / "01.csv", "--machine", tmp_path / "m.toml")

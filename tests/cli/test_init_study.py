@@ -86,7 +86,7 @@ def test_without_ground_truth_it_writes_a_label_file_to_fill_in(gate, tmp_path):
     (gate / "blind.toml").write_text("\n".join(line for line in text.splitlines() if "force =" not in line))
     logs = csv_logs(gate, "stiff")
     done = cdtool("init", *logs, "-m", gate / "blind.toml", "-o", tmp_path / "study")
-    assert done.status == 0 and "fill in" in done.out
+    assert done.status == 0 and "fill in" in done.out and "protocol init" not in done.out
     rows = (tmp_path / "study" / "labels.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0] == "recording,start_s,end_s,uncertainty_s" and len(rows) == 1 + len(logs)
     found = api.detect(logs, gate / "machine.toml", detector="gm", limit=[400])
@@ -112,6 +112,14 @@ def test_logs_named_free_are_learned_from_and_folders_of_one_log_are_one_group(g
     assert made["learn"]["logs"] == [f"../{free}/*.csv"] and "until" not in made["learn"]
     assert list(made["impacts"]) == ["trial"]
     assert "# CHECK: 10 logs impact-free by their names" in (tmp_path / "study" / "benchmark.toml").read_text()
+
+
+def test_printed_patterns_of_a_folder_with_blanks_can_be_pasted_into_a_shell(gate, tmp_path):
+    (gate / "stiff").rename(gate / "my stiff")
+    text = (gate / "machine.toml").read_text(encoding="utf-8").replace("force =", "# force =")
+    (gate / "blind.toml").write_text(text, encoding="utf-8")
+    done = cdtool("init", *csv_logs(gate, "my stiff"), "-m", gate / "blind.toml", "-o", tmp_path / "study")
+    assert "/my stiff/'*.csv --machine" in done.out
 
 
 def test_a_log_that_cannot_be_read_is_named_and_the_others_are_drafted(gate, tmp_path):

@@ -596,7 +596,7 @@ SENTENCES: list[tuple[Fact, str]] = [
         motion.AccelerometerTurned("elbow", -1.02, -0.98),
         (
             "accelerometer of elbow has the opposite sign (slope -1.02, correlation -0.98 over the speed's "
-            "derivative): give scale = -1"
+            "derivative): reverse the sign of its scale"
         ),
     ),
     (

@@ -1,11 +1,12 @@
 """Contacts of a rigid axis whose channels are logged on clocks with a known offset and drift.
 
 The force of a contact is prescribed, and position and speed follow from it by integration: the data satisfy the balance
-m dv/dt = u - friction - F exactly, before noise, steps, filters and clocks are added.
+m dv/dt = u - friction - F, before noise, steps, filters and clocks are added.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from cdtool.machines.linear_axis import LinearAxis
 from cdtool.recording import Contact, FloatArray, Recording, Series
 
 MASS, FRICTION = 40.0, 25.0
+# Below about this speed the axis sticks [m/s].
+_STICK = 1e-3
 # Integration step [s], and the length of a simulated stroke [s].
 _STEP, _STROKE = 1e-4, 3.0
 
@@ -60,16 +63,18 @@ def collisions(
     clocks: Clocks,
     sensors: Sensors = Sensors(),
     rises: tuple[float, float] = (0.004, 0.04),
+    rebound: float = 0.1,
 ) -> tuple[Recording, list[Contact]]:
     """Return a log with one stroke per start time [s], each with a contact, and the contacts on the cell's clock.
 
-    Between the strokes nothing is logged. `rises` [s] are the shortest and longest rise times of the force.
+    Between the strokes nothing is logged. `rises` [s] are the shortest and longest rise times of the force, `rebound`
+    is the mean speed after the contact, by the one before it.
     """
     machine: dict[str, list[FloatArray]] = {"time": [], "speed": [], "position": [], "torque": []}
     cell: list[tuple[FloatArray, FloatArray]] = []
     contacts = []
     for start in starts:
-        time, force, drive, speed, position, touch, end = _stroke(rng, rises)
+        time, force, drive, speed, position, touch, end = _stroke(rng, rises, rebound)
         own = _stamps(rng, clocks.machine_rate, clocks.jitter)
         machine["time"].append(start + own)
         moved = np.interp(own, time, position)
@@ -95,7 +100,7 @@ def collisions(
     return Recording("log", "log", ("axis",), channels), contacts
 
 
-def _stroke(rng: np.random.Generator, rises: tuple[float, float]) -> tuple[FloatArray, ...]:
+def _stroke(rng: np.random.Generator, rises: tuple[float, float], rebound: float) -> tuple[FloatArray, ...]:
     """Return time, force, drive force, speed and position of a stroke, and the start and end of the contact [s]."""
     time = np.arange(0.0, _STROKE, _STEP)
     low, high = np.log(rises)
@@ -103,19 +108,28 @@ def _stroke(rng: np.random.Generator, rises: tuple[float, float]) -> tuple[Float
     touch, speed = rng.uniform(1.4, 1.9), rng.uniform(0.1, 0.3)
     fall = rise * rng.uniform(1.0, 3.0)
     end = touch + 2.0 * (rise + fall)
-    # The load is stopped and pushed back a little: the impulse is that of its momentum.
+    # The load is stopped and pushed back: the impulse is that of its momentum.
     shape = np.where(time < touch + 2.0 * rise, np.sin(0.25 * np.pi * np.clip(time - touch, 0.0, None) / rise), 0.0)
     back = np.clip((time - touch - 2.0 * rise) / (2.0 * fall), 0.0, 1.0)
     shape = np.where(time >= touch + 2.0 * rise, 0.5 * (1.0 + np.cos(np.pi * back)), shape)
     shape[time < touch] = 0.0
-    force = shape * MASS * speed * rng.uniform(1.0, 1.2) / (shape.sum() * _STEP)
+    force = shape * MASS * speed * (rng.uniform(0.9, 1.1) + rebound) / (shape.sum() * _STEP)
     ramp = np.clip((time - 0.2) / 0.5, 0.0, 1.0)
     drive = MASS * np.gradient(speed * (3.0 * ramp**2 - 2.0 * ramp**3), _STEP) + FRICTION * (ramp > 0.0)
     # The drive pushes harder after the contact, slowly, then gives up.
     drive = drive + 60.0 * np.clip((time - touch) / 0.1, 0.0, 1.0) * (time < end)
     drive = np.where(time > end, FRICTION, drive)
-    motion = _integral((drive - FRICTION * (ramp > 0.0) - force) / MASS)
+    motion = _speed(drive - force)
     return time, force, drive, motion, _integral(motion), touch, end
+
+
+def _speed(balance: FloatArray) -> FloatArray:
+    """Return the speed that a force leads to, against dry friction that turns round with the motion."""
+    speed, now = np.empty(len(balance)), 0.0
+    for k, force in enumerate(balance.tolist()):
+        now += _STEP * (force - FRICTION * math.tanh(now / _STICK)) / MASS
+        speed[k] = now
+    return speed
 
 
 def _integral(values: FloatArray) -> FloatArray:

@@ -105,9 +105,10 @@ def audit(recording: Recording, machine: Machine, contacts: Sequence[Contact]) -
     Notes
     -----
     F = u - friction - J dv/dt for a rigid machine. With an accelerometer on the load, m dv/dt of the load is measured
-    instead (two masses, connected by an elastic transmission). Friction enters as constant in a contact, scale and
-    offset are estimated in every event. The method fails where neither holds: contacts that the machine's inertia does
-    not feel (very slow ones), clamping at standstill, robots whose contact moves another joint than the one examined.
+    instead (two masses, connected by an elastic transmission). Of an axis, the friction in the machine file is
+    subtracted; scale and offset are estimated in every event. The method fails where neither holds: contacts that the
+    machine's inertia does not feel (very slow ones), clamping at standstill, robots whose contact moves another joint
+    than the one examined, dry friction that the machine file does not have where the load rebounds.
 
     Examples
     --------
@@ -266,6 +267,11 @@ def _balances(
             parts = [replace(motion, factor=-float(reflected[j])), load] if reflected[j] > 0.0 else [load]
         torque = recording["torque"]
         parts.append(_part(torque, j, 0))
+        if "speed" in recording and not machine.coupled:
+            # Constant while the motion keeps its direction; it changes its sign where the load rebounds.
+            speed = recording["speed"]
+            nothing = np.zeros_like(speed.values)
+            parts.append(_part(speed.with_values(machine.force_balance(nothing, nothing, speed.values), "N"), j, 0))
         sums.append(parts)
     return rests_on, sums
 

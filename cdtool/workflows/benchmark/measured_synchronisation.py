@@ -109,7 +109,7 @@ def _of_all(audited: Sequence[_Audited]) -> ChannelLatency | None:
     from cdtool.evaluation.synchronisation.latency import preferred
     from cdtool.workflows.log_checks.synchronisation import pooled_latencies
 
-    known = [item for item in audited if any(latency.assessable for latency in item.latencies)]
+    known = [item for item in audited if any(latency.has_delays for latency in item.latencies)]
     logs, origins = [item.latencies for item in known], [item.origin for item in known]
     together = preferred(pooled_latencies(logs, origins)) or (preferred(logs[0]) if logs else ())
     unknown = preferred([latency for item in audited for latency in item.latencies])

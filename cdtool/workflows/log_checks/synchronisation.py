@@ -38,7 +38,7 @@ def pooled_latencies(logs: Sequence[Sequence[ChannelLatency]], origins: Sequence
     pairs: dict[tuple[str, str, str, str], list[tuple[ChannelLatency, float]]] = {}
     for latencies, origin in zip(logs, origins, strict=True):
         for item in latencies:
-            if item.assessable:
+            if item.has_delays:
                 key = (item.channel, item.joint, item.reference, item.rests_on)
                 pairs.setdefault(key, []).append((item, origin))
     found = []

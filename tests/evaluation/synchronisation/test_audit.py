@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from cdtool.evaluation.synchronisation.audit import audit
-from cdtool.evaluation.synchronisation.latency import ChannelLatency, pooled, preferred
+from cdtool.evaluation.synchronisation.delay import EventDelay
+from cdtool.evaluation.synchronisation.latency import ChannelLatency, TimedEvent, latency_from, pooled, preferred
 from cdtool.recording import Contact, Recording, Series
 from tests.synthetic.shifted_clocks import Clocks, Sensors, axis, collisions
 
@@ -44,6 +45,27 @@ def test_intervals_contain_the_offset_and_drifts_are_within_5_ppm():
     assert hits >= 3
 
 
+@pytest.mark.parametrize("count, reason", [(1, "1 contact with a delay"), (4, "4 contacts"), (5, "")])
+def test_a_load_cell_is_not_assessable_below_five_contacts(count, reason):
+    recording, contacts = collisions(np.random.default_rng(3), np.arange(count) * 5.0, Clocks())
+    found = load_cell(audit(recording, axis(), contacts))
+    assert found.reason.startswith(reason) and found.assessable == (not reason) == found.offset.known
+    assert len(found.used) == count
+
+
+@pytest.mark.parametrize("spread, assessable", [(0.005, True), (0.03, False)])
+def test_an_interval_wider_than_20_ms_is_not_assessable(spread, assessable):
+    events = [TimedEvent(EventDelay(float(i), spread * (i % 3), 1e-3, 0.9)) for i in range(9)]
+    found = latency_from(ChannelLatency("force", "position", "momentum balance"), events)
+    assert found.assessable == assessable and ("ms wide, at most 20 ms" in found.reason) == (not assessable)
+
+
+def test_friction_that_turns_round_at_a_rebound_is_no_delay():
+    rng, rises = np.random.default_rng(7), (0.02, 0.04)
+    recording, contacts = collisions(rng, np.arange(6) * 5.0, Clocks(), rises=rises, rebound=0.9)
+    assert abs(load_cell(audit(recording, axis(), contacts)).offset.value) < 5e-4
+
+
 def test_a_filter_in_the_load_cell_is_a_latency():
     rng, sensors = np.random.default_rng(3), Sensors(cell_filter=0.008)
     recording, contacts = collisions(rng, np.arange(5) * 10.0, Clocks(), sensors)
@@ -68,7 +90,7 @@ def test_stiff_and_soft_contacts_are_told_apart():
 
 
 def test_the_offset_follows_a_shift_of_the_stamps():
-    recording, contacts = collisions(np.random.default_rng(5), np.arange(2) * 5.0, Clocks())
+    recording, contacts = collisions(np.random.default_rng(5), np.arange(5) * 5.0, Clocks())
     force = recording["force"]
     later = {**recording.channels, "force": Series(force.time + 0.015, force.values, "N")}
     moved = [replace(item, start=item.start + 0.015, end=item.end + 0.015) for item in contacts]
@@ -79,7 +101,7 @@ def test_the_offset_follows_a_shift_of_the_stamps():
 
 def test_missing_samples_and_a_gap_do_not_displace_the_result():
     clocks = Clocks(0.004)
-    recording, contacts = collisions(np.random.default_rng(6), np.arange(3) * 5.0, clocks)
+    recording, contacts = collisions(np.random.default_rng(6), np.arange(5) * 5.0, clocks)
     force = recording["force"].values.copy()
     force[::7] = np.nan
     speed = recording["speed"]
