@@ -2,8 +2,8 @@
 
     python .ci/readme_commands.py VENV
 
-Each must end with status 0 and without a traceback; the first shows colour, and the only wait for compiled loops. The lines that create
-an environment, install or run the tests are left out: .ci/run does that.
+Each must end with status 0 and without a traceback; the first shows colour, and the only wait for compiled loops. The
+lines that create an environment, install or run the tests are left out: .ci/run does that.
 """
 
 from __future__ import annotations
