@@ -80,7 +80,7 @@ def import_kernels() -> None:
 
 def missing() -> list[Kernel]:
     """Return the kernels of the modules imported so far that are not in the cache; none without a cache."""
-    return _not_cached(item for item in entries() if not item.is_ready)
+    return _not_cached(item for item in entries() if not item.is_ready and not item.is_instruction)
 
 
 def compile_named(names: Iterable[tuple[str, str]]) -> None:

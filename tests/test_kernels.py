@@ -153,6 +153,13 @@ def test_compiling_all_loaded_kernels_leaves_none_to_compile_later(monkeypatch):
     assert _double not in kernels.entries()
 
 
+def test_instructions_without_a_caller_are_nothing_to_compile():
+    code = "import cdtool.instructions; from cdtool.kernel_warm_up import missing; print(len(missing()))"
+    run = [sys.executable, "-c", code]
+    done = subprocess.run(run, cwd=Path(__file__).parents[1], capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n"
+
+
 def _ours() -> list[Kernel]:
     modules = ("cdtool.activation", "cdtool.machines.tree_kernel", "cdtool.machines.tree_inverse_kernel")
     return [
