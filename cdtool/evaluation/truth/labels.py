@@ -170,8 +170,12 @@ def read_labels(
     if clock == "source" and form == "row":
         raise ConfigurationError(f"{path}: labels_clock is source, but the labels count rows", "remove labels_clock")
     findings = [Finding(LabelsWithoutZone())] if False in zoned and not zone else []
-    for contacts in found.values():
+    # The finest digit of the file counts for all labels: many programs drop zeros at the end, and write 2 for 2.000.
+    digits = [contact.resolution for items in found.values() for contact, _ in items]
+    finest = min((digit for digit in digits if not math.isnan(digit)), default=math.nan)
+    for name, contacts in found.items():
         contacts.sort(key=lambda item: item[0].start)
+        found[name] = [(replace(item, resolution=min(item.resolution, finest)), where) for item, where in contacts]
     excluded = _excluded(path, found, not_contacts)
     if excluded:
         findings.append(Finding(KindsExcluded(excluded, tuple(dict.fromkeys(not_contacts))), severity="note"))

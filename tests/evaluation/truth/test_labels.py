@@ -113,6 +113,11 @@ def test_a_label_is_as_uncertain_as_its_log_or_its_last_digit(tmp_path, text, un
     assert (matching.matches[0].outcome, matching.matches[0].latency, matching.false_alarms) == ("detected", 0.0, ())
 
 
+def test_a_label_without_the_zeros_at_its_end_is_as_uncertain_as_the_others(tmp_path):
+    labels = read_labels(write(tmp_path, "recording,start_s,end_s\n01.csv,2,\n02.csv,1.953,\n"))
+    assert labels.contacts["01.csv"][0].resolution == pytest.approx(0.001)
+
+
 ON_SOURCE = {
     "seconds": ("start_s,end_s", "1743681602.75,1743681603.25"),
     "milliseconds": ("start_ms,end_ms", "1743681602750,1743681603250.0"),
