@@ -128,7 +128,7 @@ class LimitsUnchecked(TemplateFact):
     limits: int
     detectors: str
 
-    words = "{count} of {limits} limits are set for detectors that were not run ({detectors}): not checked"
+    words = "{count} of {limits} limits not checked ({detectors} not run)"
 
 
 @frozen

@@ -210,7 +210,7 @@ WORST = {
     ),
     "limits of a detector that was not run": (
         replace(results([40.0] * 3), findings=tuple(ABSENT)), [], (), "", 0,
-        "1 of 1 limits are set for detectors that were not run (gm): not checked",
+        "1 of 1 limits not checked (gm not run)",
     ),
     "what was lost before limits that are met": (
         replace(results([40.0] * 3), findings=LOST_PART, skipped=(Skipped("b.csv", "empty"),)), [MET], (), "unknown", 3,

@@ -775,7 +775,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (scoring.LearnedFromIt(), "the signature was learned from this log: the absence of alarms is no evidence"),
     (scoring.PlotsLeftOut(7), "7 more operations with a miss or a false alarm have no trigger plot"),
-    (scoring.LimitsUnchecked(1, 2, "gm"), "1 of 2 limits are set for detectors that were not run (gm): not checked"),
+    (scoring.LimitsUnchecked(1, 2, "gm"), "1 of 2 limits not checked (gm not run)"),
     (scoring.DetectorLeftOut("no channel 'acceleration'"), "left out: no channel 'acceleration'"),
     (
         scoring.SpeedsPooled("limit", "forward at 0.2 m/s", "forward at 0.3 m/s"),

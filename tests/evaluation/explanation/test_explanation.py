@@ -304,7 +304,7 @@ def test_the_words_name_joint_limit_debounce_and_what_moved_first():
         "the alarm (debounce: 9 consecutive samples outside).",
         "Likely cause: not clear.",
         "No impact-free runs to compare with: limits set by hand are not learned from runs; learn a signature with "
-        "cdtool learn-signature and give it with --signature. Compared with this log's own past instead.",
+        "cdtool learn-signature and give it to cdtool detect --signature. Compared with this log's own past instead.",
         "Moved first: acceleration down 5 ms after the onset, torque up 20 ms.",
         "First input of momentum: torque, 20 ms after the onset.",
     ]
