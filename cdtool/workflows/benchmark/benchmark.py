@@ -90,8 +90,8 @@ def benchmark(
     file : str, Path or BenchmarkFile
         The benchmark file.
     detectors : sequence of str or Detector, optional
-        Detectors in place of the file's: names, or objects with their gains, `Momentum(bandwidth=20.0)`. Only "all": every registered detector that can learn from these logs; the
-        others are listed in `results.findings`.
+        Detectors in place of the file's: names, or objects with their gains, as `Momentum(bandwidth=20.0)`. Only "all":
+        every registered detector that can learn from these logs; the others are listed in `results.findings`.
     false_alarm_budget : str, optional
         As "1/1000op" or "0.1/h": sets each detector's safety factor on the runs learned from.
     jobs : int, optional
