@@ -385,7 +385,8 @@ def _measures_synchronisation(onset: Table) -> bool:
 def _wanted_detectors(root: Table, learning: bool, detectors: Sequence[str | Detector]) -> Sequence[str | Detector]:
     """Return the detectors of a file, or else those given; the recordings of a force rig may need none."""
     if root.raw("detectors") != []:
-        return root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
+        default: Any = _all_or(detectors) if detectors or not learning else None
+        return root.texts("detectors", default)
     if learning and not detectors:
         hint = "name some, or write a protocol of the forces without detectors: cdtool protocol init"
         raise root.fault("detectors", "is empty: nothing can be scored", f"{hint} {root.where}")
