@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from pathlib import Path
@@ -71,6 +71,12 @@ class MachineFile(StoresDerived):
             return registry.checked(name)
         full = registry.canonical(name)
         return registry.load(full)(**self.gains.get(full, {}))
+
+    def with_gains_of(self, detectors: Sequence[str | Any]) -> MachineFile:
+        """Return the file with the gains of those detectors that are objects; raises UsageError for unknown classes."""
+        made = [self.detector(item) for item in detectors if not isinstance(item, str)]
+        registry = _registry("cdtool.detectors", "DETECTORS")
+        return replace(self, gains={**self.gains, **{registry.canonical(item.name): asdict(item) for item in made}})
 
 
 def read_machine_file(path: str | Path) -> MachineFile:

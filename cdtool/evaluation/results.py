@@ -124,7 +124,7 @@ class ContactResult:
 class FalseAlarmResult:
     """One alarm without a contact."""
 
-    recording: str = meant("operation: the log's path, with #n where it was cut into several")
+    recording: str = meant("path of the log below the benchmark file")
     group: str = meant("the benchmark's group")
     detector: str = meant("full name of the detector")
     joint: str = meant("joint that raised it")

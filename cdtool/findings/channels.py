@@ -189,6 +189,16 @@ class UnitContradicted(Fact):
 
 
 @frozen
+class SpeedWithoutValue(TemplateFact):
+    """The speed is mapped, but no message or row has a value of it, as in JointState messages without velocities."""
+
+    words = (
+        "no sample has a value: delete the line speed in [channels] of the machine file, and it is derived from the "
+        "position; with this line, detectors that need the speed cannot assess anything"
+    )
+
+
+@frozen
 class DerivedSpeed(TemplateFact):
     """The speed is the derivative of the position, through two low-passes at `low_pass` [Hz]."""
 

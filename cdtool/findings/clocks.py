@@ -593,6 +593,15 @@ class HeaderDelay(TemplateFact):
 
 
 @frozen
+class SteadyHeader(TemplateFact):
+    """The times of the log vary, and those in the headers of the messages do not."""
+
+    words = (
+        'the header\'s stamps are regular: write time = {{ clock = "header" }} in [channels.mcap] of the machine file'
+    )
+
+
+@frozen
 class HeaderUnset(TemplateFact):
     """The stamps in the messages' headers are all 0."""
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from cdtool.clock import differentiate, integrate, previous_value
 from cdtool.findings import Finding
-from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference
+from cdtool.findings.channels import DerivedSpeed, IntegratedPosition, IntegratedReference, SpeedWithoutValue
 from cdtool.recording import RIG_UNITS, UNITLESS, FloatArray, Recording, Series
 from cdtool.tables import Table
 
@@ -122,6 +122,8 @@ class JointMachine:
         """
         channels = {name: self._referred(name, series) for name, series in recording.channels.items()}
         findings = list(recording.findings)
+        if {"speed", "position"} <= channels.keys() and not np.isfinite(channels["speed"].values).any():
+            findings.append(Finding(SpeedWithoutValue(), "speed"))
         if "speed" not in channels and "position" in channels:
             channels["speed"] = differentiate(channels["position"], speed_low_pass, self.speed_unit)
             findings.append(Finding(DerivedSpeed(speed_low_pass), "speed", "note"))

@@ -15,9 +15,20 @@ from cdtool.channels import AXES
 from cdtool.clock.stamps import COARSE_SHARE, missing_findings
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
+from cdtool.errors import RecordingError
 from cdtool.evaluation.truth.force_vector import with_scalar_force
 from cdtool.findings import Fact, Finding, worst_first
-from cdtool.findings.clocks import BackwardClock, CoarseStamps, EmptyClock, NoClock, StandingClock
+from cdtool.findings.clocks import (
+    BackwardClock,
+    CoarseClock,
+    CoarseStamps,
+    DroppedStamps,
+    EmptyClock,
+    Jitter,
+    NoClock,
+    StandingClock,
+    SteadyHeader,
+)
 from cdtool.findings.truth import InProgress
 from cdtool.formats.source import Source, in_words
 from cdtool.ingest.clock_guess import ReadColumn, TableClock, is_clock_name
@@ -169,11 +180,29 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
     findings += placeholder_findings(recording, machine_file)
+    findings += _steady_header(log, machine_file, findings)
     latencies = audit(recording, machine_file.machine, contacts)
     findings += latency_findings(latencies)
     found = worst_first(findings)
     details, origin = logged.details, recording.origin
     return Info(str(log), logged.format, details, tuple(channels), found, logged.dialect, latencies, origin)
+
+
+def _steady_header(log: Path, machine_file: MachineFile, findings: Sequence[Finding]) -> list[Finding]:
+    """Return the advice to use the stamps in the headers of messages, if these are regular and the log's are not."""
+    from cdtool.ingest.reading import read_recording
+
+    jittery = [item.channel for item in findings if isinstance(item.fact, Jitter) and item.channel != "time"]
+    time = machine_file.topics.time
+    if not jittery or time.clock == "header":
+        return []
+    topics = replace(machine_file.topics, time=replace(time, clock="header"))
+    try:
+        found = read_recording(log, replace(machine_file, topics=topics)).findings
+    except RecordingError:  # messages without a header, or with one that is never set
+        return []
+    is_steady = not any(isinstance(item.fact, Jitter | CoarseClock | DroppedStamps) for item in found)
+    return [Finding(SteadyHeader(), ", ".join(jittery))] if is_steady else []
 
 
 def common_latencies(surveys: Sequence[Info]) -> list[Finding]:

@@ -232,7 +232,9 @@ def _beside(scored: Scored, detector: str, said: Mapping[str, Triggered], clock:
     first, last = spans[0][0], spans[-1][1]
     if any(not first <= at <= last for at in outside):
         other = "recording" if clock == "source" else "source"
-        words += f"; the recording is from {first:.3f} to {last:.3f} s: another clock? try --clock {other}"
+        in_ms = all(at > last and first <= at / 1e3 <= last for at in outside)
+        cause = "are the times in ms? time_s is in seconds" if in_ms else f"another clock? try --clock {other}"
+        words += f"; the recording is from {first:.3f} to {last:.3f} s: {cause}"
     return [Skipped(name, words)]
 
 

@@ -175,6 +175,12 @@ def test_triggers_on_the_source_clock_are_converted_and_a_wrong_clock_is_reporte
     assert [item["recording"] for item in wrong["skipped"]] == ["stiff/01.csv", "soft/01.csv"]
 
 
+def test_trigger_times_in_ms_are_named(logs, measured):
+    rows = "".join(f"{name},{1e3 * (onset + 0.045):.0f},plc,\n" for name, onset in onsets(measured).items())
+    _, err = scored(logs, rows + QUIET, status=3)
+    assert "are the times in ms? time_s is in seconds" in err and "--clock" not in err
+
+
 def test_rows_of_recordings_that_are_not_scored_are_a_note(logs, measured):
     """Without a row about a scored recording, all of them would count as monitored without an alarm."""
     done = score(logs, after(measured, 0.05) + "stiff/99.csv,1.0,plc,\nfree/01.csv,2.0,plc,\n")

@@ -248,6 +248,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         clocks.HeaderDelay(1.5, 0.25, 4.0),
         "logged 1.500 ms (median; 5 to 95 %: 0.250 to 4.000 ms) after the header's stamp",
     ),
+    (
+        clocks.SteadyHeader(),
+        'the header\'s stamps are regular: write time = { clock = "header" } in [channels.mcap] of the machine file',
+    ),
     (clocks.HeaderUnset(), "the header's stamps are never set: use the log clock"),
     (
         clocks.ClocksApart(12.5, "speed"),
@@ -475,6 +479,11 @@ SENTENCES: list[tuple[Fact, str]] = [
     (
         channels.AbsentTruth("topic", "/force data", "/forces data"),
         "is not in this log: no topic '/force data'; did you mean '/forces data'?",
+    ),
+    (
+        channels.SpeedWithoutValue(),
+        "no sample has a value: delete the line speed in [channels] of the machine file, and it is derived from the "
+        "position; with this line, detectors that need the speed cannot assess anything",
     ),
     (channels.MissingValues(1, 100), "1 of 100 values is missing (NaN)"),
     (channels.MissingValues(2, 100), "2 of 100 values are missing (NaN)"),

@@ -3,5 +3,6 @@
 from __future__ import annotations
 
 from tests.formats.conftest import log, machine
+from tests.formats.mcap_files import by_hand
 
-__all__ = ["log", "machine"]
+__all__ = ["by_hand", "log", "machine"]

@@ -8,9 +8,12 @@ import pytest
 from cdtool.clock import clean_time
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import BackwardStamps, ClockRestart, ClocksApart
+from cdtool.findings.channels import SpeedWithoutValue
+from cdtool.findings.clocks import BackwardStamps, ClockRestart, ClocksApart, SteadyHeader
 from cdtool.formats.mcap.write import Stream, write_mcap
 from cdtool.ingest.reading import read_recording
+from cdtool.workflows.information import info
+from tests.command import cdtool
 from tests.ingest.test_channel_assembly import channels_and_facts, gate_columns, table
 
 
@@ -70,3 +73,28 @@ def test_channels_whose_times_do_not_overlap_are_reported_with_their_distance(tm
 def test_every_row_of_a_clock_that_runs_backward_is_counted():
     (finding,) = clean_time(np.arange(5000, 0, -1) * 1e-3).findings
     assert isinstance(finding.fact, BackwardStamps) and (finding.fact.count, finding.fact.rows) == (4999, 5000)
+
+
+@pytest.mark.parametrize(("steady", "wanted"), [(True, ["speed, torque"]), (False, [])])
+def test_regular_header_stamps_are_named_where_log_times_vary(by_hand, machine, tmp_path, steady, wanted):
+    time, late = np.arange(1, 1000) * 10**7, np.random.default_rng(1).integers(0, 9 * 10**6, (2, 999))
+    logged, stamps = time + late[0], time if steady else time + late[1]
+    speed, torque = np.sin(time / 1e9), 5.0 * np.cos(time / 1e9)
+    header = [{"stamp": {"sec": at // 10**9, "nanosec": at % 10**9}} for at in stamps.tolist()]
+    contents = [{"header": h, "velocity": v, "torque": t} for h, v, t in zip(header, speed, torque, strict=True)]
+    path = by_hand([(at, at, content) for at, content in zip(logged.tolist(), contents, strict=True)])
+    fields = {"speed": "velocity", "torque": "torque"}
+    channels = "".join(f'{name} = {{ topic = "/a", field = "{field}" }}\n' for name, field in fields.items())
+    mapped = machine(f"[channels.mcap]\n{channels}")
+    findings = info(path, machine=mapped).findings
+    assert [item.channel for item in findings if isinstance(item.fact, SteadyHeader)] == wanted
+    drafted = cdtool("init", path, "-o", tmp_path / "draft.toml")
+    assert ('write time = { clock = "header" }' in drafted.err) == steady and drafted.status == 0
+
+
+def test_a_speed_of_empty_arrays_is_to_be_deleted(by_hand, machine):
+    messages = [(i * 10**7, i * 10**7, {"position": [i / 400.0], "velocity": []}) for i in range(400)]
+    fields = {"position": "position[0]", "speed": "velocity[0]"}
+    channels = "".join(f'{name} = {{ topic = "/a", field = "{field}" }}\n' for name, field in fields.items())
+    recording = read_recording(by_hand(messages), machine(f"[channels.mcap]\n{channels}"))
+    assert Finding(SpeedWithoutValue(), "speed") in recording.findings

@@ -161,3 +161,14 @@ def test_results_are_read_back_from_their_file(result, tmp_path):
     pd.testing.assert_frame_equal(again.summary(), result.summary())
     with pytest.raises(UsageError):
         result.save(GATE / "benchmark.toml", force=True)
+
+
+def test_every_frame_of_a_log_cut_into_strokes_names_the_log(tmp_path):
+    groups = {"learn": "free/*.csv", "holdout": "*/03.csv", "impacts.stiff": "stiff/04.csv"}
+    tables = "".join(f'[{name}]\nlogs = ["{GATE}/{logs}"]\n' for name, logs in groups.items())
+    study = tmp_path / "benchmark.toml"
+    text = f'machine = "{MACHINE}"\noperations = "motion"\n[signature]\nforce = true\nsafety_factor = 0.3\n{tables}'
+    study.write_text(text.replace("free/*.csv", "free/[01][04-9].csv"))
+    found = cdtool.benchmark(study, detectors=["momentum"])
+    named = {name: found.frame(name).recording for name in ("contacts", "false_alarms", "recordings", "skipped")}
+    assert all(len(names) and names.str.endswith(".csv").all() for names in named.values()), named

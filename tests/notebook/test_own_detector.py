@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,6 +12,7 @@ import pytest
 import cdtool
 from cdtool.detectors.base import gain
 from cdtool.detectors.momentum import Momentum
+from cdtool.workflows.store.use import StoreUse
 from tests.notebook.values import FREE, GATE, LOG, MACHINE
 
 
@@ -64,3 +66,30 @@ def test_a_detector_that_violates_the_contract_is_refused_in_one_line():
 def test_a_benchmark_file_takes_the_name_of_a_detector_only():
     with pytest.raises(cdtool.CdtoolError, match="a benchmark file names its detectors"):
         cdtool.detect(LOG, benchmark=GATE / "benchmark.toml", detector=Effort())
+
+
+def test_a_benchmark_takes_detectors_with_their_gains(tmp_path):
+    machine = tmp_path / "machine.toml"
+    machine.write_text(f"{MACHINE.read_text()}\n[detectors.momentum]\nbandwidth = 20.0\n")
+    text = (GATE / "benchmark.toml").read_text().replace('= "machine.toml"', f'= "{machine}"')
+    study = tmp_path / "benchmark.toml"
+    study.write_text(re.sub(r'"((?:free|holdout|stiff|soft)/)', rf'"{GATE}/\1', text))
+    wanted = cdtool.benchmark(study, detectors=["momentum"]).contacts.latency_ms.tolist()
+    store = StoreUse(tmp_path / "store")
+    for names in (["momentum"], [Momentum(bandwidth=20.0), "pt"]):
+        found = cdtool.benchmark(GATE / "benchmark.toml", detectors=names, store=store, jobs=len(names))
+    assert found.results.detectors == ("momentum", "pure_torque")
+    assert found.contacts[found.contacts.detector == "momentum"].latency_ms.tolist() == wanted
+    assert found.results.provenance["gains"]["momentum"]["bandwidth"] == 20.0
+
+
+@pytest.mark.parametrize(
+    ("detectors", "words"),
+    [
+        (["gm", Momentum(bandwidth=20.0)], "detectors momentum, momentum contain a repetition"),
+        ([Effort()], "unknown detector 'effort'"),
+    ],
+)
+def test_a_benchmark_refuses_detectors_that_it_cannot_tell_by_name(detectors, words):
+    with pytest.raises(cdtool.CdtoolError, match=words):
+        cdtool.benchmark(GATE / "benchmark.toml", detectors=detectors)

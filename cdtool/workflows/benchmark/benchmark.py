@@ -76,7 +76,7 @@ class Benchmark:
 def benchmark(
     file: str | Path | BenchmarkFile,
     *,
-    detectors: Sequence[str] = (),
+    detectors: Sequence[str | Detector] = (),
     false_alarm_budget: str | None = None,
     jobs: int = 1,
     workers: Workers | None = None,
@@ -89,9 +89,9 @@ def benchmark(
     ----------
     file : str, Path or BenchmarkFile
         The benchmark file.
-    detectors : sequence of str, optional
-        Detectors in place of the file's. Only "all": every registered detector that can learn from these logs; the
-        others are listed in `results.findings`.
+    detectors : sequence of str or Detector, optional
+        Detectors in place of the file's: names, or objects with their gains, as `Momentum(bandwidth=20.0)`. Only "all":
+        every registered detector that can learn from these logs; the others are listed in `results.findings`.
     false_alarm_budget : str, optional
         As "1/1000op" or "0.1/h": sets each detector's safety factor on the runs learned from.
     jobs : int, optional
@@ -149,7 +149,9 @@ class BenchmarkWork:
     every_detector: bool
 
     @classmethod
-    def of(cls, file: str | Path | BenchmarkFile, detectors: Sequence[str], budget: str | None) -> BenchmarkWork:
+    def of(
+        cls, file: str | Path | BenchmarkFile, detectors: Sequence[str | Detector], budget: str | None
+    ) -> BenchmarkWork:
         """Read a benchmark file unless it has been read; raises as `benchmark`."""
         setup = file if isinstance(file, BenchmarkFile) else read_benchmark_file(file, detectors=detectors)
         limits = setup.limits

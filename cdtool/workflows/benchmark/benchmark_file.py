@@ -13,6 +13,7 @@ from typing import Any
 from cdtool.activation import Activation
 from cdtool.bounded_loading import read_bytes
 from cdtool.detectors import DETECTORS
+from cdtool.detectors.base import Detector
 from cdtool.errors import ConfigurationError, UsageError, nearest
 from cdtool.evaluation.false_alarm_budget import Budget
 from cdtool.evaluation.force.limits import ForceProfile, profile_of, read_force_limits
@@ -250,7 +251,7 @@ class BenchmarkFile:
 
 
 def read_benchmark_file(
-    path: str | Path, learning: bool = True, also_known: Sequence[str] = (), detectors: Sequence[str] = ()
+    path: str | Path, learning: bool = True, also_known: Sequence[str] = (), detectors: Sequence[str | Detector] = ()
 ) -> BenchmarkFile:
     """Read and check a benchmark file; raises ConfigurationError naming the key.
 
@@ -381,10 +382,11 @@ def _measures_synchronisation(onset: Table) -> bool:
     return measured
 
 
-def _wanted_detectors(root: Table, learning: bool, detectors: Sequence[str]) -> Sequence[str]:
+def _wanted_detectors(root: Table, learning: bool, detectors: Sequence[str | Detector]) -> Sequence[str | Detector]:
     """Return the detectors of a file, or else those given; the recordings of a force rig may need none."""
     if root.raw("detectors") != []:
-        return root.texts("detectors", _all_or(detectors) if detectors or not learning else None)
+        default: Any = _all_or(detectors) if detectors or not learning else None
+        return root.texts("detectors", default)
     if learning and not detectors:
         hint = "name some, or write a protocol of the forces without detectors: cdtool protocol init"
         raise root.fault("detectors", "is empty: nothing can be scored", f"{hint} {root.where}")
@@ -400,18 +402,19 @@ def refuse_limits_by_hand(setup: BenchmarkFile) -> None:
         )
 
 
-def with_detectors(setup: BenchmarkFile, names: Sequence[str]) -> BenchmarkFile:
-    """Return the benchmark with other detectors, or with all registered ones for `all`.
+def with_detectors(setup: BenchmarkFile, detectors: Sequence[str | Detector]) -> BenchmarkFile:
+    """Return the benchmark with other detectors, with the gains of objects, or with all registered ones for `all`.
 
-    Raises ConfigurationError for an unknown name, UsageError for a repeated one.
+    Raises UsageError for an unknown detector or a repeated one.
     """
-    chosen = tuple(setup.machine_file.detector(name).name for name in _all_or(names))
+    setup = replace(setup, machine_file=setup.machine_file.with_gains_of(detectors))
+    chosen = tuple(setup.machine_file.detector(item).name for item in _all_or(detectors))
     if len(set(chosen)) < len(chosen):
-        raise UsageError(f"detectors {', '.join(names)} contain a repetition", "list each detector once")
+        raise UsageError(f"detectors {', '.join(chosen)} contain a repetition", "list each detector once")
     return with_only(setup, chosen)
 
 
-def _all_or(names: Sequence[str]) -> Sequence[str]:
+def _all_or(names: Sequence[str | Detector]) -> Sequence[str | Detector]:
     return DETECTORS.usable_names() if list(names) == ["all"] else names
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cdtool.detectors.base import Detector
 from cdtool.evaluation.results import Skipped
 from cdtool.remote.remote_path import is_remote
 from cdtool.workflows.benchmark.benchmark import BenchmarkWork, sweep_factors
@@ -57,7 +58,7 @@ class DryRun:
 def dry_run(
     file: str | Path | BenchmarkFile,
     *,
-    detectors: Sequence[str] = (),
+    detectors: Sequence[str | Detector] = (),
     false_alarm_budget: str | None = None,
     workers: Workers | None = None,
     store: StoreUse | None = None,

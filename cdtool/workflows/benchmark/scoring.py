@@ -122,7 +122,7 @@ def detect_with(
                         operations, machine, detector, known, setup.activation, setup.watched, hold
                     )
                 except CdtoolError as fault:
-                    failed = [Skipped(item.name, str(fault)) for item in operations]
+                    failed = [Skipped(item.whole.name, str(fault)) for item in operations]
                     made = []
             scored.failed[detector.name] = failed
             for of_operation, detection in zip(found, made, strict=not failed):
@@ -293,7 +293,7 @@ def _score(
     scored.findings += lost(recording)
     if setup.is_impact_free(group):
         operations, touched = without_contacts(operations, unwanted)
-        scored.skipped += touched
+        scored.skipped += [replace(item, recording=recording.name) for item in touched]
         scored.unchecked = [(recording.name, item) for item in absent_truth(recording)]
         if not operations:
             scored.findings += log_warnings(recording, unwanted, setup.onset)
