@@ -134,7 +134,28 @@ def _unscored_kind(rule: LimitRule, summaries: Sequence[Summary]) -> list[LimitR
 
 
 def unchecked(rules: Sequence[LimitRule], detectors: Sequence[str], file: str) -> list[RecordingFinding]:
-    """Return the warning that limits of a file are set for detectors that were not run; empty if none is."""
+    """Return the warning that limits of a file are set for detectors that were not run.
+
+    Parameters
+    ----------
+    rules : sequence of LimitRule
+        The limits of the file.
+    detectors : sequence of str
+        The detectors that were run.
+    file : str
+        The path of the file.
+
+    Returns
+    -------
+    list of RecordingFinding
+        One warning, or none.
+
+    Examples
+    --------
+    >>> rules = [LimitRule("gm.*.missed", "gm", "*", "missed")]
+    >>> unchecked(rules, ["feekf"], "benchmark.toml")[0].reason
+    '1 of 1 limits not checked (gm not run)'
+    """
     absent = [rule.detector for rule in rules if rule.detector not in (ALL, *detectors)]
     fact = LimitsUnchecked(len(absent), len(rules), ", ".join(dict.fromkeys(absent)))
     return [RecordingFinding.of(file, Finding(fact))] if absent else []

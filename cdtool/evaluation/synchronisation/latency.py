@@ -180,10 +180,10 @@ def pooled(latencies: Sequence[ChannelLatency], starts: Sequence[float]) -> Chan
 
     Examples
     --------
-    >>> shown = [TimedEvent(EventDelay(1.0, 3e-3 + 1e-5 * i, 1e-5, 0.99)) for i in range(4)]
+    >>> shown = [TimedEvent(EventDelay(1.0, 3e-3 + 1e-5 * i, 1e-5, 0.99)) for i in range(5)]
     >>> each = [latency_from(ChannelLatency("force", "speed", "deceleration"), [event]) for event in shown]
-    >>> round(pooled(each, [0.0] * 4).offset.value, 6)
-    0.003015
+    >>> round(pooled(each, [0.0] * 5).offset.value, 6)
+    0.00302
     """
     events = tuple(
         replace(event, delay=replace(event.delay, time=event.delay.time + start - starts[0]))
