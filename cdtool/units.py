@@ -45,6 +45,8 @@ _TABLE = (
     ("gf", 1e-3 * _STANDARD_GRAVITY, "N", "k", "pond"),
     ("kp", _STANDARD_GRAVITY, "N", "", ""),
     ("kg", _STANDARD_GRAVITY, "N", "", "kilogram kilogramm"),
+    ("tf", 1e3 * _STANDARD_GRAVITY, "N", "", "tonne"),
+    ("kip", 1e3 * _POUND, "N", "", "kip"),
     ("lbf", _POUND, "N", "k", "lb lbm pound"),
     ("ozf", _POUND / 16.0, "N", "", "oz ounce unze"),
     ("Pa", 1.0, "Pa", "h k M", "pascal"),
@@ -57,7 +59,7 @@ _TABLE = (
 )
 _PREFIX_WORDS = {
     "kilo": "k", "mega": "M", "milli": "m", "micro": "u", "mikro": "u", "centi": "c", "zenti": "c", "deci": "d",
-    "dezi": "d", "deca": "da", "deka": "da", "hecto": "h", "hekto": "h",
+    "dezi": "d", "deca": "da", "deka": "da", "hecto": "h", "hekto": "h", "k": "k", "da": "da",
 }  # fmt: skip
 # Signs that are written differently, and the word before an area.
 _SIGNS = str.maketrans({**dict(zip("²¹⁻−·⋅*µμ", "21--   uu", strict=True)), "^": "", "°": "deg"})

@@ -27,8 +27,9 @@ class PlaceholderScale(TemplateFact):
 
     raw: str
     unit: str
+    per: str
 
-    words = "scale = 1 for '{raw}' is a placeholder of cdtool init; give the {unit} per {raw}"
+    words = "scale = 1 for '{raw}' is a placeholder of cdtool init; give the {unit} per {per}"
 
 
 @frozen

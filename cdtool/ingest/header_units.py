@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
+from unicodedata import normalize
 
 import numpy as np
 
@@ -26,8 +27,12 @@ from cdtool.units import RAW_UNITS, Unit, find_unit
 _PLAIN = ("1", "count")
 # A scale that converts another unit is often rounded: 0.1047 for rpm. No two units of one kind are this close.
 _ROUNDED = 1e-3
-# Where the name of a force may state its unit: `F [kN] filtered`, `Kraft in daN`, `F_kN`; not `F_N`, a normal force.
-_IN_NAME = re.compile(r"[\[(]([^\[\]()]+)[\])]|([^\W_]{2,})$")
+# Where the name of a force may state its unit: `F [kN] filtered`, `Kraft in daN`, `kN_Kraft`, `ForcekN`; not `F_N`, a
+# normal force. A factor beside it is none that is known: `Kraft [N]*1000`, `Kraft x10`, `Kraft 10 N`.
+_IN_NAME = re.compile(
+    r"[\[({<]([^\[\](){}<>]+)[\])}>]|(?<![^\W_])(?=([^\W_]{2,}))|(?<=[a-z])((?:da|[hkK])N|Kgf?|Kp|Lbf?)(?![^\W_])"
+)
+_FACTOR = re.compile(r"(?:(?<![^\W\d_])x|[*×·]|(?<!\w)/)\s*10+(?!\d)|(?<![\w.,])10+\s?N\b", re.IGNORECASE)
 
 
 def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
@@ -50,7 +55,7 @@ def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> lis
         return []
     by_unit: dict[str, list[Column]] = {}
     for column, factor in zip(columns, item.factor, strict=False):
-        text = _unit_text(item, column)
+        text = _unit_text(item, column, abs(factor))
         header_unit = find_unit(text) if text else None
         if text and (header_unit is None or not _fits(header_unit, stated, item, abs(factor))):
             by_unit.setdefault(text, []).append(column)
@@ -61,13 +66,19 @@ def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> lis
     ]
 
 
-def _unit_text(item: ChannelSource, column: Column) -> str | None:
-    """Return the text in the place of a column's unit; of a force or pressure also a unit elsewhere in its name."""
+def _unit_text(item: ChannelSource, column: Column, factor: float) -> str | None:
+    """Return the text in the place of a column's unit; of a force or pressure first one that contradicts."""
     if item.channel not in RIG_UNITS:
         return column.unit
-    texts = [column.unit or "", *("".join(found) for found in _IN_NAME.findall(column.name))]
-    known = [text for text in texts if text and (found := find_unit(text)) and found.si == item.unit]
-    return next(iter(known), column.unit or ("1" if column.name.endswith((" [1]", " (1)")) else None))
+    name = normalize("NFKC", column.name)
+    if (found := _FACTOR.search(name)) and find_unit(column.unit or "N"):
+        return found[0]
+    known, stated = {}, find_unit(item.stated)
+    for text in (column.unit or "", *("".join(found) for found in _IN_NAME.findall(name))):
+        if text and (unit := find_unit(text)) and unit.si in (item.unit, "V"):
+            known[text] = stated is not None and _fits(unit, stated, item, factor)
+    bare = "1" if column.name.endswith((" [1]", " (1)")) else None
+    return min(known, key=lambda text: known[text]) if known else column.unit or bare
 
 
 def check_clock_unit(path: Path, time: TimeSource, column: Column, origin: float = 0.0) -> list[Finding]:
@@ -125,6 +136,8 @@ def _first_stamp(time: TimeSource, column: Column, origin: float) -> float:
 def _fits(header_unit: Unit, stated: Unit, item: ChannelSource, factor: float) -> bool:
     if header_unit == Unit("1", 1.0) and stated.si != "1":  # some loggers write "1" if the unit is unknown
         return item.channel not in RIG_UNITS
+    if header_unit.si in RAW_UNITS and stated.si == header_unit.si and item.channel in RIG_UNITS:
+        return not math.isclose(factor, stated.factor)  # the scale 1 is that of a draft
     if header_unit.si in RAW_UNITS and stated.si == item.unit and not math.isclose(factor, stated.factor):
         return True  # the scale is a torque constant, or converts percent of the rated torque
     same_kind = header_unit.si == stated.si or (header_unit.si in _PLAIN and stated.si in _PLAIN)
@@ -140,7 +153,7 @@ def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequen
     if header_unit is None or (unit == "1" and item.channel in RIG_UNITS):
         return UnitContradicted(_header_text(columns[0]), unit, len(columns) - 1, str(item.stated), 0.0, "no unit")
     advice: Literal["unit", "unit and scale", "unit without scale", "other column"] = "unit"
-    if item.duty is None and header_unit.si in RAW_UNITS and stated.si != header_unit.si:
+    if item.duty is None and header_unit.si in RAW_UNITS and (stated.si != header_unit.si or item.channel in RIG_UNITS):
         advice = "unit and scale"
     elif header_unit.si == item.unit and stated.si in RAW_UNITS:
         advice = "unit without scale"
@@ -153,7 +166,7 @@ def _contradiction(item: ChannelSource, stated: Unit, unit: str, columns: Sequen
 
 def _ratio(header_unit: Unit, stated: Unit) -> float:
     """Return the factor by which values are wrong if the header is right; 0 for units of different kinds."""
-    if header_unit.si != stated.si:
+    if header_unit.si != stated.si or header_unit == stated:
         return 0.0
     ratio = header_unit.factor / stated.factor
     return max(ratio, 1.0 / ratio)

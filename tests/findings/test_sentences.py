@@ -879,8 +879,8 @@ SENTENCES: list[tuple[Fact, str]] = [
         "transmission_ratio = 1 m/rad is a placeholder of cdtool init; give the travel per motor angle",
     ),
     (
-        placeholders.PlaceholderScale("A", "N m"),
-        "scale = 1 for 'A' is a placeholder of cdtool init; give the N m per A",
+        placeholders.PlaceholderScale("mA", "N m", "A"),
+        "scale = 1 for 'mA' is a placeholder of cdtool init; give the N m per A",
     ),
     (
         placeholders.PlaceholderInertia("load_mass"),

@@ -136,6 +136,9 @@ def test_a_text_that_is_not_a_unit_is_reported(log, machine, channel, header, se
         ("F_N", True),
         ("Kraft Newton", True),
         ("Fz_max", True),
+        ("AI/10 [N]", True),
+        ("Kraft 100Hz", True),
+        ("Kraft [N] (max. 10 kN)", True),
     ],
 )
 def test_the_name_of_a_force_may_state_its_unit(column, fits):

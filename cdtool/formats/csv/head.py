@@ -13,6 +13,7 @@ from cdtool.formats.csv.cells import has_numbers, kind, split_line
 from cdtool.formats.csv.head_words import are_numbered, are_types, is_unit
 from cdtool.formats.csv.lines import Line, is_ruler
 from cdtool.plain_text import counted, shown_lines
+from cdtool.units import find_unit
 
 _LOOKED_BELOW = 4
 _SINGLE_CELL = 1
@@ -108,7 +109,7 @@ class HeadFinder:
             header, names = upper_row, upper
         self._refuse_row_as_names(header, cut[start])
         units = units or types or self._units_in_comment(header.line, comments)
-        return self._make_head(names, header, units, cut[start].line, above)
+        return self._make_head(names, header, units, cut[start].line, [*map(self._split, comments), *above])
 
     def _units_in_comment(self, header: Line, comments: Sequence[Line]) -> _SplitLine | None:
         """Return the comment directly above the names if it has their units: `# s,mm,mm/s`."""
@@ -120,11 +121,24 @@ class HeadFinder:
         fitting = [row for row in rows if row.line.number == header.number - 1 and len(row.cells) in width]
         return next((row for row in fitting if self._are_units(row)), None)
 
+    def _units_above(self, names: Sequence[str], header: _SplitLine, above: Sequence[_SplitLine]) -> _SplitLine | None:
+        """Return the row of units above the names; or, of a clock and one channel, that of a line `Einheit: kN`."""
+        stated = re.compile(rf"\W*(?:einheit|unit|{re.escape(names[-1])})\b.*[\W_](\w+)\W*", re.IGNORECASE)
+        for row in above:
+            if row is not header and self._are_units(row) and all(map(is_unit, row.cells)):
+                return row
+            found = stated.fullmatch(row.line.text) if self.width == _SINGLE_CELL + 1 else None
+            if found and (unit := find_unit(found[1])) and unit.si != "s":
+                return _SplitLine(row.line, ["", found[1]], "MX")
+        return None
+
     def _make_head(
         self, names: list[str], header: _SplitLine, units: _SplitLine | None, first: Line, above: Sequence[_SplitLine]
     ) -> Head:
         if units is None and self.pins.units is None:
-            units = next((row for row in above if row.cells[0] == _LABVIEW_UNITS), None)
+            units = next(
+                (row for row in above if row.cells[0] == _LABVIEW_UNITS), self._units_above(names, header, above)
+            )
         texts: Sequence[str] = () if units is None or are_types(units.cells) else units.cells
         if texts and texts[0] == _LABVIEW_UNITS:
             texts = ("", *texts[1:])

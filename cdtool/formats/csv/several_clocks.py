@@ -243,7 +243,7 @@ def unit_from_header(dialect: Dialect, name: str) -> str | None:
     text = dialect.units[column].strip() if column < len(dialect.units) else ""
     if text[:1] + text[-1:] in ("[]", "()"):
         text = text[1:-1].strip()
-    texts = [item for item in (split_unit(name.partition("#")[0])[1], text) if item and item != "-"]
+    texts = [item for item in (text, split_unit(name.partition("#")[0])[1]) if item and item != "-"]
     return next((item for item in texts if find_unit(item)), next(iter(texts), None))
 
 

@@ -218,7 +218,7 @@ def _of_torque(stream: Stream, accepted: tuple[str, ...], joints: int) -> Logged
 
 
 def _raw(unit: str, target: str, joints: int, why: str) -> Logged:
-    per = f"{target} at 100 %" if unit == "%" else f"{target} per {unit}"
+    per = f"{target} at 100 %" if unit == "%" else f"{target} per {find_unit(unit).si}"
     return Logged(unit, why, (1.0,) * joints, f"the scale 1 is a placeholder: {per}")
 
 

@@ -57,14 +57,14 @@ def _top_speed(recording: Recording) -> float:
     return float(known.max()) if len(known) else math.nan
 
 
-def _scales(sources: tuple[ChannelSource, ...]) -> Iterator[tuple[str, tuple[str, str]]]:
-    """Yield the channels in a raw unit with the scale 1, and the units of both."""
+def _scales(sources: tuple[ChannelSource, ...]) -> Iterator[tuple[str, tuple[str, str, str]]]:
+    """Yield the channels in a raw unit with the scale 1, and the units of both and of the scale."""
     for source in sources:
         known = find_unit(source.stated) if source.stated else None
         if known is None or known.si not in RAW_UNITS or source.duty is not None or source.unit in RAW_UNITS:
             continue
         if all(factor == known.factor for factor in source.factor):
-            yield source.channel, (source.stated, source.unit)
+            yield source.channel, (source.stated, source.unit, known.si)
 
 
 def _marked_keys(machine_file: MachineFile) -> tuple[int, tuple[str, ...]]:

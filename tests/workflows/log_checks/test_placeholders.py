@@ -45,7 +45,7 @@ def test_a_draft_has_warnings_with_the_speed_that_a_placeholder_causes(log, tmp_
     found = placeholders(log, tmp_path / "machine.toml")
     assert set(found) == set(KINDS)
     assert found[PlaceholderRatio].speed == pytest.approx(150.0, rel=1e-3)
-    assert found[PlaceholderScale] == PlaceholderScale("A", "N m")
+    assert found[PlaceholderScale] == PlaceholderScale("A", "N m", "A")
     assert found[PlaceholderInertia].key == "load_mass"
     assert "transmission_ratio" in found[UncheckedLines].keys and found[UncheckedLines].count >= 4
 

@@ -80,21 +80,26 @@ logs = ["{name}.csv"]
 """
 
 
-def write_curve(path: Path, spelling: Spelling, peak: float) -> None:
-    """Write a log of the force alone in the spelling's unit: decimal commas, a skewed pulse, a jittering clock."""
+def write_curve(path: Path, spelling: Spelling, peak: float, head: str = "") -> None:
+    """Write a log of the force alone in the spelling's unit: decimal commas, a skewed pulse, a jittering clock.
+
+    `head`: the lines above the rows, in place of the spelling's.
+    """
     rng = np.random.default_rng(round(1e3 * peak))
     time = (np.arange(round(SECONDS * RATE)) + rng.uniform(-0.2, 0.2, round(SECONDS * RATE))) / RATE
     since = np.clip((time - 0.8) / 0.25, 0.0, 1.0) ** 0.7
     force = peak * np.sin(np.pi * since) ** 2 + 3.0 + rng.normal(0.0, 0.3, len(time))
     rows = [f"{t:.5f};{f / spelling.factor:.9g}".replace(".", ",") for t, f in zip(time, force, strict=True)]
     units = [f"s;{spelling.units}"] if spelling.units else []
-    path.write_text("\n".join([f"Zeit [s];{spelling.header}", *units, *rows]) + "\n", encoding="utf-8")
+    path.write_text("\n".join([head or f"Zeit [s];{spelling.header}", *units, *rows]) + "\n", encoding="utf-8")
 
 
-def measured(folder: Path, spelling: Spelling, peaks: list[float], by_init: bool) -> list[PointAssessment]:
+def measured(
+    folder: Path, spelling: Spelling, peaks: list[float], by_init: bool, head: str = ""
+) -> list[PointAssessment]:
     """Return a point of a protocol for each peak, with a machine file by `cdtool init`, or one that states N."""
     for number, peak in enumerate(peaks):
-        write_curve(folder / f"c{number:02d}.csv", spelling, peak)
+        write_curve(folder / f"c{number:02d}.csv", spelling, peak, head)
     text = init(folder / "c00.csv", folder / "machine.toml").text
     before, mark, after = text.partition("\nforce = {")
     assert mark, text
@@ -142,6 +147,36 @@ def test_no_spelling_of_a_unit_passes_a_force_above_the_limit(tmp_path, spelling
 @pytest.mark.parametrize(("spelling", "by_init"), MATRIX, ids=name_of)
 def test_no_spelling_of_a_unit_passes_one_of_60_curves_above_the_limit(tmp_path, spelling, by_init):
     check(tmp_path, spelling, PEAKS, by_init)
+
+
+@pytest.mark.parametrize("by_init", [True, False])
+@pytest.mark.parametrize(
+    ("head", "factor"),
+    [
+        ("Zeit [s];kN_Kraft", 1e3),
+        ("Zeit [s];KraftkN", 1e3),
+        ("Zeit [s];forceKg", GRAVITY),
+        ("Zeit [s];Kraft kNewton", 1e3),
+        ("Zeit [s];Kraft in Tonnen", 1e3 * GRAVITY),
+        ("Zeit [s];Force kips", 1e3 * POUND),
+        ("Zeit [s];Kraft {kN}", 1e3),
+        ("Zeit [s];Kraft［ｋＮ］", 1e3),
+        ("Zeit [s];Kraft [kN] [N]", 1e3),
+        ("Zeit [s];Kraft [N]*1000", 1e3),
+        ("Zeit [s];Kraft x10 [N]", 10.0),
+        ("Zeit [s];Kraft 10N", 10.0),
+        ("Zeit [s];Kraft [mV]", 10.0),
+        ("Zeit [s];Kraft_mV", 10.0),
+        ("Zeit [s];Kraft [N]\ns;kN", 1e3),
+        ("s;kN\nZeit;Kraft", 1e3),
+        ("Messung 7\nEinheit: kN\nZeit;Kraft", 1e3),
+        ("# Einheit der Kraft: kN\nZeit;Kraft", 1e3),
+        ("Zeit;s\nKraft;kN\nZeit;Kraft", 1e3),
+    ],
+)
+def test_a_unit_anywhere_in_the_head_passes_no_force_above_the_limit(tmp_path, head, factor, by_init):
+    (point,) = measured(tmp_path, Spelling(head.removeprefix("Zeit [s];"), factor), [421.0], by_init, head)
+    assert point.outcome != "pass"
 
 
 RIG_BENCHMARK = """
