@@ -180,7 +180,8 @@ class UnitContradicted(Fact):
         ratio = f" (a factor of {self.ratio:.4g})" if self.ratio else ""
         text = f"the header says '{self.header}'{more}, the machine file {self.stated}{ratio}"
         if self.advice == "no unit":
-            return f"{text}, which the header does not confirm: write unit_confirmed = true if that is right"
+            cure = "write the unit and scale of its values, and unit_confirmed = true"
+            return f"{text}, which the header does not confirm: {cure}"
         if self.advice == "other column":
             return f"{text}, not assessable: map another column, or write unit_confirmed = true if it is this one"
         scale = {"unit and scale": f" with a scale in {self.scale}", "unit without scale": " without that scale"}

@@ -218,7 +218,8 @@ def _of_torque(stream: Stream, accepted: tuple[str, ...], joints: int) -> Logged
 
 
 def _raw(unit: str, target: str, joints: int, why: str) -> Logged:
-    per = f"{target} at 100 %" if unit == "%" else f"{target} per {find_unit(unit).si}"
+    known = find_unit(unit)
+    per = f"{target} at 100 %" if unit == "%" else f"{target} per {known.si if known else unit}"
     return Logged(unit, why, (1.0,) * joints, f"the scale 1 is a placeholder: {per}")
 
 
