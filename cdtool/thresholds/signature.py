@@ -30,7 +30,7 @@ LEAST_RUNS = 2
 # The time curve reaches this much beyond the slowest run's acceleration.
 _TIME_RESERVE = 1.5
 #: 40 m in steps of 2 mm; memory and time grow with the places, and a wrong unit makes a thousand times as many.
-_MOST_PLACES = 20_000
+MOST_PLACES = 20_000
 
 
 @dataclass(frozen=True)
@@ -148,10 +148,10 @@ class Signature:
         step, window = pace * self.position_step, pace * self.position_window
         lasting = self._longest_time(wheres)
         longest = max((float(np.nanmax(where.travel, initial=0.0)) for where in wheres), default=0.0)
-        if max(longest / self.position_step, lasting / step) > _MOST_PLACES:
+        if max(longest / self.position_step, lasting / step) > MOST_PLACES:
             unit = pairs[0][0]["position"].unit
             raise UsageError(
-                f"a travel of {longest:.6g} {unit} has more than {_MOST_PLACES:,} places of {self.position_step:g} "
+                f"a travel of {longest:.6g} {unit} has more than {MOST_PLACES:,} places of {self.position_step:g} "
                 f"{unit}: transmission_ratio or the position's unit may be wrong",
                 "correct it, or set a larger position_step in [signature]",
             )

@@ -40,7 +40,7 @@ def test_a_format_whose_library_is_absent_says_how_to_install_it(name, tmp_path,
     found = FORMATS.load(name)()
     path = tmp_path / f"x{found.suffixes[0]}"
     path.write_bytes(b"no recording")
-    extra = rf"is not installed \(pip install 'cdtool\[{name}\]'\)"
+    extra = rf"is not installed \(pip install '\.\[{name}\]'\)"
     with pytest.raises(CdtoolError, match=extra if name in PROJECT["optional-dependencies"] else None):
         found.columns(path)
 

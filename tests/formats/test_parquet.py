@@ -111,7 +111,7 @@ def test_a_small_file_that_decompresses_to_far_more_is_refused(tmp_path):
 def test_without_the_library_the_error_names_the_extra(saved, monkeypatch):
     path = saved({"v": [1.0, 2.0]})
     monkeypatch.setattr("cdtool.formats.container_checks.import_module", _absent)
-    with pytest.raises(RecordingError, match=r"pyarrow is not installed.*pip install 'cdtool\[parquet\]'"):
+    with pytest.raises(RecordingError, match=r"pyarrow is not installed.*pip install '\.\[parquet\]'"):
         survey(path)
 
 

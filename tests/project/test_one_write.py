@@ -22,6 +22,7 @@ ELSEWHERE = {
     "cdtool/simulation/recording_folder.py": "writes into the folder that replaced_folder gives it",
     "cdtool/workflows/injecting.py": "writes into the folder that replaced_folder gives it",
     "cdtool/workflows/injection/injected_logs.py": "writes into that folder, or into the benchmark's own",
+    "cdtool/workflows/benchmark/with_injected.py": "marks such a folder with what it depends on",
 }
 
 

@@ -100,7 +100,7 @@ def test_without_the_package_of_a_protocol_one_line_names_it(monkeypatch):
         monkeypatch.delitem(registered._registry, protocol, raising=False)
     with pytest.raises(StorageError, match=r"gs:// needs a package that is not installed \(.*gcsfs.*\)"):
         storage.info("gs://bucket/a.csv")
-    with pytest.raises(StorageError, match=r"s3:// needs .* \(pip install 'cdtool\[remote\]'\)"):
+    with pytest.raises(StorageError, match=r"s3:// needs .* \(pip install '\.\[remote\]'\)"):
         storage.info("s3://bucket/a.csv")
 
 

@@ -12,6 +12,7 @@ import pytest
 import cdtool
 from cdtool.errors import ConfigurationError, UsageError
 from cdtool.evaluation.results_file import to_json
+from cdtool.evaluation.synchronisation import latency
 from cdtool.ingest.run_reading import read_runs
 from cdtool.machine_file import read_machine_file
 from cdtool.operations import RunCut
@@ -337,7 +338,9 @@ def test_runs_are_learned_from_until_their_onset_and_scored_without_their_own_pa
     assert figures(cdtool.benchmark(cut).results) == figures(one), "other patterns name the same runs"
 
 
-def test_the_synchronisation_is_measured_on_runs_as_on_files(folder):
+def test_the_synchronisation_is_measured_on_runs_as_on_files(folder, monkeypatch):
+    monkeypatch.setattr(latency, "LEAST_CONTACTS", 2)  # the folder has no more
+    monkeypatch.setattr(latency, "_WIDEST_OFFSET", 1.0)
     plain, cut = both_ways(folder, ("above_n = 20.0", 'above_n = 20.0\nsynchronisation = "measured"'))
     assert figures(cut) == figures(plain)
     early = 'to = "3s"\nlogs = '

@@ -22,7 +22,7 @@ from cdtool.pipeline import run_detector
 from cdtool.plain_text import counted, digits
 from cdtool.recording import SHOWS_CONTACTS, Recording
 from cdtool.remote.remote_path import relative_name
-from cdtool.thresholds.signature import ENOUGH_RUNS
+from cdtool.thresholds.signature import ENOUGH_RUNS, MOST_PLACES, Signature
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.runs import read_named
@@ -127,7 +127,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         f"machine = {json.dumps(relative_name(machine_file.path, folder), ensure_ascii=False)}",
         f"detectors = {_listed(usable)}" + ("" if usable or others else _FORCE_ONLY),
         *([f"# With inertia and friction in the machine file also: {', '.join(others)}"] if others else []),
-        *(_learning(impacts, free, folder, "position" in first) if usable or others else []),
+        *(_learning(impacts, free, folder, _is_plausible_travel(first)) if usable or others else []),
         *_groups(impacts, folder),
         *_onset(known, beside),
         *_comments(unknown, folder),
@@ -173,13 +173,21 @@ def _detectors(recording: Recording, machine_file: MachineFile) -> tuple[list[st
     return usable, others
 
 
+def _is_plausible_travel(recording: Recording) -> bool:
+    """Return whether a signature by location can be learned: not from motor angles that the draft takes for metres."""
+    if "position" not in recording:
+        return False
+    values = recording["position"].values
+    return bool(np.nanmax(values) - np.nanmin(values) < MOST_PLACES * Signature.position_step)
+
+
 def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_position: bool) -> list[str]:
     """Return how limits are learned: from impact-free logs, from what is before the contacts, or run by run."""
     if len(free) >= ENOUGH_RUNS:
         enough = len(free) - len(free) // _HOLDOUT >= ENOUGH_RUNS
         held = free[_HOLDOUT - 1 :: _HOLDOUT] if enough else []
         learned = [log for log in free if log not in held]
-        lines = [] if by_position else ['threshold = "limit"']
+        lines = [] if by_position else ['threshold = "limit"  # without a plausible position']
         lines += ["", "[learn]", f"logs = {_paths(learned, folder)}"]
         return [*lines, "", "[holdout]", f"logs = {_paths(held, folder)}"] if held else lines
     why = f"# {counted(len(free), 'impact-free log')}: a signature needs {ENOUGH_RUNS}."

@@ -189,5 +189,5 @@ def test_the_only_date_in_it_is_the_day_of_the_test(documents, pypdf):
 
 def test_without_the_library_one_line_says_what_to_install(documents, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "typst", None)
-    with pytest.raises(UsageError, match=r"needs typst.*pip install 'cdtool\[pdf\]'"):
+    with pytest.raises(UsageError, match=r"needs typst.*pip install '\.\[pdf\]'"):
         to_pdf(documents["pass"])

@@ -187,6 +187,6 @@ def test_a_link_is_no_key_of_an_axis(tmp_path: Path) -> None:
 
 def test_without_pinocchio_one_line_names_the_extra(six: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pinocchio", None)
-    with pytest.raises(ConfigurationError, match=r"cdtool\[urdf\]") as fault:
+    with pytest.raises(ConfigurationError, match=r"\.\[urdf\]") as fault:
         cdtool.inject(write(six), six / "out")
     assert "\n" not in str(fault.value)
