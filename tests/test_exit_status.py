@@ -55,7 +55,7 @@ def test_with_several_facts_2_comes_before_1_before_3_before_4():
 
 def table_of(page: str) -> dict[int, str]:
     text = (ROOT / page).read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (\d+) \| ([^|]+) \|", text.partition("| status |")[2], re.MULTILINE)
+    rows = re.findall(r"^\| (\d+) \| ([^|]+) \|", text.partition("| status | meaning |")[2], re.MULTILINE)
     return {int(number): meaning.strip().replace("`", "") for number, meaning in rows}
 
 

@@ -545,7 +545,7 @@ SENTENCES: list[tuple[Fact, str]] = [
         channels.UnitContradicted("F (raw)", "raw", 0, "N", 0.0, "no unit"),
         (
             "the header says 'F (raw)', the machine file N, which the header does not confirm: write "
-            "unit_confirmed = true if that is right"
+            "the unit and scale of its values, and unit_confirmed = true"
         ),
     ),
     (

@@ -132,7 +132,7 @@ def mean_interval(values: npt.ArrayLike, labels: Iterable[Hashable], level: floa
     'an interval needs 10 recordings or campaigns; there are 4'
     """
     spread = spread_of(values, labels)
-    return student_interval(spread.mean, spread.error, spread.clusters - 1.0, spread.clusters, level)
+    return _student_interval(spread.mean, spread.error, spread.clusters - 1.0, spread.clusters, level)
 
 
 def difference_interval(a: Spread, b: Spread, level: float = 0.95) -> Interval:
@@ -169,12 +169,12 @@ def difference_interval(a: Spread, b: Spread, level: float = 0.95) -> Interval:
     """
     error = math.hypot(a.error, b.error)
     parts = sum(item.error**4 / (item.clusters - 1) for item in (a, b) if item.clusters > 1)
-    return student_interval(
+    return _student_interval(
         a.mean - b.mean, error, error**4 / parts if parts else 1.0, min(a.clusters, b.clusters), level
     )
 
 
-def student_interval(value: float, error: float, freedom: float, clusters: int, level: float) -> Interval:
+def _student_interval(value: float, error: float, freedom: float, clusters: int, level: float) -> Interval:
     """Return a value with Student's interval of its standard error; without bounds below 10 clusters."""
     from scipy import stats
 
