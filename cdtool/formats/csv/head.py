@@ -109,7 +109,9 @@ class HeadFinder:
             header, names = upper_row, upper
         self._refuse_row_as_names(header, cut[start])
         units = units or types or self._units_in_comment(header.line, comments)
-        return self._make_head(names, header, units, cut[start].line, [*map(self._split, comments), *above])
+        if units is None and self.pins.units is None:
+            units = self._units_above(names, header, [*map(self._split, comments), *above])
+        return self._make_head(names, header, units, cut[start].line, above)
 
     def _units_in_comment(self, header: Line, comments: Sequence[Line]) -> _SplitLine | None:
         """Return the comment directly above the names if it has their units: `# s,mm,mm/s`."""
@@ -136,9 +138,7 @@ class HeadFinder:
         self, names: list[str], header: _SplitLine, units: _SplitLine | None, first: Line, above: Sequence[_SplitLine]
     ) -> Head:
         if units is None and self.pins.units is None:
-            units = next(
-                (row for row in above if row.cells[0] == _LABVIEW_UNITS), self._units_above(names, header, above)
-            )
+            units = next((row for row in above if row.cells[0] == _LABVIEW_UNITS), None)
         texts: Sequence[str] = () if units is None or are_types(units.cells) else units.cells
         if texts and texts[0] == _LABVIEW_UNITS:
             texts = ("", *texts[1:])
