@@ -107,8 +107,8 @@ class Budget:
     def excess(self, operations: tuple[int, int], hours: tuple[int, float] = (0, 0.0)) -> str:
         """Return by how much runs that did not set the factor exceed the budget, in words; empty if they do not.
 
-        `operations`: those that alarm, of all; `hours`: false alarms in so many hours. The chance is that of as many or
-        more at exactly the budget (binomial, by hours Poisson).
+        `operations`: how many alarm, and how many there are; `hours`: false alarms, and the hours they are from. The
+        words state the chance of at least this excess at exactly the budget (binomial, by hours Poisson).
         """
         from scipy import stats
 

@@ -76,8 +76,8 @@ class BuildRow:
 
     `old_contacts` and `new_contacts` are all that the files hold, `pairs` those compared one by one (0 where not
     paired); in `one_not_assessable` of them one build could not assess the contact, which counts there alone. What
-    happened on the pairs: `later_ms` and `earlier_ms` are the shortest and the longest change of so many contacts, by
-    which the new build is later or earlier; `newly_missed` and `newly_detected` count the others.
+    happened on the pairs: the new build is later on `later` of them, by `later_ms` (least, most), and earlier on
+    `earlier`; `newly_missed` and `newly_detected` count the contacts that only one of the builds missed.
     """
 
     detector: str

@@ -16,7 +16,7 @@ from tests.synthetic.force_rig import half_sine, write_protocol, write_rig
 
 LIMIT, RATE, SECONDS = 400.0, 500.0, 2.5
 GRAVITY, POUND = 9.80665, 4.4482216152605
-# The true peaks [N]; within so much of the limit [N] noise may decide.
+# The true peaks [N]; within this distance of the limit [N] noise may decide.
 PEAKS, NOISE = [LIMIT * (0.9 + 0.2 * number / 59) for number in range(60)], 2.0
 
 
