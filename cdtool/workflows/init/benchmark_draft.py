@@ -35,7 +35,7 @@ _FORCE_ONLY = "  # the logs have no channels of a machine: a protocol of the for
 _NORMAL_MAD = 1.4826
 # Words, between anything but letters, in the names of logs without an impact.
 _FREE = re.compile(
-    r"(?<![^\W\d_])(free|frei|ohne|without|normal|sans|libre|no[_-]?(contact|impact|collision)s?)(?![^\W\d_])",
+    r"(?<![^\W\d_])(free|frei|ohne|(no|without)[ _-]?(contact|impact|collision)s?)(?![^\W\d_])",
     re.IGNORECASE,
 )
 _NUMBER = re.compile(r"[\W_]*\d+.*$")
@@ -175,10 +175,9 @@ def _detectors(recording: Recording, machine_file: MachineFile) -> tuple[list[st
 
 def _is_plausible_travel(recording: Recording) -> bool:
     """Return whether a signature by location can be learned: not from motor angles that the draft takes for metres."""
-    if "position" not in recording:
-        return False
-    values = recording["position"].values
-    return bool(np.nanmax(values) - np.nanmin(values) < MOST_PLACES * Signature.position_step)
+    values = recording["position"].values if "position" in recording else np.empty(0)
+    known = values[np.isfinite(values)]
+    return len(known) > 0 and float(np.ptp(known)) < MOST_PLACES * Signature.position_step
 
 
 def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_position: bool) -> list[str]:
