@@ -28,7 +28,7 @@ _PLAIN = ("1", "count")
 # A scale that converts another unit is often rounded: 0.1047 for rpm. No two units of one kind are this close.
 _ROUNDED = 1e-3
 # Where the name of a force may state its unit: `F [kN] filtered`, `Kraft in daN`, `kN_Kraft`, `ForcekN`; not `F_N`, a
-# normal force. A factor beside it is none that is known: `Kraft [N]*1000`, `Kraft x10`, `Kraft 10 N`.
+# normal force. With a factor beside it the unit is unknown: `Kraft [N]*1000`, `Kraft x10`, `Kraft 10 N`.
 _IN_NAME = re.compile(
     r"[\[({<]([^\[\](){}<>]+)[\])}>]|(?<![^\W_])(?=([^\W_]{2,}))|(?<=[a-z])((?:da|[hkK])N|Kgf?|Kp|Lbf?)(?![^\W_])"
 )
