@@ -11,7 +11,7 @@ from typing import Literal, TypeVar
 
 from cdtool.errors import ConfigurationError, nearest
 from cdtool.log_names import log_stem
-from cdtool.recording import CHANNELS, GROUND_TRUTH, RIG_UNITS, TRIGGER, UNITLESS
+from cdtool.recording import CHANNELS, CHECKED, GROUND_TRUTH, RIG_UNITS, TRIGGER, UNITLESS
 from cdtool.short_repr import short_repr
 from cdtool.tables import Table
 from cdtool.units import RAW_UNITS, unit
@@ -70,8 +70,9 @@ class ChannelSource:
     """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
-    `most`. `confirmed`: the unit is `stated`, whatever the header says. `keys` are the columns by their names in the
-    file, once these are known (resolve_columns). `words`: the column may contain texts, which are read as categories.
+    `most`. `unit_confirmed`: the unit is `stated`, whatever the header says. `confirmed`: the channel is right,
+    whatever the mechanics of the machine say. `keys` are the columns by their names in the file, once these are known
+    (resolve_columns). `words`: the column may contain texts, which are read as categories.
 
     A force may be a vector: `columns`, or `fields`, each of one of the `topics`, are then its axes. `direction` (axes,)
     is a unit vector: the force is the component along it; without one it is the magnitude. It may be in a file of its
@@ -97,6 +98,7 @@ class ChannelSource:
     own_file: OwnFile | None = None
     kinds: tuple[tuple[float, str], ...] = ()
     words: bool = False
+    unit_confirmed: bool = False
     confirmed: bool = False
 
     __repr__ = short_repr
@@ -301,7 +303,8 @@ def _source(
         direction=_direction(table, count) if channel == "force" and "direction" in table else (),
         own_file=own_file,
         kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
-        confirmed=channel not in UNITLESS and table.flag("unit_confirmed", False),
+        unit_confirmed=channel not in UNITLESS and table.flag("unit_confirmed", False),
+        confirmed=channel in CHECKED and table.flag("confirmed", False),
     )
     table.finish()
     return source

@@ -9,7 +9,7 @@ is derived from them.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -19,6 +19,7 @@ import numpy as np
 
 from cdtool.findings import Finding
 from cdtool.findings.channels import ImplausibleValues, Leap, LeapingValues, LearnedInOtherUnit
+from cdtool.findings.plausibility import ChannelCheck
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
@@ -52,6 +53,9 @@ _AMONG, _SETTLED, _MOVED = 1.5, 0.1, 0.02
 # Ranges without a log are learned at most so many times, each time without a part of the logs.
 _FOLDS = 10
 
+# Beside the channels' ranges in a file.
+_CHECKS = "contradicted"
+
 _VALUES = "Array(float64, 2, 'C', readonly=True)"
 
 
@@ -72,9 +76,10 @@ class ChannelRange:
 
 @dataclass(frozen=True)
 class PlausibleRanges:
-    """The plausible values of each channel."""
+    """The plausible values of each channel, and the checks of channels that contradict the machine file."""
 
     channels: Mapping[str, ChannelRange]
+    contradicted: tuple[ChannelCheck, ...] = ()
 
     __repr__ = short_repr
 
@@ -100,6 +105,7 @@ class PlausibleRanges:
         `factors` convert a channel's logged numbers to SI, per joint. A run `to_learn` from has no contact, so its
         spikes are masked too.
         """
+        recording = recording if to_learn else self._without_contradicted(recording)
         channels, findings = dict(recording.channels), list(recording.findings)
         for name, known in self.channels.items():
             if name not in recording:
@@ -129,9 +135,21 @@ class PlausibleRanges:
                 channels[name] = Series(series.time, values, series.unit)
         return replace(recording, channels=channels, findings=tuple(findings))
 
+    def _without_contradicted(self, recording: Recording) -> Recording:
+        """Return the recording without values of the channels that a check contradicts, and a loss for each."""
+        checks = [check for check in self.contradicted if check.channel in recording]
+        channels = dict(recording.channels)
+        for check in checks:
+            series = channels[check.channel]
+            wrong = np.array([check.joint in ("", joint) for joint in recording.joints])
+            channels[check.channel] = series.with_values(np.where(wrong, np.nan, series.values), series.unit)
+        losses = tuple(Finding(check, check.channel, "loss") for check in checks)
+        return replace(recording, channels=channels, findings=(*recording.findings, *losses)) if checks else recording
+
     def to_dict(self) -> dict[str, Any]:
         """Return the ranges as JSON values."""
-        return {name: asdict(item) for name, item in self.channels.items()}
+        checks = {_CHECKS: [asdict(item) for item in self.contradicted]} if self.contradicted else {}
+        return {name: asdict(item) for name, item in self.channels.items()} | checks
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -145,12 +163,13 @@ class PlausibleRanges:
                 float(item.get("extreme", 0.0)),
             )
             for name, item in values.items()
+            if name != _CHECKS
         }
         for name, item in channels.items():
             figures = [*item.centre, item.reach, item.rate, item.extreme]
             if not (np.isfinite(figures).all() and item.reach > 0.0 <= min(item.rate, item.extreme)):
                 raise ValueError(f"a plausible range of {name} with reach {item.reach:g} and rate {item.rate:g}")
-        return cls(channels)
+        return cls(channels, tuple(ChannelCheck(**item) for item in values.get(_CHECKS, ())))
 
 
 @dataclass(frozen=True)
@@ -159,6 +178,16 @@ class LearnedRanges:
 
     all: PlausibleRanges
     by_name: Mapping[str, PlausibleRanges] = field(default_factory=dict)
+
+    def contradicted_by(self, checks: Iterable[Finding]) -> LearnedRanges:
+        """Return the ranges without the channels of which one of the checks is a contradiction."""
+        wrong = tuple(
+            item.fact for item in checks if isinstance(item.fact, ChannelCheck) and item.fact.answer == "contradicts"
+        )
+        if not wrong:
+            return self
+        by_name = {name: replace(item, contradicted=wrong) for name, item in self.by_name.items()}
+        return LearnedRanges(replace(self.all, contradicted=wrong), by_name)
 
     @classmethod
     def of(cls, runs: Mapping[str, Recording], scored: Collection[str]) -> Self:

@@ -26,6 +26,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 MEASURED = ("torque", "speed", "position", "acceleration")
 REFERENCES = ("reference_position", "reference_speed", "reference_torque")
+# Of what is measured, what the mechanics of the machine can contradict.
+CHECKED = ("torque", "speed", "acceleration")
 # What shows where a contact is; and all that is known from outside: a pressure only shows how hard it was.
 SHOWS_CONTACTS = ("force", "label", "event")
 CONTACT_PRESSURE = "contact_pressure"

@@ -301,29 +301,6 @@ class ClockUnitContradicted(Fact):
 
 
 @frozen
-class ClockFactor(Fact):
-    """Two pairs of channels disagree by the same factor, as two units of time do that are named `as_between`.
-
-    `by_speed` is the integral of the speed over the position, `by_acceleration` the acceleration over the derivative of
-    the speed; the clock alone is part of both. `joint` is empty where there is but one.
-    """
-
-    joint: str
-    by_speed: float
-    by_acceleration: float
-    as_between: str
-
-    def sentence(self) -> str:
-        """Return both factors, and what to check."""
-        of = f" of {self.joint}" if self.joint else ""
-        return (
-            f"the integral of the speed{of} is {self.by_speed:.4g} times the position, and the acceleration "
-            f"{self.by_acceleration:.4g} times the speed's derivative: a factor as between {self.as_between} in both "
-            "points to the clock's unit, in [channels] time"
-        )
-
-
-@frozen
 class NoClock(TemplateFact):
     """No column of a table looks like its clock."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from cdtool.findings.finding import Fact
+from cdtool.findings.finding import Fact, TemplateFact
 from cdtool.frozen import frozen
 
 Answer = Literal["agrees", "contradicts", "not checked"]
@@ -17,7 +17,7 @@ _CONTRADICTIONS = {
     ),
     "start": ("has the opposite sign of the force that the starts need", "reverse the sign of its scale"),
     "place": (
-        "is a function of position and speed alone ({share:.2%} of it): the force of a drive shows inertia and dry friction",
+        "is a function of position and speed alone ({share:.2%} of it), as no force of a drive is",
         "map the drive's torque, force or current",
     ),
     "other joint": ("follows the motion of {other} and not its own", "put the columns in the order of the joints"),
@@ -30,7 +30,10 @@ _CONTRADICTIONS = {
         "is {value:.4g} times the derivative of the {other}{between}",
         "correct the unit of the {channel}, of the {other} or of the time",
     ),
-    "course": ("does not follow the derivative of the {other}: in {share:.0%} of the motion it has the opposite sign", "map another column"),
+    "course": (
+        "does not follow the derivative of the {other}: in {share:.0%} of the motion it has the opposite sign",
+        "map another column",
+    ),
     "joints": (
         "follows the derivative of the {other} of another joint, {between}",
         "put the columns in the order of the joints",
@@ -43,12 +46,18 @@ _AGREES = {
 }
 _WHY_NOT = {
     "rest": "the joint hardly moves",
-    "speed": "the speed contradicts the position",
     "few": "too little motion",
     "one direction": "motion in one direction, with no start that shows the sign",
     "unclear": "the motion does not show it",
     "apart": "in {value:.0%} of the motion it has the opposite sign of the derivative of the {other}",
 }
+
+
+@frozen
+class Confirmed(TemplateFact):
+    """The machine file confirms the channel, whatever the mechanics of the machine say."""
+
+    words = "confirmed in the machine file: not checked against the other channels"
 
 
 @frozen
@@ -73,13 +82,18 @@ class ChannelCheck(Fact):
 
     variant_field = "check"
 
-    def sentence(self) -> str:
-        """Return the answer; of a contradiction also what to write."""
-        of = f"of {self.joint}: " if self.joint else ""
-        fields = vars(self)
-        if self.answer == "agrees":
-            return of + _AGREES[self.found].format(**fields)
+    @property
+    def seen(self) -> str:
+        """What was seen, in words, without the joint."""
         if self.answer == "not checked":
-            return f"{of}{self.check} not checked: {_WHY_NOT[self.found].format(**fields)}"
-        seen, cure = (text.format(**fields) for text in _CONTRADICTIONS[self.found])
-        return f"{of}{seen}, not assessable: {cure}, or write confirmed = true under {self.channel} if it is right"
+            return f"{self.check} not checked: {_WHY_NOT[self.found].format(**vars(self))}"
+        words = _CONTRADICTIONS[self.found][0] if self.answer == "contradicts" else _AGREES[self.found]
+        return words.format(**vars(self))
+
+    def sentence(self) -> str:
+        """Return what was seen; of a contradiction also what to write."""
+        text = f"{f'of {self.joint}: ' if self.joint else ''}{self.seen}"
+        if self.answer != "contradicts":
+            return text
+        cure = _CONTRADICTIONS[self.found][1].format(**vars(self))
+        return f"{text}, not assessable: {cure}, or write confirmed = true under {self.channel} if it is right"

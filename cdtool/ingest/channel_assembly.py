@@ -32,6 +32,7 @@ from cdtool.findings.channels import (
     UnitContradicted,
 )
 from cdtool.findings.clocks import ClocksApart, LowerRate
+from cdtool.findings.plausibility import Confirmed
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
@@ -90,6 +91,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
         findings=(
             *source.findings,
             *work.findings,
+            *(Finding(Confirmed(), item.channel, "note") for item in channels.sources if item.confirmed),
             *stuck_findings({name: _is_constant(series[name]) for name in MEASURED if name in series}, channels.joints),
             *disjoint_clock_findings(
                 {name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}

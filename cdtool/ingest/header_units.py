@@ -51,7 +51,7 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
 def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> list[Finding]:
     """Return the findings of one channel, one per contradicting unit; `columns` are those of its joints."""
     stated = find_unit(item.stated) if item.stated else None
-    if stated is None or item.confirmed:
+    if stated is None or item.unit_confirmed:
         return []
     by_unit: dict[str, list[Column]] = {}
     for column, factor in zip(columns, item.factor, strict=False):

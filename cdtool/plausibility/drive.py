@@ -1,8 +1,8 @@
-"""Whether a torque is that of the drive: friction takes power, starts show the inertia, and it is no function of position and speed.
+"""Whether a torque is that of the drive: friction takes power, and starts show the inertia.
 
 tau = g(q) + sum_k m_k a_k + f sign(v) + d (|v| - mean |v|) sign(v) + sum_k f_k sign(v_k) over windows in motion: g is a
-polynomial of the positions (weight, springs), f the friction at the mean speed. A sum of powers of the joints' positions
-and all accelerations stand for the coupling of a robot. Without motion in both directions g and f cannot be told apart:
+polynomial of the positions (weight, springs), f the friction at the mean speed. All positions and accelerations stand
+for the coupling of a robot. Without motion in both directions g and f cannot be told apart:
 then f is the mean, and counts only together with the inertia that starts show.
 """
 

@@ -6,19 +6,18 @@ detector may use the channel until the machine file is corrected, or confirms it
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 
 from cdtool.dynamics import Machine
 from cdtool.findings import Finding
 from cdtool.findings.channels import DerivedSpeed, IntegratedPosition
+from cdtool.findings.plausibility import Confirmed
 from cdtool.plausibility.derivatives import derivative_checks
 from cdtool.plausibility.drive import drive_checks
 from cdtool.recording import Recording
 
 
-def check_channels(
-    recordings: Sequence[Recording], machine: Machine, confirmed: Container[str] = ()
-) -> tuple[Finding, ...]:
+def check_channels(recordings: Sequence[Recording], machine: Machine) -> tuple[Finding, ...]:
     """Return the answer of each check of torque, speed and acceleration, for all logs together.
 
     Parameters
@@ -27,30 +26,48 @@ def check_channels(
         Logs of one machine on the load side, without contacts.
     machine : Machine
         The machine: its inertia is compared with what starts show.
-    confirmed : container of str, optional
-        Channels that the machine file confirms; they are not checked.
 
     Returns
     -------
     tuple of Finding
-        Of `ChannelCheck` each: a contradiction is a loss, all else a note.
+        Of `ChannelCheck` each: a contradiction is a loss, all else a note. A channel that the machine file confirms is
+        not checked.
+
+    Examples
+    --------
+    >>> import cdtool
+    >>> machine = cdtool.read_machine_file("sample_logs/gate/machine.toml")
+    >>> log = cdtool.read("sample_logs/gate/free/01.csv", machine)
+    >>> [(item.channel, item.fact.answer) for item in check_channels([log], machine.machine)][0]
+    ('speed', 'agrees')
     """
-    checked = derivatives(recordings, confirmed)
-    if not any(item.severity == "loss" and item.channel == "speed" for item in checked) and "torque" not in confirmed:
-        checked += drive_checks([item for item in recordings if "speed" in item], machine)
-    return tuple(checked)
+    found = derivatives(recordings)
+    if any(item.severity == "loss" and item.channel == "speed" for item in found):
+        return tuple(found)  # by such a speed nothing can be said of a torque
+    return (*found, *drive_checks(_with("torque", recordings), machine))
 
 
-def derivatives(recordings: Sequence[Recording], confirmed: Container[str] = ()) -> list[Finding]:
+def derivatives(recordings: Sequence[Recording]) -> list[Finding]:
     """Return whether the speed is the derivative of the position and the acceleration that of the speed.
 
-    A speed that contradicts the position says nothing about the acceleration.
+    A speed that contradicts the position says nothing about the acceleration. One that is derived is not checked.
     """
-    measured = [item for item in recordings if "speed" in item]
-    derived = any(
-        isinstance(found.fact, DerivedSpeed | IntegratedPosition) for item in measured for found in item.findings
-    )
-    found = [] if derived or "speed" in confirmed else list(derivative_checks(measured, "speed", "position"))
-    if "acceleration" in confirmed or any(item.severity == "loss" for item in found):
+    measured = [
+        item
+        for item in _with("speed", recordings)
+        if not any(isinstance(found.fact, DerivedSpeed | IntegratedPosition) for found in item.findings)
+    ]
+    found = list(derivative_checks(measured, "speed", "position"))
+    if any(item.severity == "loss" for item in found):
         return found
-    return [*found, *derivative_checks(measured, "acceleration", "speed")]
+    return [*found, *derivative_checks(_with("acceleration", recordings), "acceleration", "speed")]
+
+
+def _with(channel: str, recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the logs with a speed and the channel, unless the machine file confirms it."""
+    return [
+        item
+        for item in recordings
+        if {"speed", channel} <= item.channels.keys()
+        and not any(found.channel == channel and isinstance(found.fact, Confirmed) for found in item.findings)
+    ]

@@ -9,9 +9,9 @@ import numpy as np
 
 from cdtool.recording import FloatArray, Recording, Series
 
-# A window has at least so many samples of the slowest channel and lasts at least so long [s]; a log has at most so many.
+# Samples of the slowest channel in a window, its shortest length [s], and the most windows of a log.
 _SAMPLES, _SHORTEST, _MOST = 5.0, 0.05, 2000
-# Changes are taken over so many windows.
+# Changes are taken over this number of windows.
 _SPAN = 4
 
 
@@ -30,7 +30,8 @@ class Windows:
         """Return the change of a channel, or of its integral, over four windows (k, J), and its noise (J,)."""
         values = self.means[channel]
         bends = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
-        noise = np.array([np.median(column[np.isfinite(column)] if np.isfinite(column).any() else np.inf) for column in bends.T])
+        known = [column[np.isfinite(column)] for column in bends.T]
+        noise = np.array([np.median(column) if len(column) else np.inf for column in known])
         if integrated:
             steps = 0.5 * (values[1:] + values[:-1]) * self.length[1:, np.newaxis]
             changes = np.lib.stride_tricks.sliding_window_view(steps, _SPAN, axis=0).sum(axis=-1)
@@ -50,7 +51,8 @@ class Windows:
 
 def windows_of(recordings: Sequence[Recording], channels: Sequence[str]) -> Windows | None:
     """Return the windows of the logs that have all the channels; None if there are none."""
-    parts = [part for item in recordings if (part := _windows([item[name] for name in channels if name in item], len(channels)))]
+    chosen = [[item[name] for name in channels] for item in recordings if all(name in item for name in channels)]
+    parts = [part for series in chosen if (part := _windows(series)) is not None]
     if not parts:
         return None
     length = np.concatenate([np.full(len(means[0]), step) for step, means in parts])
@@ -60,8 +62,8 @@ def windows_of(recordings: Sequence[Recording], channels: Sequence[str]) -> Wind
     )
 
 
-def _windows(series: list[Series], count: int) -> tuple[float, list[FloatArray]] | None:
-    if len(series) < count or min(map(len, series)) < 2:
+def _windows(series: list[Series]) -> tuple[float, list[FloatArray]] | None:
+    if min(map(len, series)) < 2:
         return None
     start, end = max(float(item.time[0]) for item in series), min(float(item.time[-1]) for item in series)
     step = max(_SHORTEST, _SAMPLES * max(item.period for item in series), (end - start) / _MOST)

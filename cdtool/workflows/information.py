@@ -34,13 +34,14 @@ from cdtool.formats.source import Source, in_words
 from cdtool.ingest.clock_guess import ReadColumn, TableClock, is_clock_name
 from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.plausibility import check_channels
 from cdtool.recording import Recording, Series
 from cdtool.remote.remote_path import location
 from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
-from cdtool.workflows.log_checks.log_findings import log_findings
+from cdtool.workflows.log_checks.log_findings import before_contact, log_findings
 from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 from cdtool.workflows.log_checks.placeholders import placeholder_findings
 
@@ -179,6 +180,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     contacts = any_contacts(recording, rules)
     findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
+    findings += check_channels([before_contact(recording, contacts)], machine_file.machine)
     findings += placeholder_findings(recording, machine_file)
     findings += _steady_header(log, machine_file, findings)
     latencies = audit(recording, machine_file.machine, contacts)

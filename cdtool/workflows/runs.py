@@ -19,6 +19,7 @@ from cdtool.ingest.run_reading import LogRuns, read_runs, split_run
 from cdtool.logged_recording import LoggedRecording
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.operations import Operation, RunCut, operations_of
+from cdtool.plausibility import check_channels
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.remote.remote_path import is_remote, joined, location
@@ -211,7 +212,8 @@ def load_runs(
 
     Also left out: a log that is given twice or has the content of another one, a log whose header contradicts the unit
     of its motion or torque, and an operation in which the load cell shows a contact. Values that no sensor can measure
-    are masked: those outside the plausible `ranges`, which are learned from all these logs if none are given.
+    are masked: those outside the plausible `ranges`, which are learned from all these logs if none are given. Channels
+    that contradict the mechanics of the machine are learned from, and judged nowhere.
     """
     rule, base = reading.onset or OnsetRule(), reading.base
     paths, repeated = _each_once(paths)
@@ -219,6 +221,7 @@ def load_runs(
     skipped = [Skipped(shown_path(path, base), "given more than once, used once") for path in repeated]
     findings: list[RecordingFinding] = []
     by_bytes: dict[str, str] = {}
+    free_ones: list[Recording] = []
     without: list[tuple[str, Finding]] = []
 
     cut = RunCut.of(reading.operations)
@@ -262,11 +265,16 @@ def load_runs(
             by_bytes[recording.digest] = recording.name
         contacts = contacts_shown(recording, rule) if contacts is None else contacts
         free, touched = without_contacts(parts, contacts)
+        free_ones += [recording] if free else []
         operations.extend(free)
         skipped.extend(touched)
         findings.extend(lost(recording))
-        findings.extend(log_warnings(recording, contacts, rule))
+        warned = log_warnings(recording, contacts, rule)
+        findings.extend(item for item in warned if item.kind != "channel_check" or not free)
         without.extend((recording.name, item) for item in absent_truth(recording))
+    checks = check_channels(free_ones, machine_file.machine)
+    findings += [RecordingFinding.of(machine_file.path.name, item) for item in checks if item.severity == "loss"]
+    known = known.contradicted_by(checks)
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known, lasts)
 
 

@@ -346,12 +346,15 @@ def _for_this_machine(
 def _impact_free(
     logs: Sequence[str | Path], key: str, machine_file: MachineFile, reading: RunReading
 ) -> tuple[Runs, list[Recording]]:
-    """Return the runs of some logs, and their recordings; raises IdentificationError if none is impact-free."""
+    """Return the runs of some logs, and their recordings; raises IdentificationError if none can be used."""
     runs = load_runs(find_logs(map(str, several_logs(logs)), Path(), key), machine_file, reading)
     recordings = [operation.recording for operation in runs.operations]
     if not recordings:
         reason = runs.skipped[0].reason if runs.skipped else "no log is given"
         raise IdentificationError(f"no impact-free log is left: {reason}", "give other logs")
+    for check in runs.ranges.all.contradicted:
+        if check.found != "inertia":  # that of the machine file is what is to be identified
+            raise IdentificationError(f"{machine_file.path}: {check.channel}: {check.sentence()}")
     return runs, recordings
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from cdtool.findings.plausibility import ChannelCheck
 from cdtool.recording import CONTACT_PRESSURE, UNITLESS
 from cdtool.workflows.init.derived_speed import LowPass
 from cdtool.workflows.init.machine_side import Side
@@ -69,8 +70,8 @@ class Draft:
         return {name: self.evidence.logged(name) for name in self.channels.found if name not in UNITLESS}
 
 
-def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False) -> str:
-    """Return the machine file; channels in `left_out` become comments. `turned`: invert the accelerometer's sign."""
+def draft_text(draft: Draft, left_out: Mapping[str, str], reverse: Sequence[ChannelCheck]) -> str:
+    """Return the machine file; channels `left_out` become comments with the reason, those to `reverse` change sign."""
     side = draft.side
     lines = [
         f"# Draft by cdtool init from {_plain(draft.log)}: guessed, not measured.",
@@ -92,8 +93,9 @@ def draft_text(draft: Draft, left_out: Sequence[str] = (), turned: bool = False)
         lines += _commented(f"speed_low_pass_hz = {draft.low_pass.corner!r}", why)
     units = draft.units
     for name in draft.channels.found:
-        made = _mapped(draft, name, units.get(name), -1.0 if turned and name == "acceleration" else 1.0)
+        made = _mapped(draft, name, units.get(name), [item for item in reverse if item.channel == name])
         lines += [f"# {text}" if text and name in left_out else text for text in made]
+        lines += _wrapped(f"CHECK: left out: it {left_out[name]}") if left_out.get(name) else []
     if not draft.channels.found:
         lines += _wrapped(
             "CHECK: no name or value indicates a torque, speed or position. Write the channels here, with the unit "
@@ -126,20 +128,22 @@ def _value(value: object) -> str:
     return _text(value) if isinstance(value, str) else json.dumps(value)
 
 
-def _mapped(draft: Draft, name: str, logged: Logged | None, sign: float) -> list[str]:
+def _mapped(draft: Draft, name: str, logged: Logged | None, reverse: Sequence[ChannelCheck]) -> list[str]:
     """Return one channel's line, and the comment with the reason and what to check."""
     found = draft.channels.found[name]
     why, checks = f"guessed: {found.why}", [found.check]
     if logged is not None:
         why += f"; unit: {logged.why}" if logged.why else ""
         checks.append(logged.check)
-    if sign < 0.0:
-        why += "; opposite in sign to the speed's derivative: inverted"
+    if reverse:
+        why += f"; with a positive scale it {reverse[0].seen}: inverted"
     if name == "force":
         checks.append("ground truth only: is it the load cell of the test?")
     if name == CONTACT_PRESSURE:
         checks.append("ground truth only: is it the pressure of the contact, not of oil or air?")
-    line = f"{name} = {_channel(draft, name, logged, sign)}"
+    turned = {item.joint or draft.joints[0] for item in reverse}
+    signs = [-1.0 if joint in turned else 1.0 for joint in draft.joints]
+    line = f"{name} = {_channel(draft, name, logged, signs)}"
     return _commented(line, _marked(why, "; ".join(check for check in checks if check)))
 
 
@@ -209,7 +213,7 @@ def _time(clock: Clock) -> list[str]:
     return _commented(f"time = {{ column = {column}, {scale} }}", _marked(f"guessed: {clock.why}", clock.check))
 
 
-def _channel(draft: Draft, name: str, logged: Logged | None, sign: float) -> str:
+def _channel(draft: Draft, name: str, logged: Logged | None, signs: Sequence[float]) -> str:
     stream = draft.channels.found[name].stream
     if draft.topics:
         parts = [_place(draft, stream)]
@@ -221,8 +225,8 @@ def _channel(draft: Draft, name: str, logged: Logged | None, sign: float) -> str
         return f"{{ {', '.join(parts)} }}"
     if logged.unit:
         parts.append(f"unit = {_text(logged.unit)}")
-    if logged.scale is not None or sign < 0.0:
-        scale = [sign * value for value in logged.scale or (1.0,)]
+    if logged.scale is not None or min(signs) < 0.0:
+        scale = [sign * value for sign, value in zip(signs, logged.scale or (1.0,) * len(signs), strict=False)]
         shown = [f"{value!r}" for value in scale]
         parts.append(f"scale = {shown[0] if len(set(shown)) == 1 else _list(shown)}")
     return f"{{ {', '.join(parts)} }}"

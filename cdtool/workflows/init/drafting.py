@@ -13,7 +13,7 @@ from cdtool.evaluation.results import Skipped
 from cdtool.files import write_text
 from cdtool.findings import Finding
 from cdtool.findings.clocks import ClockUnitAssumed
-from cdtool.findings.motion import AccelerometerTurned
+from cdtool.findings.plausibility import ChannelCheck
 from cdtool.findings.tables import UnreadCells
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
@@ -40,6 +40,8 @@ from cdtool.workflows.runs import several_logs
 
 # Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
 _SLOWEST = 2.0
+# Contradictions that a change of sign cures, and those of a channel that is another quantity.
+_REVERSED, _ANOTHER = ("friction", "start", "sign"), ("place", "course", "joints", "other joint")
 # So many words in columns of numbers may stand for missing values.
 _MOST_WORDS = 4
 
@@ -193,29 +195,39 @@ def _refuse_existing(force: bool, *targets: Path) -> None:
 
 
 def _settled(log: Path, draft: Draft) -> Drafted:
-    """Return the draft with which `cdtool info` reads the log; guesses that the log contradicts are withdrawn."""
-    left_out: list[str] = []
-    turned = False
+    """Return the draft with which `cdtool info` reads the log; guesses that the log contradicts are withdrawn.
+
+    Signs that the mechanics of the machine contradict are reversed.
+    """
+    left_out: dict[str, str] = {}
+    reverse: list[ChannelCheck] = []
     if not draft.channels.found:
-        return Drafted("", draft_text(draft), (), (), (), draft.unmapped)
+        return Drafted("", draft_text(draft, {}, ()), (), (), (), draft.unmapped)
     with TemporaryDirectory() as folder:
         trial = Path(folder) / "draft.toml"
         while True:
-            text = draft_text(draft, left_out, turned)
+            text = draft_text(draft, left_out, reverse)
             trial.write_text(text, encoding="utf-8", newline="\n")
             mapped = tuple(name for name in draft.channels.found if name not in left_out)
             try:
-                findings = info(log, machine=read_machine_file(trial)).findings
+                findings = info(log, machine=read_machine_file(trial)).findings if mapped else ()
             except CdtoolError as fault:
                 if fault.channel not in mapped:
                     raise
-                left_out.append(fault.channel)
-                if len(mapped) == 1:
-                    return Drafted("", draft_text(draft, left_out, turned), (), tuple(left_out), (), draft.unmapped)
+                left_out[fault.channel] = ""
                 continue
-            if turned or not any(isinstance(found.fact, AccelerometerTurned) for found in findings):
+            wrong = [
+                item.fact
+                for item in findings
+                if isinstance(item.fact, ChannelCheck) and item.fact.answer == "contradicts"
+            ]
+            turned = {item.channel for item in reverse}
+            signs = [item for item in wrong if item.found in _REVERSED and item.channel not in turned]
+            others = {item.channel: item.seen for item in wrong if item.found in _ANOTHER or item.channel in turned}
+            if not signs and not others:
                 return Drafted("", text, mapped, tuple(left_out), findings, draft.unmapped)
-            turned = True
+            reverse += signs
+            left_out |= others
 
 
 def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:
