@@ -101,6 +101,6 @@ def units_apart(ratio: float, tolerance: float = _NEAR) -> str:
     >>> units_apart(1000.0), units_apart(1.0 / 60.0), units_apart(57.3), units_apart(3.0)
     ('mm and m, or ms and s', 'min and s', 'deg and rad', '')
     """
-    ratio = max(ratio, 1.0 / ratio)
+    ratio = max(ratio, 1.0 / max(ratio, 1e-300))
     factor, units = min(_FACTORS, key=lambda item: abs(math.log(ratio / item[0])))
     return units if abs(ratio / factor - 1.0) < tolerance else ""

@@ -62,7 +62,8 @@ def drive_checks(recordings: Sequence[Recording], machine: Machine) -> Iterator[
 
 def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) -> Iterator[ChannelCheck]:
     speed, torque = windows.means["speed"], windows.means["torque"][:, j]
-    known = np.isfinite(speed).all(axis=1) & np.isfinite(torque)
+    position = windows.means.get("position", np.empty((len(torque), 0)))
+    known = np.isfinite(np.column_stack([speed, torque, position])).all(axis=1)
     usual = np.quantile(np.abs(speed[known]), 0.99, axis=0) if known.any() else np.zeros(speed.shape[1])
     if not usual[j] > _HARDLY * usual.max():
         yield replace(check, found="rest")
@@ -70,7 +71,7 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
     moving = known & (np.abs(speed[:, j]) > _MOVING * usual[j])
     forward = float(np.mean(speed[moving, j] > 0.0)) if moving.any() else 0.0
     both = _BOTH < forward < 1.0 - _BOTH
-    place = _place(windows.means["position"], known) if "position" in windows.means else np.empty((len(torque), 0))
+    place = _place(position, known, j)
     columns = _motion_columns(windows, j, usual, both, float(np.mean(np.abs(speed[moving, j]))))
     table = np.column_stack([*columns.values(), place if both or machine.coupled else place[:, :0]])
     used = moving & np.isfinite(table).all(axis=1)
@@ -85,18 +86,18 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
         yield replace(check, answer="contradicts", found="place", share=share)
     elif not both and (machine.coupled or friction != inertia):
         yield replace(check, found="one direction")
+    elif follows := [k for k in range(len(usual)) if _follows(fit, k)]:
+        yield replace(check, answer="contradicts", found="other joint", other=machine.joints[follows[0]])
     elif friction < 0 <= -inertia:
         yield replace(check, answer="contradicts", found="friction")
     elif inertia < 0 <= -friction:
         yield replace(check, answer="contradicts", found="start")
     elif friction > 0:
         yield replace(check, answer="agrees", found="friction", share=fit.errors["friction"])
-    elif follows := [k for k in range(len(usual)) if _sure(fit, f"friction {k}", _OF_OTHER) > 0]:
-        yield replace(check, answer="contradicts", found="other joint", other=machine.joints[follows[0]])
     else:
         yield check
     expected = float(machine.nominal_inertia[j])
-    if not machine.coupled and inertia > 0 and expected > 0.0:
+    if not machine.coupled and min(friction, inertia) > 0 and expected > 0.0:
         seen = fit.value[f"inertia {j}"]
         answer: Answer = "agrees" if 1.0 / _FACTOR < seen / expected < _FACTOR else "contradicts"
         unit = {"N": "kg", "N m": "kg m2"}.get(machine.force_unit, "")
@@ -108,6 +109,12 @@ def _sure(fit: _Fit, name: str, share: float = _SHARE) -> int:
     if abs(fit.errors.get(name, 0.0)) < _ERRORS or abs(fit.share[name]) < share:
         return 0
     return 1 if fit.value[name] > 0.0 else -1
+
+
+def _follows(fit: _Fit, k: int) -> bool:
+    """Whether a torque shows the friction of joint k, and at most half as much of its own."""
+    other = fit.share.get(f"friction {k}", 0.0)
+    return _sure(fit, f"friction {k}", _OF_OTHER) > 0 and abs(fit.share["friction"]) < 0.5 * other
 
 
 def _explained(motion: FloatArray, torque: FloatArray) -> float:
@@ -134,13 +141,14 @@ def _motion_columns(windows: Windows, j: int, usual: FloatArray, both: bool, mea
     return columns | {f"friction {k}": np.tanh(speed[:, k] / (0.05 * usual[k])) for k in moved if k != j}
 
 
-def _place(position: FloatArray, known: BoolArray) -> FloatArray:
-    """Return the powers of the positions that stand for weight and springs, (w, p); of one joint up to the fifth."""
+def _place(position: FloatArray, known: BoolArray, j: int) -> FloatArray:
+    """Return the powers of the positions that stand for weight and springs, (w, p); of the own joint up to five."""
     spread = np.std(position[known], axis=0)
     moved = np.flatnonzero(spread > 0.0)
     z = (position[:, moved] - np.mean(position[known][:, moved], axis=0)) / spread[moved]
     products = [z[:, i] * z[:, k] for i in range(len(moved)) for k in range(i + 1)]
-    return np.column_stack([z, *products, *([z**3, z**4, z**5] if len(moved) == 1 else [])])
+    own = z[:, moved == j]
+    return np.column_stack([z, *products, own**3, own**4, own**5])
 
 
 def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Fit:

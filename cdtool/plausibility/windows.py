@@ -9,8 +9,9 @@ import numpy as np
 
 from cdtool.recording import FloatArray, Recording, Series
 
-# Samples of the slowest channel in a window, its shortest length [s], and the most windows of a log.
-_SAMPLES, _SHORTEST, _MOST = 5.0, 0.05, 2000
+# A window has the first number of samples of the slowest channel and lasts 0.05 s, or the next share of a log that is
+# short, or whose clock has the wrong unit; a log has at most the last number of windows.
+_SAMPLES, _SHORTEST, _PART, _MOST = 5.0, 0.05, 1.0 / 40.0, 2000
 # Changes are taken over this number of windows.
 _SPAN = 4
 
@@ -66,7 +67,10 @@ def _windows(series: list[Series]) -> tuple[float, list[FloatArray]] | None:
     if min(map(len, series)) < 2:
         return None
     start, end = max(float(item.time[0]) for item in series), min(float(item.time[-1]) for item in series)
-    step = max(_SHORTEST, _SAMPLES * max(item.period for item in series), (end - start) / _MOST)
+    shortest = min(_SHORTEST, _PART * (end - start))
+    step = max(shortest, _SAMPLES * max(item.period for item in series), (end - start) / _MOST)
+    if not step > 0.0:
+        return None
     edges = np.arange(start, end, step)
     return (step, [_mean(item, edges) for item in series]) if len(edges) > 2 * _SPAN else None
 
