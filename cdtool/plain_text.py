@@ -30,6 +30,12 @@ def one_line(text: object) -> str:
     return shorten(plain(text), LINE_LENGTH)
 
 
+def reason_line(word: str, name: str, reason: str) -> str:
+    """Return why something was left out or noted, on one line: the name is shortened, not the reason."""
+    room = LINE_LENGTH - len(f"{word}: : {plain(reason)}")
+    return one_line(f"{word}: {shorten(plain(name), max(room, LINE_LENGTH // 10))}: {reason}")
+
+
 def shorten(text: str, length: int) -> str:
     """Return the text, or its beginning and end with an ellipsis between them if it is longer than `length`."""
     if len(text) <= length:
