@@ -90,7 +90,7 @@ def test_a_label_file_may_be_written_like_a_log(tmp_path, separator, mark, encod
     assert labels.contacts["b.csv"] == ()
 
 
-def test_what_excel_adds_to_a_file_is_no_content_and_a_row_twice_is_one_contact(tmp_path):
+def test_what_excel_adds_does_not_count_and_a_row_twice_is_one_contact(tmp_path):
     text = "sep=;\r\nrecording;start_s;end_s;;\r\na.csv;1,25;1,5;;\r\n;;;;\r\na.csv;1,25;1,5;;\r\n"
     labels = read_labels(write(tmp_path, text))
     assert [contact.start for contact in labels.contacts["a.csv"]] == [1.25]
