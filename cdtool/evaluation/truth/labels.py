@@ -103,8 +103,8 @@ class Labels:
         start, end = label.start - shift, label.end - shift
         if not recording.start <= start <= recording.end:
             raise RecordingError(
-                f"{line}: the contact begins at {label.start:.10g} s, {recording.name} is recorded "
-                f"from {recording.start + shift:.3f} to {recording.end + shift:.3f} s on the {self.clock}'s clock",
+                f"{line}: the contact begins at {label.start:.10g} s, outside "
+                f"{recording.start + shift:.3f} to {recording.end + shift:.3f} s on the {self.clock}'s clock",
                 self._other_clock(label.start, recording),
             )
         return replace(label, start=start, end=max(end, start))
