@@ -246,11 +246,10 @@ def _contact(row: NamedRow, start: float, end: float, form: str) -> Contact:
         uncertainty, digit = math.nan, _last_digit(row.decimal(f"start_{form}"), form)
     else:
         digit = math.nan
-    if end < start or uncertainty < 0.0:
-        raise row.fault(
-            f"start {start:.10g} s, end {end:.10g} s, uncertainty {uncertainty:g} s",
-            "the end must be after the start, and the uncertainty not negative",
-        )
+    if end < start:
+        raise row.fault(f"start {start:.10g} s, end {end:.10g} s", "the end must be after the start")
+    if uncertainty < 0.0:
+        raise row.fault(f"uncertainty {uncertainty:g} s", "it must not be negative")
     return Contact(start, end, uncertainty, found_by="label file", kind=row.text("kind"), resolution=digit)
 
 
