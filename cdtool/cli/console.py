@@ -20,7 +20,7 @@ import typer
 from cdtool.cli.colour import coloured, shows_colour, style_of
 from cdtool.errors import CdtoolError
 from cdtool.exit_status import Fact, status_of
-from cdtool.plain_text import LINE_LENGTH, counted, one_line, reason_line, shorten, shorten_names
+from cdtool.plain_text import LINE_LENGTH, counted, one_line, reason_line, shorten_names, shorten_paths
 from cdtool.plain_text import plain as plain
 from cdtool.strict_json import strict_json
 
@@ -51,7 +51,7 @@ def print_error(fault: CdtoolError) -> None:
     message, hint = plain(fault.message), plain(fault.hint)
     room = LINE_LENGTH - len(_ERROR) - len(" ()")
     hint = shorten_names(hint, max(_SHORTEST_HINT, room - len(message)))
-    message = shorten(message, room - len(hint))
+    message = shorten_paths(message, room - len(hint))
     typer.echo(f"{_ERROR}{message}{f' ({hint})' if hint else ''}", err=True)
 
 

@@ -103,8 +103,8 @@ class Labels:
         start, end = label.start - shift, label.end - shift
         if not recording.start <= start <= recording.end:
             raise RecordingError(
-                f"{line}: the contact begins at {label.start:.10g} s, {recording.name} is recorded "
-                f"from {recording.start + shift:.3f} to {recording.end + shift:.3f} s on the {self.clock}'s clock",
+                f"{line}: the contact begins at {label.start:.10g} s, outside "
+                f"{recording.start + shift:.3f} to {recording.end + shift:.3f} s on the {self.clock}'s clock",
                 self._other_clock(label.start, recording),
             )
         return replace(label, start=start, end=max(end, start))
@@ -248,12 +248,10 @@ def _contact(row: NamedRow, start: float, end: float, form: str) -> Contact:
         uncertainty, digit = math.nan, _last_digit(row.decimal(f"start_{form}"), form)
     else:
         digit = math.nan
-    if end < start or uncertainty < 0.0:
-        stated = "" if math.isnan(uncertainty) else f", uncertainty {uncertainty:g} s"
-        raise row.fault(
-            f"start {start:.10g} s, end {end:.10g} s{stated}",
-            "the end must be after the start, and the uncertainty not negative",
-        )
+    if end < start:
+        raise row.fault(f"start {start:.10g} s, end {end:.10g} s", "the end must be after the start")
+    if uncertainty < 0.0:
+        raise row.fault(f"uncertainty {uncertainty:g} s", "it must not be negative")
     return Contact(start, end, uncertainty, found_by="label file", kind=row.text("kind"), resolution=digit)
 
 

@@ -38,7 +38,7 @@ class NoUsableRunError(SignatureError):
 
     def __init__(self, detector: str, reason: str) -> None:
         first = f"; first reason: {reason}" if reason else ""
-        super().__init__(f"{detector} cannot be used on any run{first}", "check with cdtool info")
+        super().__init__(f"{detector} cannot be used on any run{first}", "" if reason else "check with cdtool info")
         self.reason = reason
 
 
