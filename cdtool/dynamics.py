@@ -52,13 +52,10 @@ class JointEquation:
 class Machine(Protocol):
     """The interface of machines/: see the module's conventions. Every method takes whole recordings.
 
-    A machine is a frozen dataclass of its parameters, from which its fingerprint is computed. `default_sides`, "one" or
-    "two": the sides of its band on which a threshold raises alarms by default.
+    A machine is a frozen dataclass of its parameters, from which its fingerprint is computed.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
-    default_sides: ClassVar[str]
-
     @property
     def name(self) -> str:
         """Return the machine's name."""
@@ -82,6 +79,11 @@ class Machine(Protocol):
     @property
     def speed_unit(self) -> str:
         """Return the unit of the joints' speed."""
+        ...
+
+    @property
+    def default_sides(self) -> str:
+        """Return the sides of its band, "one" or "two", on which a threshold raises alarms by default."""
         ...
 
     @property

@@ -154,6 +154,18 @@ def not_cached(functions: Iterable[Function]) -> list[Function]:
     return missing
 
 
+def mark_current(functions: Iterable[Function]) -> None:
+    """Date the indices of cached functions now: an upgrade that left a file as it was made its functions look outdated.
+
+    numba, which compares the content of the file, keeps such an index as it is.
+    """
+    for function in functions:
+        folder = Path(imported_numba().njit(cache=True)(function).stats.cache_path)
+        with suppress(OSError):
+            for index in folder.glob(f"{_name(function)}-*.nbi"):
+                index.touch()
+
+
 def _indices(folder: Path) -> dict[str, float]:
     """Return when each index of a cache folder was written, by function: its name ends in line and Python version."""
     written: dict[str, float] = {}

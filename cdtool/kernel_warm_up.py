@@ -15,7 +15,7 @@ from importlib import import_module
 from pathlib import Path
 
 from cdtool.cores import usable_cores
-from cdtool.kernel_cache import before_compiling, not_cached, report_compilation, report_progress
+from cdtool.kernel_cache import before_compiling, mark_current, not_cached, report_compilation, report_progress
 from cdtool.kernels import Kernel, entries, loaded, named
 
 # Compile time, in bytes of byte code: fixed cost of a kernel; cost of starting a process; and the minimum work per
@@ -59,8 +59,9 @@ def compile_package() -> int:
         for child in children:
             child.kill()
             child.wait()
-    for item in _not_cached(absent):
+    for item in (outdated := _not_cached(absent)):
         _ = item.compiled
+    mark_current(map(named, outdated))
     return len(absent)
 
 

@@ -27,7 +27,13 @@ def plain(text: object) -> str:
 
 def one_line(text: object) -> str:
     """Return plain text on one line of at most 300 characters; an ellipsis marks omitted text."""
-    return shorten(plain(text), LINE_LENGTH)
+    return shorten_paths(plain(text), LINE_LENGTH)
+
+
+def reason_line(word: str, name: str, reason: str) -> str:
+    """Return why something was left out or noted, on one line: the name is shortened, not the reason."""
+    room = LINE_LENGTH - len(f"{word}: : {plain(reason)}")
+    return one_line(f"{word}: {shorten(plain(name), max(room, LINE_LENGTH // 10))}: {reason}")
 
 
 def shorten(text: str, length: int) -> str:
@@ -36,6 +42,19 @@ def shorten(text: str, length: int) -> str:
         return text
     tail = (length - 1) // 2
     return f"{text[: length - 1 - tail]}…{text[len(text) - tail :]}"
+
+
+def shorten_paths(text: str, length: int) -> str:
+    """Shorten like `shorten`, but the paths in the text first, the longest ones to 30 characters, then the reason.
+
+    >>> shorten_paths("/home/somebody/measurements/2026/gate/a.csv: no clock", 44)
+    '/home/somebody/…026/gate/a.csv: no clock'
+    """
+    for word in sorted(text.split(), key=len, reverse=True):
+        if len(text) > length and ("/" in word or "\\" in word):
+            path = word.strip("():,;'")
+            text = text.replace(path, shorten(path, 30))
+    return shorten(text, length)
 
 
 def shorten_names(text: str, length: int) -> str:

@@ -17,15 +17,15 @@ _WRONG_KIND = (TypeError, AttributeError, IndexError)
 def value_in_words(value: Any) -> str:
     """Return a value in words for a message.
 
-    >>> [value_in_words(value) for value in (True, None, "a", 2.5, [1, 2], {"b": 1})]
-    ['true', 'empty', "'a'", '2.5', 'a list of 2 values', 'a table']
+    >>> [value_in_words(value) for value in (True, None, "a", 2.5, 1e-300, [1, 2], {"b": 1})]
+    ['true', 'empty', "'a'", '2.5', '1e-300', '[1, 2]', 'a table']
     """
     if value is None or isinstance(value, bool):
         return "empty" if value is None else str(value).lower()
     if isinstance(value, str):
         return f"'{shorten(value, _LONGEST)}'"
     if isinstance(value, int | float):
-        return digits(value) if abs(value) < 1e15 else f"{value:g}"
+        return digits(value) if not value or 1e-9 <= abs(value) < 1e15 else f"{value:g}"
     if isinstance(value, list | tuple):
         plain = all(isinstance(item, int | float | str) for item in value) and len(value) <= 4
         listed = ", ".join(map(value_in_words, value))

@@ -241,3 +241,18 @@ def test_a_kernel_is_not_in_the_cache_before_it_is_compiled_and_after_its_file_h
 
 def test_without_a_writable_cache_no_process_is_started(no_cache_folder):
     assert kernel_warm_up._not_cached(_ours()) == []
+
+
+def test_kernels_in_the_cache_that_an_upgrade_left_valid_are_announced_once(tmp_path):
+    code = "import cdtool.activation; from cdtool import kernel_warm_up as w; w.import_kernels = lambda: 0; "
+    run = [sys.executable, "-c", f"{code}print(w.compile_package() > 0)"]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    project = Path(__file__).parents[1]
+    announced = []
+    for _ in range(3):
+        done = subprocess.run(run, cwd=project, env=environment, capture_output=True, text=True, check=True)
+        announced.append(done.stdout)
+        if len(announced) == 1:
+            for index in tmp_path.rglob("*.nbi"):
+                os.utime(index, (1.0, 1.0))  # older than its file, which is installed again with the same content
+    assert announced == ["True\n", "True\n", "False\n"]

@@ -144,9 +144,9 @@ def benchmark(
     if as_json:
         typer.echo(to_json(evaluated.results), nl=False)
     else:
+        show_results(evaluated, written, quiet=quiet, more=_stored(done.stored))
         if not quiet:
             _show_agreement(evaluated)
-        show_results(evaluated, written, quiet=quiet, more=_stored(done.stored))
         if made is not None:
             show_written(made, documents)
         elif done.results.forces and not quiet:

@@ -104,14 +104,14 @@ def compare(
     if as_json:
         typer.echo(to_json(found), nl=False)
     else:
-        _show(found, quiet=quiet)
+        _show(found, quiet=quiet, fail_if_later=fail_if_later)
         for path in () if quiet else targets:
             typer.echo(f"written: {plain(path)}")
     later = {Fact.LATER} if fail_if_later and found.later else set()
     leave(facts={*(found.facts if require_power else set(found.facts) & {Fact.WORSE}), *later})
 
 
-def _show(found: BuildComparison, *, quiet: bool) -> None:
+def _show(found: BuildComparison, *, quiet: bool, fail_if_later: bool) -> None:
     """Print what is missing from one file, the numbers, each row in words, the differences, and the verdict.
 
     If `quiet`, of the rows only those that are worse, and no table.
@@ -124,7 +124,10 @@ def _show(found: BuildComparison, *, quiet: bool) -> None:
     _show_rows([row for row in found.rows if not quiet or _TONES.get(row.outcome) == "bad"])
     if not quiet:
         _show_differences(found)
-    _say(found.words, _TONES.get(found.verdict, ""))
+    tone = _TONES.get(found.verdict, "")
+    if found.later and tone != "bad":
+        tone = "bad" if fail_if_later else "unknown"
+    _say(found.words, tone)
 
 
 def _show_table(found: BuildComparison) -> None:

@@ -20,7 +20,7 @@ import typer
 from cdtool.cli.colour import coloured, shows_colour, style_of
 from cdtool.errors import CdtoolError
 from cdtool.exit_status import Fact, status_of
-from cdtool.plain_text import LINE_LENGTH, counted, one_line, shorten, shorten_names
+from cdtool.plain_text import LINE_LENGTH, counted, one_line, reason_line, shorten_names, shorten_paths
 from cdtool.plain_text import plain as plain
 from cdtool.strict_json import strict_json
 
@@ -45,11 +45,13 @@ _REDRAWN = 0.1
 
 
 def print_error(fault: CdtoolError) -> None:
-    """Print an error in one line of at most 300 characters: the problem, then the next step."""
+    """Print an error in one line of at most 300 characters: the problem, then the next step; before it, its notes."""
+    for note in getattr(fault, "__notes__", ()):
+        typer.echo(one_line(note), err=True)
     message, hint = plain(fault.message), plain(fault.hint)
     room = LINE_LENGTH - len(_ERROR) - len(" ()")
     hint = shorten_names(hint, max(_SHORTEST_HINT, room - len(message)))
-    message = shorten(message, room - len(hint))
+    message = shorten_paths(message, room - len(hint))
     typer.echo(f"{_ERROR}{message}{f' ({hint})' if hint else ''}", err=True)
 
 
@@ -82,11 +84,7 @@ def _print_alike(word: str, every: Sequence[Skipped | RecordingFinding]) -> None
 
     items = alike([replace(item, reason=_bare(item)) for item in dict.fromkeys(every)])
     for item in items[:_SHOWN]:
-        reason = plain(item.reason)
-        # The name is shortened, not the reason.
-        room = LINE_LENGTH - len(f"{word}: : {reason}")
-        name = shorten(plain(item.recording), max(room, LINE_LENGTH // 4))
-        typer.echo(one_line(f"{word}: {name}: {reason}"), err=True)
+        typer.echo(reason_line(word, item.recording, item.reason), err=True)
     if len(items) > _SHOWN:
         typer.echo(f"{word}: and {len(items) - _SHOWN} more", err=True)
 

@@ -116,13 +116,15 @@ def _show(study: DraftedStudy, logs: list[Path], output: Path, *, quiet: bool) -
         f"{', '.join(map(plain, names))} written: drafts based on guesses. Check each line marked CHECK, then run"
     )
     typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(study.machine_path)}")
+    for name in study.kept:
+        typer.echo(f"{plain(name)} kept as it is: delete it for an empty one")
     if study.beside:
         typer.echo(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
         some = " ".join("*".join(part and _quoted(part) for part in item.split("*")) for item in patterns(logs, Path()))
         typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
     if study.has_detectors:
         typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
-    if not study.beside:
+    if not study.beside and not study.kept:
         typer.echo("for a test protocol of the contact forces:")
         typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
 

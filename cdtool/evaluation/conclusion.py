@@ -166,15 +166,16 @@ class Severity(IntEnum):
     LOST = 6
     INCOMPLETE = 7
     APPARENT = 8
-    MET = 9
-    NOT_ASKED = 10
+    UNCHECKED = 9
+    MET = 10
+    NOT_ASKED = 11
 
     @property
     def tone(self) -> str:
         """Return the colour of a verdict that opens with it: good, bad, unknown, or empty if nothing was required."""
         if self <= Severity.VIOLATED:
             return "bad"
-        return {Severity.MET: "good", Severity.NOT_ASKED: ""}.get(self, "unknown")
+        return {Severity.MET: "good", Severity.UNCHECKED: "", Severity.NOT_ASKED: ""}.get(self, "unknown")
 
 
 class Statement(NamedTuple):
@@ -309,7 +310,7 @@ def _of_limits(results: Results) -> Iterator[Statement]:
     elif not unchecked:
         yield Statement(Severity.NOT_ASKED, "no limits are set")
     for words in unchecked:
-        yield Statement(Severity.NOT_ASKED, plain(words))
+        yield Statement(Severity.UNCHECKED, plain(words))
 
 
 def _of_forces(checks: Sequence[ForceCheck]) -> Iterator[Statement]:

@@ -25,7 +25,6 @@ class CoupledMachine(JointMachine, ABC):
     """A machine of coupled joints; methods use whole recordings: position, speed and torque (n, J), load side."""
 
     coupled: ClassVar[bool] = True
-    default_sides: ClassVar[str] = "two"  # the side of a link on which a contact is unknown
     derives_position: ClassVar[bool] = False
 
     @property

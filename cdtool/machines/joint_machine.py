@@ -43,7 +43,6 @@ class JointMachine:
     constant_force: tuple[float, ...]
     stick_speed: tuple[float, ...]
 
-    default_sides: ClassVar[str] = "one"
     coordinates_by_default: ClassVar[str] = "motor"
     derives_position: ClassVar[bool] = True
     ratio_unit: ClassVar[str] = "rad/rad"
@@ -79,6 +78,11 @@ class JointMachine:
             "constant_force": table.numbers("constant_force", count, 0.0),
             "stick_speed": table.numbers("stick_speed", count, 1e-3, above=0.0),
         }
+
+    @property
+    def default_sides(self) -> str:
+        """ "two" for several joints: the leading one's direction is not that in which the others meet an obstacle."""
+        return "one" if len(self.joints) == 1 else "two"
 
     @property
     def load_units(self) -> dict[str, str]:

@@ -271,7 +271,8 @@ class Gathering:
         if not self._exposure and not self.setup.limits:
             first = self.skipped[0] if self.skipped else None
             reason = f"; first reason: {first.recording}: {first.reason}" if first else ""
-            raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", "check with cdtool info")
+            hint = "" if first else "check with cdtool info"
+            raise RecordingError(f"{self.setup.path}: no recording could be scored{reason}", hint)
         if self._choice.left_out:
             left_out = Finding(PlotsLeftOut(self._choice.left_out))
             self.findings.append(RecordingFinding.of(str(self.setup.path), left_out))

@@ -62,6 +62,18 @@ def test_a_label_outside_the_recording_is_left_out_with_its_line(read):
     assert "onset:" in done.out and "label file labels.csv" in done.out
 
 
+def test_the_first_reason_is_whole_and_its_next_step_the_only_one(read):
+    read(LEARN, STIFF, ONSET, labels="stiff/01.csv,1764394765.253,\nstiff/02.csv,1764394795.253,\n")
+    (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")
+    done = cdtool("score", read.folder / "triggers.csv", "-b", read.folder / "b.toml")
+    (line,) = done.err.splitlines()
+    assert done.status == 2 and "no recording could be scored; first reason: stiff/01.csv: " in line
+    assert "labels.csv line 2: the contact begins at 1764394765 s, outside 0.000 to " in line
+    assert line.endswith(
+        " s on the recording's clock (give seconds on the recording's own clock, as cdtool shows them)"
+    )
+
+
 def test_a_recording_labelled_without_a_contact_gets_a_hint_where_to_add_one(read):
     read(LEARN, STIFF, ONSET, labels="stiff/01.csv,,\nstiff/02.csv,5.0,5.2\n")
     (read.folder / "triggers.csv").write_text("recording,time_s\nstiff/01.csv,1.1\n", encoding="utf-8")

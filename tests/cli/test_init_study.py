@@ -94,6 +94,9 @@ def test_without_ground_truth_it_writes_a_label_file_to_fill_in(gate, tmp_path):
     filled = [rows[0], *(f"{row[:-3]},{contacts[row[:-3].rpartition('/')[2]].start},6.9," for row in rows[1:])]
     (tmp_path / "study" / "labels.csv").write_text("\n".join(filled), encoding="utf-8")
     assert cdtool("benchmark", tmp_path / "study" / "benchmark.toml", "--detectors", "gm").status == 0
+    again = cdtool("init", *logs, "-m", gate / "blind.toml", "-o", tmp_path / "study", "--force")
+    assert again.status == 0 and "labels.csv kept" in again.out  # what was filled in stays
+    assert (tmp_path / "study" / "labels.csv").read_text(encoding="utf-8").splitlines() == filled
 
 
 @pytest.mark.parametrize(("free", "folders"), [("Frei", 1), ("ohne_kontakt", 5), ("run-free", 5), ("no_contact", 1)])

@@ -58,7 +58,20 @@ def test_too_few_runs_count_those_left_out_before(gate_folder, tmp_path):
     machine = ("-m", gate_folder / "machine.toml")
     done = cdtool("learn-signature", *copies, *machine, "-d", "pi", "-o", tmp_path / "pi.json")
     assert done.status == 2 and "1 impact-free run of one class" in done.err
-    assert "left out before: 9 runs, first" in done.err and "used once" in done.err
+    assert "left out before: 9 runs (add runs; " in done.err and "used once" in done.err
+
+
+def test_too_few_runs_say_why_the_first_was_left_out_in_full(gate_folder, tmp_path):
+    hit = (gate_folder / "stiff" / "01.csv").read_bytes()
+    logs = [tmp_path / ("a long name of a folder, " * 8) / f"{number}.csv" for number in range(3)]
+    logs[0].parent.mkdir()
+    for number, log in enumerate(logs):
+        log.write_bytes(hit + b"\n" * number)
+    given = (*logs, gate_folder / "free" / "01.csv", "-m", gate_folder / "machine.toml", "-d", "pi")
+    left_out, error = cdtool("learn-signature", *given, "-o", tmp_path / "pi.json").err.splitlines()[-2:]
+    assert left_out.startswith("left out: ") and "0.csv: the load cell shows a contact of " in left_out
+    assert left_out.endswith("or detect --onset-above)") and len(left_out) <= 300
+    assert "left out before: 3 runs (add runs; to learn from fewer, but at least 2: " in error
 
 
 def test_a_reason_of_some_detectors_names_them():

@@ -212,6 +212,10 @@ WORST = {
         replace(results([40.0] * 3), findings=tuple(ABSENT)), [], (), "", 0,
         "1 of 1 limits not checked (gm not run)",
     ),
+    "limits of a detector that was not run before limits that are met": (
+        replace(results([40.0] * 3), findings=tuple(ABSENT)), [MET], (), "", 0,
+        "1 of 1 limits not checked (gm not run); the limit is met",
+    ),
     "what was lost before limits that are met": (
         replace(results([40.0] * 3), findings=LOST_PART, skipped=(Skipped("b.csv", "empty"),)), [MET], (), "unknown", 3,
         "1 entry left out; data lost in 1 recording; the limit is met",

@@ -169,9 +169,12 @@ def compare_builds(
     )
     verdict = _verdict(rows)
     words = overall_words(verdict, rows, count, significance, relevant_change)
-    later = sum(row.is_later(relevant_change) for row in rows)
-    if later and verdict in (INCONCLUSIVE, NOTHING_SHOWN):
-        words = f"later on the same contacts in {later} of {counted(len(rows), 'row')}; about other recordings {words}"
+    later = [row for row in rows if row.is_later(relevant_change)]
+    if later and verdict in (INCONCLUSIVE, NOTHING_SHOWN, "better"):
+        ways = ["later on"] if not all(row.misses_more for row in later) else []
+        ways += ["missing more of"] if any(row.misses_more for row in later) else []
+        where = f"the same contacts in {len(later)} of {counted(len(rows), 'row')}"
+        words = f"{' or '.join(ways)} {where}; about other recordings {words}"
     only_old = tuple(_alone(old, new, builds))
     return BuildComparison(
         verdict=verdict,
@@ -185,7 +188,7 @@ def compare_builds(
         only_old=only_old,
         only_new=tuple(_alone(new, old, builds[::-1])),
         notes=tuple(pairing_words(pairings)),
-        later=later,
+        later=len(later),
     )
 
 

@@ -24,11 +24,15 @@ Onsets = Mapping[tuple[str, str], Mapping[int, tuple[float, float]]]
 
 @dataclass(frozen=True)
 class Pairing:
-    """The partner in the new results of each old recording of a group, by name; empty: the group is not paired."""
+    """The partner in the new results of each old recording of a group, by name; where not `paired`, of the same bytes.
+
+    What happened on the partners is a fact; whether they are enough to decide about the group is `paired`.
+    """
 
     partners: Mapping[str, str]
     old_alone: int
     new_alone: int
+    paired: bool
 
 
 def pair_recordings(old: Results, new: Results) -> dict[str, Pairing]:
@@ -52,15 +56,16 @@ def _pair(
         if counts[0][name] != counts[1][partner]:
             raise _other_truth(name, f"its contacts are {counts[0][name]} in old and {counts[1][partner]} in new")
         _refuse_other_onsets(name, before.get((group, name), {}), after.get((group, partner), {}))
+    identical = dict(partners)
     taken = set(partners.values())
     left = {item.recording for item in new} - taken
     for item in old:
         name = item.recording
         if name not in partners and name in left and _same_onsets(before.get((group, name)), after.get((group, name))):
             partners[name] = name
-    if 2 * len(partners) < min(len(old), len(new)):
-        partners = {}
-    return Pairing(partners, len(old) - len(partners), len(new) - len(partners))
+    paired = bool(partners) and 2 * len(partners) >= min(len(old), len(new))
+    partners = partners if paired else identical
+    return Pairing(partners, len(old) - len(partners), len(new) - len(partners), paired)
 
 
 def _same_bytes(old: Sequence[RecordingResult], new: Sequence[RecordingResult]) -> dict[str, str]:

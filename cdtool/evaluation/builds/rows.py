@@ -74,10 +74,11 @@ class Question:
 class BuildRow:
     """One detector in one group.
 
-    `old_contacts` and `new_contacts` are all that the files hold, `pairs` those compared one by one (0 where not
-    paired); in `one_not_assessable` of them one build could not assess the contact, which counts there alone. What
-    happened on the pairs: the new build is later on `later` of them, by `later_ms` (least, most), and earlier on
-    `earlier`; `newly_missed` and `newly_detected` count the contacts that only one of the builds missed.
+    `old_contacts` and `new_contacts` are all that the files hold, `pairs` those of recordings in both, which are
+    compared one by one where `paired`; in `one_not_assessable` of them one build could not assess the contact, which
+    counts there alone. What happened on the pairs: the new build is later on `later` of them, by `later_ms` (least,
+    most), earlier on `earlier`, and later by `later_share` of the old mean; `newly_missed` and `newly_detected` count
+    the contacts that only one of the builds missed.
     """
 
     detector: str
@@ -91,6 +92,7 @@ class BuildRow:
     words: str = ""
     later: int = 0
     later_ms: tuple[float, float] | None = None
+    later_share: float = 0.0
     earlier: int = 0
     earlier_ms: tuple[float, float] | None = None
     newly_missed: int = 0
@@ -111,10 +113,12 @@ class BuildRow:
 
     def is_later(self, relevant_change: float) -> bool:
         """Whether the new build misses more of the pairs, or is later on most and by this share of the old mean."""
-        if self.newly_missed > self.newly_detected:
-            return True
-        latency = self.question("latency_ms")
-        return bool(latency and self.later > self.earlier and latency.change.value >= relevant_change * latency.old)
+        return self.misses_more or (self.later > self.earlier and self.later_share >= relevant_change)
+
+    @property
+    def misses_more(self) -> bool:
+        """Whether more of the pairs are newly missed than no longer missed."""
+        return self.newly_missed > self.newly_detected
 
     @property
     def inconclusive(self) -> bool:
@@ -174,7 +178,7 @@ def ask(
 ) -> tuple[BuildRow, list[Asked]]:
     """A row without its questions, and what is asked; `level` of the intervals."""
     old, new = (build.contacts(detector, group) for build in builds)
-    paired = bool(pairing.partners)
+    paired = pairing.paired
     pairs = pairs_of_contacts(pairing, old, new)
     before, after = ([a for a, _ in pairs], [b for _, b in pairs]) if paired else (old, new)
     labels = (_shared_labels(builds, pairing) if paired else builds[0].labels, builds[1].labels)
@@ -199,7 +203,10 @@ def ask(
             ask_false_alarms(*watched, same_logs),
         ]
     apart = sum((a.outcome == "not_assessable") != (b.outcome == "not_assessable") for a, b in pairs)
-    late, early = _changes(pairs, 1.0), _changes(pairs, -1.0)
+    known = [(a.latency_ms, b.latency_ms) for a, b in pairs if a.latency_ms is not None and b.latency_ms is not None]
+    changes, before_ms = [b - a for a, b in known], sum(a for a, _ in known)
+    late = [change for change in changes if change > LEAST_CHANGE]
+    early = [-change for change in changes if -change > LEAST_CHANGE]
     outcomes = [(a.outcome, b.outcome) for a, b in pairs]
     row = BuildRow(
         detector,
@@ -211,19 +218,13 @@ def ask(
         apart,
         later=len(late),
         later_ms=(min(late), max(late)) if late else None,
+        later_share=sum(changes) / before_ms if before_ms else math.inf,
         earlier=len(early),
         earlier_ms=(min(early), max(early)) if early else None,
         newly_missed=outcomes.count(("detected", "missed")),
         newly_detected=outcomes.count(("missed", "detected")),
     )
     return row, asked
-
-
-def _changes(pairs: Sequence[tuple[ContactResult, ContactResult]], sign: float) -> list[float]:
-    """Return by how much the latency of each pair grew (sign 1) or fell (-1) [ms], those with less left out."""
-    known = [(a.latency_ms, b.latency_ms) for a, b in pairs]
-    changes = [sign * (b - a) for a, b in known if a is not None and b is not None]
-    return [change for change in changes if change > LEAST_CHANGE]
 
 
 def answer(

@@ -79,13 +79,17 @@ def pairing_words(pairings: Mapping[str, Pairing]) -> list[str]:
     """Return a note for each group whose recordings are not all the same in both."""
     words = []
     for group, pairing in pairings.items():
+        alone = f"{pairing.old_alone} only in old and {pairing.new_alone} only in new"
         if not pairing.partners:
             if pairing.old_alone or pairing.new_alone:
                 words.append(f"{group}: unpaired, the recordings differ ({pairing.old_alone} and {pairing.new_alone})")
+        elif not pairing.paired:
+            both = counted(len(pairing.partners), "recording", "are")
+            words.append(f"{group}: unpaired, {both} in both, {alone}")
         elif pairing.old_alone or pairing.new_alone:
             words.append(
-                f"{group}: {counted(len(pairing.partners), 'recording', 'are')} paired; {pairing.old_alone} only in "
-                f"old and {pairing.new_alone} only in new count only for false alarms"
+                f"{group}: {counted(len(pairing.partners), 'recording', 'are')} paired; {alone} count only for false "
+                "alarms"
             )
     return words
 

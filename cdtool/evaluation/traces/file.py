@@ -200,6 +200,8 @@ def trace_values(trace: Trace) -> dict[str, Any]:
     `encode_traces` writes them.
     """
     low, step = _scale([trace.force])
+    # So that no time is as many steps as stand for "no limit": 1e-5 s up to 10,000 s.
+    time_step = max(_TIME_STEP, 10.0 ** (math.floor(math.log10(max(trace.end - trace.start, 1.0))) - 8))
     return {
         "recording": trace.recording,
         "group": trace.group,
@@ -210,13 +212,13 @@ def trace_values(trace: Trace) -> dict[str, Any]:
         "view": list(trace.view),
         "joints": trace.joints,
         "chosen": trace.chosen,
-        "force_time": _coded(trace.force_time, trace.start, _TIME_STEP),
+        "force_time": _coded(trace.force_time, trace.start, time_step),
         "force": _coded(trace.force, low, step),
-        "panels": [_panel_values(panel, trace.start) for panel in trace.panels],
+        "panels": [_panel_values(panel, trace.start, time_step) for panel in trace.panels],
     }
 
 
-def _panel_values(panel: Panel, start: float) -> dict[str, Any]:
+def _panel_values(panel: Panel, start: float, time_step: float) -> dict[str, Any]:
     course = panel.course
     low, step = _scale([course.value, course.lower, course.upper])
     return {
@@ -230,7 +232,7 @@ def _panel_values(panel: Panel, start: float) -> dict[str, Any]:
         "false_alarms": list(panel.false_alarms),
         "why": list(panel.why),
         "rearmed": [time if math.isfinite(time) else None for time in panel.rearmed],
-        "time": _coded(course.time, start, _TIME_STEP),
+        "time": _coded(course.time, start, time_step),
         "value": _coded(course.value, low, step),
         "lower": _coded(course.lower, low, step),
         "upper": _coded(course.upper, low, step),

@@ -4,7 +4,7 @@ Conventions: `recording` is the path below the benchmark file, or the file's nam
 columns of start and end state what they contain: `start_s`, `start_ms`, `start_us`, `start_ns` a number of that unit,
 `start_time` a date and time of ISO 8601, `start_row` the number of a row in the log's table, the first being 0. Numbers
 are on the recording's own clock, as cdtool shows it, or on the source's (`clock`), an epoch for example; a date is
-always on the source's. A recording that is named without a time has no contact.
+always on the source's. A recording that is named without a time has no contact. A contact that is named twice is one.
 """
 
 from __future__ import annotations
@@ -103,8 +103,8 @@ class Labels:
         start, end = label.start - shift, label.end - shift
         if not recording.start <= start <= recording.end:
             raise RecordingError(
-                f"{line}: the contact begins at {label.start:.10g} s, {recording.name} is recorded "
-                f"from {recording.start + shift:.3f} to {recording.end + shift:.3f} s on the {self.clock}'s clock",
+                f"{line}: the contact begins at {label.start:.10g} s, outside "
+                f"{recording.start + shift:.3f} to {recording.end + shift:.3f} s on the {self.clock}'s clock",
                 self._other_clock(label.start, recording),
             )
         return replace(label, start=start, end=max(end, start))
@@ -155,14 +155,15 @@ def read_labels(
     columns = (f"start_{form}", f"end_{form}")
     offset = _offset(path, zone) if zone else None
     first: dict[str, str] = {}
-    found: dict[str, list[tuple[Contact, str]]] = {}
+    rows: dict[str, dict[tuple[float, float, str], tuple[Contact, str]]] = {}
     zoned: dict[bool, str] = {}
     for row in read_named_rows(path, ("recording", *columns), _OPTIONAL, "label"):
         first.setdefault(row.recording, row.where)
-        contacts = found.setdefault(row.recording, [])
+        contacts = rows.setdefault(row.recording, {})
         start, end = (_moment(row, column, form, offset, zoned) for column in columns)
         if start is not None:
-            contacts.append((_contact(row, start, start if end is None else end, form), row.where))
+            end = start if end is None else end
+            contacts.setdefault((start, end, row.text("kind")), (_contact(row, start, end, form), row.where))
     if len(zoned) > 1:
         raise ConfigurationError(f"{zoned[False]}: a date without a zone, {zoned[True]} has one", "give all a zone")
     if zone and form != "time":
@@ -171,11 +172,12 @@ def read_labels(
         raise ConfigurationError(f"{path}: labels_clock is source, but the labels count rows", "remove labels_clock")
     findings = [Finding(LabelsWithoutZone())] if False in zoned and not zone else []
     # The finest digit of the file counts for all labels: many programs drop zeros at the end, and write 2 for 2.000.
-    digits = [contact.resolution for items in found.values() for contact, _ in items]
+    digits = [contact.resolution for items in rows.values() for contact, _ in items.values()]
     finest = min((digit for digit in digits if not math.isnan(digit)), default=math.nan)
-    for name, contacts in found.items():
-        contacts.sort(key=lambda item: item[0].start)
-        found[name] = [(replace(item, resolution=min(item.resolution, finest)), where) for item, where in contacts]
+    found = {}
+    for name, items in rows.items():
+        ordered = sorted(items.values(), key=lambda item: item[0].start)
+        found[name] = [(replace(item, resolution=min(item.resolution, finest)), where) for item, where in ordered]
     excluded = _excluded(path, found, not_contacts)
     if excluded:
         findings.append(Finding(KindsExcluded(excluded, tuple(dict.fromkeys(not_contacts))), severity="note"))
@@ -246,11 +248,10 @@ def _contact(row: NamedRow, start: float, end: float, form: str) -> Contact:
         uncertainty, digit = math.nan, _last_digit(row.decimal(f"start_{form}"), form)
     else:
         digit = math.nan
-    if end < start or uncertainty < 0.0:
-        raise row.fault(
-            f"start {start:.10g} s, end {end:.10g} s, uncertainty {uncertainty:g} s",
-            "the end must be after the start, and the uncertainty not negative",
-        )
+    if end < start:
+        raise row.fault(f"start {start:.10g} s, end {end:.10g} s", "the end must be after the start")
+    if uncertainty < 0.0:
+        raise row.fault(f"uncertainty {uncertainty:g} s", "it must not be negative")
     return Contact(start, end, uncertainty, found_by="label file", kind=row.text("kind"), resolution=digit)
 
 

@@ -1,8 +1,9 @@
 """A small CSV that a person or a program writes about recordings, as a label or trigger file: checked line by line.
 
 Conventions: one header line, separated by commas, semicolons or tabs, in any encoding that a log may have. A number has
-a decimal point or comma. `recording` is the path below the benchmark file, or the file's name alone where that is
-unique. Every row has as many cells as the header, so that a decimal comma between commas is noticed.
+a decimal point or comma. What Excel adds (a line sep=;, empty cells and rows) is no content. `recording` is the path
+below the benchmark file, or the file's name alone where that is unique. Every row has as many cells as the header, so
+that a decimal comma between commas is noticed.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path, PurePosixPath
 from cdtool.bounded_loading import read_bytes
 from cdtool.errors import ConfigurationError, RecordingError, nearest
 from cdtool.formats.csv.encoding import detect_text
+from cdtool.formats.csv.lines import Line
 from cdtool.plain_text import counted, first_of
 
 
@@ -57,8 +59,12 @@ class NamedRow:
 
 def read_named_rows(path: Path, required: Sequence[str], optional: Sequence[str], what: str) -> list[NamedRow]:
     """Return the rows of a file; raises ConfigurationError with the line. `what`: the kind of file, for messages."""
-    (_, header), *rows = read_cells(path, what)
-    _check_header(path, header, required, [*required, *optional])
+    (line, header), *rows = read_cells(path, what)
+    _check_header(f"{path} line {line}", header, required, [*required, *optional])
+    if not rows:
+        raise ConfigurationError(
+            f"{path}: contains no row", f"write one per {what}; one without a time: the recording has none"
+        )
     return [_row(path, line, header, cells) for line, cells in rows]
 
 
@@ -71,16 +77,25 @@ def read_cells(path: Path, what: str) -> list[tuple[int, list[str]]]:
             text = found.decode(stream)
         except RecordingError:  # empty, or names with characters that no log has
             text = content.decode("utf-8-sig")
-        separator = max(",;\t", key=text.partition("\n")[0].count)
+        first = text.lstrip("\r\n").partition("\n")[0]
+        named = Line(1, first, 0).separator
+        separator = named or max(",;\t", key=first.count)
         reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
-        header = [name.strip() for name in next(reader, [])]
-        return [(1, header), *((reader.line_num, cells) for cells in reader if cells)]
+        filled = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
     except UnicodeDecodeError as fault:
         raise ConfigurationError(f"{path}: not a {what} file: not text", "give a CSV file") from fault
     except csv.Error as fault:
         raise ConfigurationError(
             f"{path}: not a {what} file: damaged at line {reader.line_num}", "give a CSV file with paired quotes"
         ) from fault
+    (line, header), *rows = filled[bool(named) :] or [(1, [])]
+    names = [name.strip() for name in header]
+    while names and not names[-1]:
+        names.pop()
+    for _, cells in rows:
+        while len(cells) > len(names) and not cells[-1].strip():
+            cells.pop()
+    return [(line, names), *rows]
 
 
 def by_recording(
@@ -143,19 +158,19 @@ def _meant_runs(name: str, recordings: Collection[str]) -> list[str]:
     return [f"{recording}{name[i:]}" for recording, i in meant]
 
 
-def _check_header(path: Path, header: Sequence[str], required: Sequence[str], known: Sequence[str]) -> None:
+def _check_header(where: str, header: Sequence[str], required: Sequence[str], known: Sequence[str]) -> None:
     unknown = [name for name in header if name not in known]
     if unknown:
         which = ", ".join(f"'{name}'" for name in unknown)
         missing = [name for name in required if name not in header]
         hint = f"{nearest(unknown[0], known)}; needed: {', '.join(missing or required)}"
-        raise ConfigurationError(f"{path} line 1: unknown column{'s' * (len(unknown) > 1)} {which}", hint)
+        raise ConfigurationError(f"{where}: unknown column{'s' * (len(unknown) > 1)} {which}", hint)
     for name in header:
         if header.count(name) > 1:
-            raise ConfigurationError(f"{path} line 1: column '{name}' is repeated", "name each column once")
+            raise ConfigurationError(f"{where}: column '{name}' is repeated", "name each column once")
     for name in required:
         if name not in header:
-            raise ConfigurationError(f"{path} line 1: column '{name}' is missing", f"use {','.join(known)}")
+            raise ConfigurationError(f"{where}: column '{name}' is missing", f"use {','.join(known)}")
 
 
 def _row(path: Path, line: int, header: Sequence[str], cells: Sequence[str]) -> NamedRow:

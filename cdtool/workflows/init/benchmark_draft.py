@@ -109,8 +109,7 @@ def draft_benchmark(logs: Sequence[Path], machine_file: MachineFile, folder: Pat
         first = first or recording
         known.append(_Log(path, _contacts(recording), _noise(recording)))
     if first is None:
-        reason = f"; first reason: {skipped[0].reason}" if skipped else ""
-        raise RecordingError(f"none of {counted(len(logs), 'log')} can be read{reason}", "check with cdtool info")
+        raise RecordingError(f"none of {counted(len(logs), 'log')} can be read; first reason: {skipped[0].reason}")
     # Without ground truth, its name is what shows that a log has no impact.
     named_free = [log for log in known if log.contacts is None and _is_named_free(log.path)]
     known = [replace(log, contacts=0) if log in named_free else log for log in known]

@@ -115,7 +115,7 @@ class DraftedStudy:
     """A machine file and a benchmark file in one folder: their paths, the benchmark's text, and logs left out.
 
     `machine` is the draft of the machine file, None if one was given; `beside` are further files that were written.
-    `has_detectors`: the benchmark file names a detector.
+    `has_detectors`: the benchmark file names a detector. `kept`: files to fill in that existed and stay as they are.
     """
 
     machine: Drafted | None
@@ -125,6 +125,7 @@ class DraftedStudy:
     beside: tuple[str, ...]
     skipped: tuple[Skipped, ...]
     has_detectors: bool = True
+    kept: tuple[str, ...] = ()
 
     __repr__ = short_repr
 
@@ -148,7 +149,7 @@ def init_study(
     machine : str or Path, optional
         A machine file to use in place of a draft; it is named in the benchmark file.
     force : bool, optional
-        Replace existing files.
+        Replace existing files, except a label file.
     csv : mapping, optional
         Keys of `[csv]` of the drafted machine file, for tables that cannot be read without them.
 
@@ -180,12 +181,14 @@ def init_study(
     drafted = None if machine is not None else init(paths[0], target / "machine.toml", force=force, csv=csv)
     machine_path = location(machine) if machine is not None else target / "machine.toml"
     made = draft_benchmark(paths, read_machine_file(machine_path), target)
-    _refuse_existing(force, *(target / name for name in made.beside))
     write_text(file, made.text)
-    for name, text in made.beside.items():
-        write_text(target / name, text)
-    beside = tuple(str(target / name) for name in made.beside)
-    return DraftedStudy(drafted, str(machine_path), str(file), made.text, beside, made.skipped, made.has_detectors)
+    kept = tuple(str(target / name) for name in made.beside if (target / name).exists())
+    beside = tuple(str(target / name) for name in made.beside if str(target / name) not in kept)
+    for name in beside:
+        write_text(location(name), made.beside[location(name).name])
+    return DraftedStudy(
+        drafted, str(machine_path), str(file), made.text, beside, made.skipped, made.has_detectors, kept
+    )
 
 
 def _refuse_existing(force: bool, *targets: Path) -> None:

@@ -18,7 +18,7 @@ from cdtool.motion import MotionClass
 from cdtool.motion.speed_range import in_ranges
 from cdtool.operations import Operation
 from cdtool.pipeline import run_detector_on_each
-from cdtool.plain_text import counted
+from cdtool.plain_text import counted, reason_line
 from cdtool.thresholds.base import FittedThreshold, Threshold, is_per_run
 from cdtool.thresholds.common_class import SPEED_TOLERANCE
 from cdtool.thresholds.contract import checked_fit
@@ -38,7 +38,7 @@ class NoUsableRunError(SignatureError):
 
     def __init__(self, detector: str, reason: str) -> None:
         first = f"; first reason: {reason}" if reason else ""
-        super().__init__(f"{detector} cannot be used on any run{first}", "check with cdtool info")
+        super().__init__(f"{detector} cannot be used on any run{first}", "" if reason else "check with cdtool info")
         self.reason = reason
 
 
@@ -138,8 +138,9 @@ def with_left_out(fit: Fit, skipped: Sequence[Skipped]) -> Fit:
         except SignatureError as fault:
             if skipped and type(fault) is SignatureError:
                 before = f"left out before: {counted(len(skipped), 'run')}"
-                first = f"first {skipped[0].recording}: {skipped[0].reason}"
-                raise SignatureError(f"{fault.message}; {before}, {first}", fault.hint) from fault
+                told = SignatureError(f"{fault.message}; {before}", fault.hint)
+                told.add_note(reason_line("left out", skipped[0].recording, skipped[0].reason))
+                raise told from fault
             raise
 
     return told

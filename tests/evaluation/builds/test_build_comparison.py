@@ -441,5 +441,25 @@ def test_what_happened_on_the_same_contacts_is_said_beside_the_inference(name):
     found = compare_builds(single(OLD, campaigns=day), single(new, campaigns=day))
     assert found.verdict == "inconclusive" and found.later == later
     assert row_of(found).words.startswith(f"on the same 16 contacts: {words}; inconclusive: ")
-    start = "later on the same contacts in 1 of 1 row; about other recordings inconclusive: "
-    assert found.words.startswith(start if later else "inconclusive: ")
+    start = f"{'missing more of' if name == 'missed' else 'later on'} the same contacts in 1 of 1 row; about other "
+    assert found.words.startswith(f"{start}recordings inconclusive: " if later else "inconclusive: ")
+
+
+def test_what_happened_on_the_few_recordings_in_both_is_said_though_all_are_compared_unpaired():
+    old = single(OLD)
+    new = single([x + 30.0 for x in OLD], names="b")
+    fresh = tuple(replace(item, sha256=f"fresh {i}") if i > 2 else item for i, item in enumerate(new.recordings))
+    found = compare_builds(old, replace(new, recordings=fresh))
+    row = row_of(found)
+    assert not row.paired and row.words.startswith("slower by 30.0 ms") and found.later == 1
+    assert "; on the same 3 contacts: 3 later by 30.0 ms" in row.words
+    assert found.notes == ("stiff: unpaired, 3 recordings are in both, 13 only in old and 13 only in new",)
+
+
+def test_a_row_that_is_later_comes_before_another_that_is_better():
+    names = [("momentum", "stiff"), ("momentum", "soft")]
+    days = {"campaigns": ["monday"] * 8 + ["tuesday"] * 8}
+    old = build_results({names[0]: OLD, names[1]: [MISSED] * 16}, **days)
+    found = compare_builds(old, build_results({names[0]: [x + 30.0 for x in OLD], names[1]: OLD}, **days))
+    start = "later on the same contacts in 1 of 2 rows; about other recordings better: "
+    assert found.verdict == "better" and found.words.startswith(start)

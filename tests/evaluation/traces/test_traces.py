@@ -59,6 +59,18 @@ def test_traces_survive_writing_and_reading_within_a_pixel_and_give_the_same_byt
     assert encode_traces([again]) == path.read_bytes()
 
 
+@pytest.mark.parametrize("last", [9_999.0, 10_000.0, 12_000.0, 86_400.0, 3e7])
+def test_a_trace_of_a_recording_of_hours_can_be_read(tmp_path, last):
+    kept = trace()
+    course = replace(kept.panels[0].course, time=np.append(kept.panels[0].course.time[:-1], kept.start + last))
+    long = replace(kept, end=kept.start + last, panels=(replace(kept.panels[0], course=course),))
+    path = tmp_path / "results.traces.json.gz"
+    path.write_bytes(encode_traces([long]))
+    (again,) = read_traces(path)
+    np.testing.assert_allclose(again.panels[0].course.time, course.time, atol=max(1e-5, 1e-8 * last))
+    assert encode_traces([again]) == path.read_bytes()
+
+
 def test_traces_of_the_version_before_have_one_spelling_of_not_assessable_once_they_are_read(tmp_path):
     blind = replace(trace(), panels=(replace(trace().panels[0], verdict="not_assessable", reason="start-up"),))
     values = json.loads(gzip.decompress(encode_traces([blind])))

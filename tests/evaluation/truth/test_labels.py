@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -50,7 +52,10 @@ def test_a_byte_order_mark_and_spaces_in_the_header_do_not_matter(tmp_path):
         ("recording,start_s,end_s,knid\n", "unknown column 'knid'.*kind"),
         ("log,start_s,begin,stop\n", "unknown columns 'log', 'begin', 'stop'.*needed: recording, end_s"),
         ("recording,start_s,end_s\na.csv,one,2\n", "line 2: start_s is 'one'"),
-        ("recording,start_s,end_s\na.csv,2,1\n", "line 2: start 2 s, end 1 s"),
+        ("recording,start_s,end_s\na.csv,2,1\n", r"line 2: start 2 s, end 1 s \(the end must be after"),
+        ("recording,start_s,end_s,uncertainty_s\na.csv,1,2,-1\n", "line 2: uncertainty -1 s"),
+        ("recording,start_s,end_s\n", "contains no row.*one per label"),
+        ("\n\nrecording,start_s\n", "line 3: column 'end_s' is missing"),
         ("recording,start_s,end_s\n,2,3\n", "line 2: no recording"),
         ("recording,start_s,end_s\na.csv,nan,3\n", "line 2: start_s is 'nan'"),
         ("recording,start_s,end_s\na.csv,1,5,2,0\n", "line 2: 5 cells under 3 columns"),
@@ -59,8 +64,9 @@ def test_a_byte_order_mark_and_spaces_in_the_header_do_not_matter(tmp_path):
     ],
 )
 def test_a_wrong_file_is_one_line_that_names_the_line(tmp_path, text, said):
-    with pytest.raises(ConfigurationError, match=said):
+    with pytest.raises(ConfigurationError) as fault:
         read_labels(write(tmp_path, text))
+    assert re.search(said, str(fault.value))
 
 
 def log(origin: float = 0.0, rows: TableRows | None = None) -> Recording:
@@ -82,6 +88,13 @@ def test_a_label_file_may_be_written_like_a_log(tmp_path, separator, mark, encod
     (contact,) = (labels := read_labels(path)).contacts["a.csv"]
     assert (contact.start, contact.end, contact.kind, contact.resolution) == (1.25, 1.5, "stoß", 0.01)
     assert labels.contacts["b.csv"] == ()
+
+
+def test_what_excel_adds_does_not_count_and_a_row_twice_is_one_contact(tmp_path):
+    text = "sep=;\r\nrecording;start_s;end_s;;\r\na.csv;1,25;1,5;;\r\n;;;;\r\na.csv;1,25;1,5;;\r\n"
+    labels = read_labels(write(tmp_path, text))
+    assert [contact.start for contact in labels.contacts["a.csv"]] == [1.25]
+    assert labels.lines["a.csv"] == (f"{tmp_path / 'labels.csv'} line 3",)
 
 
 @pytest.mark.parametrize(

@@ -69,6 +69,7 @@ def test_the_range_contains_the_real_contacts_and_is_in_every_report(gate: Path)
     line = next(line for line in done.out.splitlines() if line.startswith("momentum: injected_stiff "))
     assert " to " in line and "real (real)" in line
     assert "bracket: drive rigid beyond its observed wind-up" in done.out
+    assert done.out.startswith("1 detection missed without a limit; "), "the verdict is the first sentence"
     stated = json.loads((gate / "r.json").read_text(encoding="utf-8"))["provenance"]["injected"]
     assert {f"injected_stiff{end}" for end in ("", "_rigid", "_limited", "_rigid_limited")} <= set(stated)
     assert stated["injected_stiff_rigid"]["assumed"] == ["drive rigid beyond its observed wind-up"]
