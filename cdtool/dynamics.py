@@ -56,6 +56,7 @@ class Machine(Protocol):
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
     @property
     def name(self) -> str:
         """Return the machine's name."""

@@ -105,7 +105,7 @@ class PlausibleRanges:
         `factors` convert a channel's logged numbers to SI, per joint. A run `to_learn` from has no contact, so its
         spikes are masked too.
         """
-        recording = recording if to_learn else self._without_contradicted(recording)
+        recording = recording if to_learn else self.without_contradicted(recording)
         channels, findings = dict(recording.channels), list(recording.findings)
         for name, known in self.channels.items():
             if name not in recording:
@@ -135,7 +135,12 @@ class PlausibleRanges:
                 channels[name] = Series(series.time, values, series.unit)
         return replace(recording, channels=channels, findings=tuple(findings))
 
-    def _without_contradicted(self, recording: Recording) -> Recording:
+    def contradicted_by(self, checks: Iterable[Finding]) -> PlausibleRanges:
+        """Return the ranges with the checks that are contradictions."""
+        facts = (item.fact for item in checks if isinstance(item.fact, ChannelCheck))
+        return replace(self, contradicted=tuple(fact for fact in facts if fact.answer == "contradicts"))
+
+    def without_contradicted(self, recording: Recording) -> Recording:
         """Return the recording without values of the channels that a check contradicts, and a loss for each."""
         checks = [check for check in self.contradicted if check.channel in recording]
         channels = dict(recording.channels)
@@ -178,16 +183,6 @@ class LearnedRanges:
 
     all: PlausibleRanges
     by_name: Mapping[str, PlausibleRanges] = field(default_factory=dict)
-
-    def contradicted_by(self, checks: Iterable[Finding]) -> LearnedRanges:
-        """Return the ranges without the channels of which one of the checks is a contradiction."""
-        wrong = tuple(
-            item.fact for item in checks if isinstance(item.fact, ChannelCheck) and item.fact.answer == "contradicts"
-        )
-        if not wrong:
-            return self
-        by_name = {name: replace(item, contradicted=wrong) for name, item in self.by_name.items()}
-        return LearnedRanges(replace(self.all, contradicted=wrong), by_name)
 
     @classmethod
     def of(cls, runs: Mapping[str, Recording], scored: Collection[str]) -> Self:

@@ -14,25 +14,24 @@ from cdtool.plausibility.windows import windows_of
 from cdtool.recording import FloatArray, Recording
 
 # Compared are changes of both channels above this share of the usual largest, and this multiple of their noise.
-_LARGE, _ABOVE_NOISE = 0.2, 5.0
+_LARGE, _ABOVE_NOISE = 0.2, 3.0
 # At least so many changes. All but this share of them have the same sign if the channels are related; of unrelated ones
 # more than the second share have either. The size is sure if half of them lie within this share of it.
-_FEWEST, _ODD, _EITHER, _SPREAD = 20, 0.1, 0.25, 0.3
+_FEWEST, _ODD, _EITHER, _SPREAD = 12, 0.1, 0.25, 0.3
 # A size that is right: filters, jitter and an elastic drive change it by less; and the next unit is further away.
 _LEAST, _MOST = 0.7, 1.4
-# A factor between two units is named if it is within this share.
-_NEAR = 0.05
+# A factor between two units is named if it is within this share: noise and filters change that of an accelerometer.
+_NEAR = 0.15
 _FACTORS = (
     (180.0 / np.pi, "deg and rad"),
     (1000.0, "mm and m, or ms and s"),
     (1e6, "um and m, or us and s"),
-    (9.80665, "g and m/s2"),
     (3600.0, "h and s"),
-    (60.0 / (2.0 * np.pi), "rpm and rad/s"),
     (60.0, "min and s"),
-    (6.0, "rpm and deg/s"),
     (2.0 * np.pi, "turns and rad"),
 )
+_OF_SPEED = ((60.0 / (2.0 * np.pi), "rpm and rad/s"), (6.0, "rpm and deg/s"))
+_OF_ACCELERATION = ((9.80665, "g and m/s2"),)
 
 
 def derivative_checks(recordings: Sequence[Recording], channel: str, other: str) -> Iterator[Finding]:
@@ -83,24 +82,25 @@ def _checked(check: ChannelCheck, ratios: FloatArray, others: Sequence[str]) -> 
     if _is_size(ratios):
         if _LEAST < size < _MOST:
             return replace(check, answer="agrees", found="size", value=size)
-        between = units_apart(size)
+        between = units_apart(size, check.channel)
         text = f" (a factor as between {between})" if between else ""
         return replace(check, answer="contradicts", found="size", value=size, between=text)
-    if backward > 1.0 - _ODD:
+    if _is_size(-ratios) or (backward > 1.0 - _ODD and not others):
         return replace(check, answer="contradicts", found="sign", value=size)
-    if not _EITHER < backward < 1.0 - _EITHER:
-        return replace(check, found="apart", value=backward)
     if others:
         return replace(check, answer="contradicts", found="joints", between=others[0])
+    if not _EITHER < backward < 1.0 - _EITHER:
+        return replace(check, found="apart", value=backward)
     return replace(check, answer="contradicts", found="course", share=backward)
 
 
-def units_apart(ratio: float, tolerance: float = _NEAR) -> str:
+def units_apart(ratio: float, channel: str = "speed") -> str:
     """Return the units that differ by a factor, the nearest ones within the tolerance; empty if it is none of theirs.
 
     >>> units_apart(1000.0), units_apart(1.0 / 60.0), units_apart(57.3), units_apart(3.0)
     ('mm and m, or ms and s', 'min and s', 'deg and rad', '')
     """
     ratio = max(ratio, 1.0 / max(ratio, 1e-300))
-    factor, units = min(_FACTORS, key=lambda item: abs(math.log(ratio / item[0])))
-    return units if abs(ratio / factor - 1.0) < tolerance else ""
+    factors = (*_FACTORS, *(_OF_ACCELERATION if channel == "acceleration" else _OF_SPEED))
+    factor, units = min(factors, key=lambda item: abs(math.log(ratio / item[0])))
+    return units if abs(ratio / factor - 1.0) < _NEAR else ""

@@ -25,7 +25,7 @@ from cdtool.recording import SHOWS_CONTACTS, Contact, Recording
 from cdtool.remote.remote_path import is_remote, joined, location
 from cdtool.workflows.contacts.impact_free import contacts_shown, unchecked, without_contacts
 from cdtool.workflows.execution.workers import Progress, Workers, in_order
-from cdtool.workflows.log_checks.log_findings import log_warnings
+from cdtool.workflows.log_checks.log_findings import before_contact, log_warnings
 
 # Folders of which every worker of a cluster must see a log, before it reads others.
 _FOLDERS = 50
@@ -99,10 +99,11 @@ def read_named(
 ) -> Recording:
     """Return one log's recording, named by its path below `base`; CdtoolError names the file.
 
-    A force with several axes is a magnitude, their rest levels removed by the `onset` rule.
+    A force with several axes is a magnitude, their rest levels removed by the `onset` rule. Channels that
+    contradict the mechanics of the machine have no values: in what `ranges` were learned from, else in this log.
     """
     recording = replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
-    return with_scalar_force(recording, onset or OnsetRule())
+    return _checked(with_scalar_force(recording, onset or OnsetRule()), machine_file.machine, ranges, onset)
 
 
 def named_on_load_side(
@@ -115,7 +116,16 @@ def named_on_load_side(
 ) -> Recording:
     """Return what `read_named` returns, of a log or run that has been read."""
     recording = replace(logged.on_load_side(machine_file.machine, ranges), name=shown_path(path, base))
-    return with_scalar_force(recording, onset)
+    return _checked(with_scalar_force(recording, onset), machine_file.machine, ranges, onset)
+
+
+def _checked(
+    recording: Recording, machine: Machine, ranges: PlausibleRanges | None, onset: OnsetRule | None
+) -> Recording:
+    if ranges is not None:
+        return recording
+    free = before_contact(recording, contacts_shown(recording, onset or OnsetRule()))
+    return PlausibleRanges({}).contradicted_by(check_channels([free], machine)).without_contradicted(recording)
 
 
 def runs_of(path: Path, machine_file: MachineFile, cut: RunCut | None) -> LogRuns:
@@ -274,7 +284,8 @@ def load_runs(
         without.extend((recording.name, item) for item in absent_truth(recording))
     checks = check_channels(free_ones, machine_file.machine)
     findings += [RecordingFinding.of(machine_file.path.name, item) for item in checks if item.severity == "loss"]
-    known = known.contradicted_by(checks)
+    by_name = {name: item.contradicted_by(checks) for name, item in known.by_name.items()}
+    known = LearnedRanges(known.all.contradicted_by(checks), by_name)
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known, lasts)
 
 

@@ -41,7 +41,15 @@ def test_info_shows_columns_without_and_channels_with_a_machine_file(gate_folder
     assert plain.status == 0 and "i_motor" in plain.out and "separator comma" in plain.out
     mapped = cdtool("info", log, "--machine", gate_folder / "machine.toml")
     assert mapped.status == 0
-    for word in ("torque", "speed", "m/s", "1000", "accelerometer fits the speed", "poles at 0.2"):
+    for word in (
+        "torque",
+        "speed",
+        "m/s",
+        "1000",
+        "times the derivative of the speed",
+        "friction takes power",
+        "poles at 0.2",
+    ):
         assert word in mapped.out
     (values,) = json.loads(cdtool("info", log, "--machine", gate_folder / "machine.toml", "--json").out)
     by_name = {channel["name"]: channel for channel in values["channels"]}
@@ -53,12 +61,12 @@ def test_info_finds_an_accelerometer_that_is_mounted_the_other_way_round(gate_fo
     text = (gate_folder / "machine.toml").read_text().replace('unit = "g", scale = -1', 'unit = "g", scale = 1')
     (tmp_path / "m.toml").write_text(text)
     done = cdtool("info", gate_folder / "free" / "01.csv", "--machine", tmp_path / "m.toml")
-    assert "warning: acceleration: accelerometer has the opposite sign" in done.out
+    assert "loss: acceleration: has the opposite sign of the derivative of the speed" in done.out
     assert "reverse the sign of its scale" in done.out  # it may be -1 already
     text = text.replace('unit = "g", scale = 1', 'unit = "m/s2", scale = -1')
     (tmp_path / "m.toml").write_text(text)
     done = cdtool("info", gate_folder / "free" / "01.csv", "--machine", tmp_path / "m.toml")
-    assert "wrong scale" in done.out and "may contain g" in done.out
+    assert "times the derivative of the speed (a factor as between g and m/s2)" in done.out
 
 
 def test_info_continues_after_a_bad_log(gate_folder, tmp_path):

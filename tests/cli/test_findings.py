@@ -53,12 +53,13 @@ def test_a_wrong_unit_is_reported_by_every_command_that_reads_the_log(gate_folde
     wrong = text.replace('column = "n_motor", unit = "rpm"', 'column = "n_motor", unit = "rad/s"')
     machine.write_text(wrong if units == "m_per_s" else text, encoding="utf-8")
     log, free = gate_folder / "stiff" / "01.csv", sorted((gate_folder / "free").glob("*.csv"))
-    info = _of(cdtool("info", log, "-m", machine).out, "warning")
-    assert any("check the units of speed" in words for words in info) == (units == "m_per_s")
+    words = "times the derivative of the position (a factor as between rpm and rad/s)"
+    info = _of(cdtool("info", log, "-m", machine).out, "loss")
+    assert any(words in text for text in info) == (units == "m_per_s")
     detect = cdtool("detect", log, "-m", machine, "-d", "gm", "--limit", 400)
-    assert _of(detect.err, "warning") == info
+    assert _of(detect.err, "loss") == info and detect.status == (3 if info else 0)
     learned = cdtool("learn-signature", *free, "-m", machine, "-d", "pt", "-o", tmp_path / "pt.json")
-    assert ("speed: integrates to" in learned.err) == (units == "m_per_s")
+    assert (words in learned.err) == (units == "m_per_s") and learned.status == (3 if info else 0)
 
 
 def test_info_names_a_contact_in_progress_that_detect_does_not_score(gate_folder, tmp_path):
@@ -79,7 +80,7 @@ def test_a_leap_of_the_clock_is_not_reported_as_wrong_units(gate_folder, tmp_pat
 
     log = damaged(gate_folder / "stiff" / "01.csv", tmp_path / "damaged.csv", shifted=leaps)
     done = cdtool("info", log, "-m", gate_folder / "machine.toml")
-    assert "warning: time: 1 gap after" in done.out and "check the units" not in done.out
+    assert "warning: time: 1 gap after" in done.out and "not assessable: correct the unit" not in done.out
 
 
 def test_wrong_units_are_found_together_with_a_leap_of_the_clock(gate_folder, tmp_path):

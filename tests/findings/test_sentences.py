@@ -25,6 +25,7 @@ from cdtool.findings import (
     motion,
     parts,
     placeholders,
+    plausibility,
     runs,
     scoring,
     synchronisation,
@@ -32,6 +33,7 @@ from cdtool.findings import (
     truth,
     worst_first,
 )
+from cdtool.findings.plausibility import ChannelCheck
 
 READINGS = clocks.TwoReadings(1.7e12, "s", 53870.5, "ms", "2023-11-14")
 SENTENCES: list[tuple[Fact, str]] = [
@@ -164,13 +166,6 @@ SENTENCES: list[tuple[Fact, str]] = [
         (
             "50.1 % of its stamps repeat: a coarse clock; choose other stamps in a machine file: "
             "[channels.mcap] time = { clock = ... }"
-        ),
-    ),
-    (
-        clocks.ClockFactor("elbow", 1000.0, 998.0, "ms and s"),
-        (
-            "the integral of the speed of elbow is 1000 times the position, and the acceleration 998 times the speed's "
-            "derivative: a factor as between ms and s in both points to the clock's unit, in [channels] time"
         ),
     ),
     (clocks.EmptyClock(), "named as a clock, but it contains no time stamp"),
@@ -560,22 +555,6 @@ SENTENCES: list[tuple[Fact, str]] = [
     (motion.NoMotion(), "the axis does not move"),
     (motion.Motion(1, 0.2, "m/s", "forward"), "1 stroke by motion; nominal speed 0.2 m/s, mainly forward"),
     (
-        motion.SpeedUnitDoubtful("", 1000.0, 1.0, "m", "m/s", "mm and m, or ms and s"),
-        (
-            "integrates to 1000 m, the position spans 1 m (a factor of 1000, as between mm and m, or ms and "
-            "s): check the units of speed (read as m/s) and position (read as m)"
-        ),
-    ),
-    (
-        motion.SpeedUnitDoubtful("elbow", 2.0, 1.0, "rad", "rad/s"),
-        (
-            "of elbow: integrates to 2 rad, the position spans 1 rad (a factor of 2): check the units of "
-            "speed (read as rad/s) and position (read as rad)"
-        ),
-    ),
-    (motion.SpeedSignOpposite("elbow"), "of elbow: has the opposite sign of the position's derivative"),
-    (motion.JointsSwapped("elbow", "wrist"), "that of elbow follows the speed of wrist: columns in another order?"),
-    (
         motion.Motion(3, 0.13, "rad/s", "backward", "elbow"),
         "3 strokes by motion; nominal speed of elbow 0.13 rad/s, mainly backward",
     ),
@@ -585,60 +564,109 @@ SENTENCES: list[tuple[Fact, str]] = [
         "nominal speed of elbow below minimum_speed (0.05 rad/s): not applicable",
     ),
     (motion.Poles(0.2, "m/s", 3.5, 120.0), "poles at 0.2 m/s: 3.5 and 120 rad/s"),
+    # plausibility
+    (plausibility.Confirmed(), "confirmed in the machine file: not checked against the other channels"),
     (
-        motion.AccelerometerUncheckable("elbow", "joint hardly moves"),
-        "accelerometer of elbow cannot be checked: the joint hardly moves",
+        ChannelCheck("friction", "agrees", "friction", "elbow", "torque", 4.2, "N m", share=63.0),
+        "of elbow: friction takes power: 4.2 N m at steady speed, 63 standard errors",
     ),
     (
-        motion.AccelerometerUncheckable("", "speed hardly changes"),
-        "accelerometer cannot be checked: the speed hardly changes",
-    ),
-    (
-        motion.AccelerometerUncheckable("", "correlation", 0.25),
-        "accelerometer cannot be checked: correlation with the speed's derivative 0.25",
-    ),
-    (
-        motion.AccelerometerFit("", 1.02, 0.98),
-        "accelerometer fits the speed (slope 1.02, correlation 0.98 over the speed's derivative)",
-    ),
-    (
-        motion.AccelerometerTurned("elbow", -1.02, -0.98),
+        ChannelCheck("friction", "contradicts", "friction", "", "torque", 152.0, "N"),
         (
-            "accelerometer of elbow has the opposite sign (slope -1.02, correlation -0.98 over the speed's "
-            "derivative): reverse the sign of its scale"
+            "gives power to the machine where friction takes it: at steady speed 152 N against the motion, not "
+            "assessable: reverse the sign of its scale, or write confirmed = true under torque if it is right"
         ),
     ),
     (
-        motion.AccelerometerScaleUncheckable("", 2.5, 0.7),
-        ("accelerometer: its scale cannot be checked (slope 2.5, correlation 0.70 over the speed's derivative)"),
-    ),
-    (
-        motion.AccelerometerScaleWrong("", 9.8, 0.98, "m/s2"),
+        ChannelCheck("friction", "contradicts", "start", "", "torque"),
         (
-            "accelerometer has the wrong scale (slope 9.8, correlation 0.98 over the speed's derivative): "
-            "the log may contain m/s2, not g"
+            "has the opposite sign of the force that the starts need, not assessable: reverse the sign of its scale, "
+            "or write confirmed = true under torque if it is right"
         ),
     ),
     (
-        motion.AccelerometerScaleWrong("", 0.102, 0.98, "g"),
+        ChannelCheck("friction", "contradicts", "place", "", "torque", share=0.99973),
         (
-            "accelerometer has the wrong scale (slope 0.102, correlation 0.98 over the speed's derivative): "
-            "the log may contain g"
+            "is a function of position and speed alone (99.97% of it), as no force of a drive is, not assessable: map "
+            "the drive's torque, force or current, or write confirmed = true under torque if it is right"
         ),
     ),
     (
-        motion.AccelerometerScaleWrong("", 5.0, 0.98),
+        ChannelCheck("friction", "contradicts", "other joint", "elbow", "torque", other="wrist"),
         (
-            "accelerometer has the wrong scale (slope 5, correlation 0.98 over the speed's derivative): "
-            "check unit and ratio"
+            "of elbow: follows the motion of wrist and not its own, not assessable: put the columns in the order of "
+            "the joints, or write confirmed = true under torque if it is right"
         ),
     ),
     (
-        motion.AccelerometerScaleWrong("", 0.001, 0.98, as_between="mm and m, or ms and s"),
+        ChannelCheck("inertia", "contradicts", "inertia", "", "torque", 62.0, "kg", 620.0),
         (
-            "accelerometer has the wrong scale (slope 0.001, correlation 0.98 over the speed's derivative): "
-            "check unit and ratio (a factor as between mm and m, or ms and s)"
+            "the starts show an inertia of 62 kg, the machine file has 620 kg, not assessable: correct mass, inertia, "
+            "transmission ratio or the scale of the torque, or write confirmed = true under torque if it is right"
         ),
+    ),
+    (
+        ChannelCheck("inertia", "agrees", "inertia", "", "torque", 580.0, "kg", 620.0),
+        "the starts show an inertia of 580 kg, the machine file has 620 kg",
+    ),
+    (
+        ChannelCheck("derivative", "agrees", "size", "", "speed", 0.998, other="position"),
+        "is 0.998 times the derivative of the position",
+    ),
+    (
+        ChannelCheck(
+            "derivative",
+            "contradicts",
+            "size",
+            "",
+            "speed",
+            57.3,
+            other="position",
+            between=" (a factor as between deg and rad)",
+        ),
+        (
+            "is 57.3 times the derivative of the position (a factor as between deg and rad), not assessable: correct "
+            "the unit of the speed, of the position or of the time, or write confirmed = true under speed if it is "
+            "right"
+        ),
+    ),
+    (
+        ChannelCheck("derivative", "contradicts", "sign", "elbow", "acceleration", -1.0, other="speed"),
+        (
+            "of elbow: has the opposite sign of the derivative of the speed, not assessable: reverse the sign of its "
+            "scale, or write confirmed = true under acceleration if it is right"
+        ),
+    ),
+    (
+        ChannelCheck("derivative", "contradicts", "course", "", "speed", share=0.43, other="position"),
+        (
+            "does not follow the derivative of the position: in 43% of the motion it has the opposite sign, not "
+            "assessable: map another column, or write confirmed = true under speed if it is right"
+        ),
+    ),
+    (
+        ChannelCheck("derivative", "contradicts", "joints", "elbow", "speed", other="position", between="wrist"),
+        (
+            "of elbow: follows the derivative of the position of another joint, wrist, not assessable: put the columns "
+            "in the order of the joints, or write confirmed = true under speed if it is right"
+        ),
+    ),
+    (
+        ChannelCheck("derivative", "not checked", "rest", "elbow", "acceleration", other="speed"),
+        "of elbow: derivative not checked: the joint hardly moves",
+    ),
+    (
+        ChannelCheck("derivative", "not checked", "apart", "", "acceleration", 0.2, other="speed"),
+        "derivative not checked: in 20% of the motion it has the opposite sign of the derivative of the speed",
+    ),
+    (ChannelCheck("friction", "not checked", "few", "", "torque"), "friction not checked: too little motion"),
+    (
+        ChannelCheck("friction", "not checked", "one direction", "", "torque"),
+        "friction not checked: motion in one direction, with no start that shows the sign",
+    ),
+    (
+        ChannelCheck("friction", "not checked", "unclear", "", "torque"),
+        "friction not checked: the motion does not show it",
     ),
     # truth
     (

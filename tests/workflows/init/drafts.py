@@ -73,17 +73,17 @@ class Draft:
         return self.channels[channel]["unit"]
 
 
-def drafted(log: Path, folder: Path) -> Draft:
+def drafted(log: Path, folder: Path, left_out: tuple[str, ...] = ()) -> Draft:
     """Return the draft of a log; `cdtool info` reads the log with it, and no comment line is too wide."""
     path = folder / "machine.toml"
     done = init(log, path, force=True)
-    assert not done.left_out
+    assert done.left_out == left_out
     assert max(len(line) for line in done.text.splitlines() if line.startswith("#")) <= 100
     values = tomllib.loads(done.text)
     channels = values["channels"]
     return Draft(done, values["machine"], channels.get("mcap", channels), done.text)
 
 
-def drafted_columns(folder: Path, columns: Mapping[str, FloatArray]) -> Draft:
+def drafted_columns(folder: Path, columns: Mapping[str, FloatArray], left_out: tuple[str, ...] = ()) -> Draft:
     """Return the draft of a table with these columns."""
-    return drafted(write(folder / "log.csv", columns), folder)
+    return drafted(write(folder / "log.csv", columns), folder, left_out)
