@@ -148,7 +148,7 @@ def latency_from(empty: ChannelLatency, events: Sequence[TimedEvent]) -> Channel
     if empty.rests_on != "derivative" and len(used) < LEAST_CONTACTS:
         reason = f"{counted(len(used), 'contact')} with a delay, at least {LEAST_CONTACTS} are needed"
     elif width > _WIDEST_OFFSET:
-        reason = f"the 95 % interval is {1e3 * width:.0f} ms wide, at most {1e3 * _WIDEST_OFFSET:.0f} ms is useful"
+        reason = f"the interval is {1e3 * width:.0f} ms wide, at most {1e3 * _WIDEST_OFFSET:.0f} ms is useful"
     if reason:
         return replace(empty, events=tuple(events), used=used, reason=reason)
     return replace(
