@@ -39,7 +39,7 @@ _FACTOR = 3.0
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _Terms:
     """Coefficients, how many standard errors each is, and its share of the torque's spread, by name of the column."""
 
     value: dict[str, float]
@@ -104,14 +104,14 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
         yield replace(check, check="inertia", answer=answer, found="inertia", value=seen, expected=expected, unit=unit)
 
 
-def _sure(fit: _Fit, name: str, share: float = _SHARE) -> int:
+def _sure(fit: _Terms, name: str, share: float = _SHARE) -> int:
     """Return the sign of a coefficient, 0 if it is not sure, not there, or too small a part of the torque."""
     if abs(fit.errors.get(name, 0.0)) < _ERRORS or abs(fit.share[name]) < share:
         return 0
     return 1 if fit.value[name] > 0.0 else -1
 
 
-def _follows(fit: _Fit, k: int) -> bool:
+def _follows(fit: _Terms, k: int) -> bool:
     """Whether a torque shows the friction of joint k, and at most half as much of its own."""
     other = fit.share.get(f"friction {k}", 0.0)
     return _sure(fit, f"friction {k}", _OF_OTHER) > 0 and abs(fit.share["friction"]) < 0.5 * other
@@ -151,7 +151,7 @@ def _place(position: FloatArray, known: BoolArray, j: int) -> FloatArray:
     return np.column_stack([z, *products, own**3, own**4, own**5])
 
 
-def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Fit:
+def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Terms:
     """Return the coefficients by least squares without the worst windows, with errors by blocks of windows."""
     scale = np.maximum(np.sqrt(np.mean(table**2, axis=0)), np.finfo(float).tiny)
     scaled, kept = table / scale, np.ones(len(torque), dtype=bool)
@@ -169,7 +169,7 @@ def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Fit:
     spread = np.std(torque[kept]) or np.inf
     shares = value * np.std(scaled[kept], axis=0) / spread
     shares[0] = value[0] / spread  # its own column may be constant
-    return _Fit(
+    return _Terms(
         dict(zip(names, (value / scale).tolist(), strict=False)),
         dict(zip(names, sure.tolist(), strict=False)),
         dict(zip(names, shares.tolist(), strict=False)),
