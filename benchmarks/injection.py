@@ -1,13 +1,16 @@
-"""Injected against true latencies on the simulated gate: the same runs with the same noise, hit and not hit.
+"""Injected against true latencies on simulated gates: the same strokes with the same noise, hit and not hit.
 
-Every free run has a true twin: the same seed, simulated with the obstacle. The contact is injected into the free run
-with a model of the axis, and both are judged by the same detectors with the same signatures. Parameters are the
-simulator's own ("true"), or identified from 14 impact-free runs ("identified": the accelerometer's bandwidth and the
-stiffness of the front are given, as a data sheet and a drawing give them).
+Every free stroke has a true twin: the same seed, simulated with the obstacle. The contact is injected into the free
+stroke with a model of the axis, and both are judged by the same detectors with the same signatures. On the package's
+own gate the parameters are the simulator's ("true"), or identified from 14 impact-free runs ("identified": the
+accelerometer's bandwidth and the stiffness of the front are given, as a data sheet and a drawing give them). The plain
+gates are of another simulator (tests/synthetic/plain_gate.py) whose drive and friction are not those of the model: ten
+machines drawn at random, each identified by `cdtool identify` from 14 strokes.
 
 python benchmarks/injection.py                # 5 seeds, with and without references, 8 pairs each: 8 min
 python benchmarks/injection.py --seeds 1 --pairs 4
 python benchmarks/injection.py --contacts 3   # only: identified, and three stiff contacts with a load cell added
+python benchmarks/injection.py --plain 10     # only: plain gates, six pairs per obstacle: 8 min
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,10 +29,13 @@ from timing import main
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+import cdtool  # noqa: E402
 from cdtool.activation import Activation  # noqa: E402
+from cdtool.axis_model.model_table import axis_model  # noqa: E402
 from cdtool.axis_model.obstacle import Obstacle  # noqa: E402
 from cdtool.axis_model.parameters import AxisModel, Drive, Sensors  # noqa: E402
 from cdtool.detectors import DETECTORS  # noqa: E402
+from cdtool.evaluation.agreement import with_model_error  # noqa: E402
 from cdtool.evaluation.truth.onset import find_contacts  # noqa: E402
 from cdtool.evaluation.truth.onset_rule import OnsetRule  # noqa: E402
 from cdtool.identification.axis_run import axis_run  # noqa: E402
@@ -38,13 +46,18 @@ from cdtool.identification.two_mass import TwoMassSettings, identify_two_mass  #
 from cdtool.injection.assumption import assumptions_of  # noqa: E402
 from cdtool.injection.axis_contact import axis_contact  # noqa: E402
 from cdtool.injection.injected_recording import injected_recording  # noqa: E402
+from cdtool.machine_file import read_machine_file  # noqa: E402
+from cdtool.machines.axis import Axis  # noqa: E402
+from cdtool.machines.linear_axis import LinearAxis  # noqa: E402
 from cdtool.operations import operations_of  # noqa: E402
 from cdtool.pipeline import detect_operation, run_detector  # noqa: E402
 from cdtool.recording import Recording  # noqa: E402
 from cdtool.simulation.gate_model import Impact, simulate_gate_run  # noqa: E402
 from cdtool.simulation.gate_recordings import as_recording  # noqa: E402
+from cdtool.tables import Table  # noqa: E402
 from cdtool.thresholds.signature import Signature  # noqa: E402
 from tests.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle  # noqa: E402
+from tests.synthetic import plain_gate  # noqa: E402
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, free_recording, without_references  # noqa: E402
 
 SEEDS, PAIRS, LEARNED = 5, 8, 14
@@ -54,6 +67,17 @@ KINDS: tuple[Impact, ...] = ("stiff", "soft")
 LIMITS = {"true": (0.05, 2.0), "identified": (0.12, 4.0), "contacts": (0.10, 3.0)}
 WITH_REFERENCES = ("desired_dynamics", "torque_deviation")
 LEFT_OUT = ("torque_deviation",)  # the gate's torque follows its reference closely, hit or not: it misses both
+PLAIN_DETECTORS = ("inertial_momentum", "friction_ekf", "momentum", "pure_torque")
+PLAIN_STIFFNESSES = (5e3, 20e3, 100e3, 500e3)  # N/m
+PLAIN_PAIRS, FIRST_PAIR = 6, 100
+RATIO = 1e-3  # m/rad, of the plain gates' drive
+# What the motor of a plain gate logs, and the factor from the load side.
+MOTOR_SIDE = {
+    "torque": ("N m", RATIO),
+    "speed": ("rad/s", 1.0 / RATIO),
+    "position": ("rad", 1.0 / RATIO),
+    "reference_speed": ("rad/s", 1.0 / RATIO),
+}
 
 
 @dataclass(frozen=True)
@@ -77,6 +101,13 @@ class Latencies:
         if np.min(self.differences) <= 0.0 <= np.max(self.differences):
             return 0.0
         return float(self.differences[np.argmin(np.abs(self.differences))])
+
+    @property
+    def is_in_stated_range(self) -> bool:
+        """Whether the true mean is within the range that the benchmark prints for the injected contacts."""
+        injected = np.nanmean(self.injected, axis=1)
+        low, high = with_model_error(float(np.min(injected)), float(np.max(injected)))
+        return low <= float(np.nanmean(self.true)) <= high
 
     @property
     def standard_error(self) -> float:
@@ -143,43 +174,156 @@ def identified_model(seed: int, references: bool, contacts: int = 0) -> AxisMode
     return with_contacts(model, identify_contacts(struck, model, settings))
 
 
-def compare(seed: int, model: AxisModel, kind: Impact, references: bool, pairs: int) -> dict[str, Latencies]:
-    """The latencies of every detector on injected and true contacts of one seed."""
-    obstacle: Obstacle = {"stiff": stiff_obstacle(GATE), "soft": soft_obstacle(GATE)}[kind]
-    free = [loaded(free_recording(GATE, seed, number), references) for number in range(LEARNED)]
-    names = [name for name in DETECTORS.usable_names() if name not in LEFT_OUT]
-    names = [name for name in names if references or name not in WITH_REFERENCES]
-    if model.controller is None:
-        names = [name for name in names if name != "pure_torque"]
+@dataclass(frozen=True)
+class Pair:
+    """A free stroke as logged, the same stroke with a contact, and when that begins [s]."""
+
+    free: Recording
+    hit: Recording
+    contact: float
+
+
+def compare(
+    machine: Axis,
+    learned: Sequence[Recording],
+    pairs: Sequence[Pair],
+    model: AxisModel,
+    obstacle: Obstacle,
+    names: Sequence[str],
+) -> dict[str, Latencies]:
+    """The latencies of detectors by name on injected and on true contacts."""
     judges = {}
     for name in names:
         detector = DETECTORS.load(name)()
-        runs = [operations_of(recording)[0] for recording in free]
-        pairs_to_fit = [(run.recording, run_detector(run, ON_LOAD_SIDE, detector)) for run in runs]
+        runs = [operations_of(machine.referred_to_load(recording))[0] for recording in learned]
+        pairs_to_fit = [(run.recording, run_detector(run, machine, detector)) for run in runs]
         judges[name] = (detector, Signature().fit(pairs_to_fit))
     found: dict[str, list[list[float]]] = {name: [] for name in names}
+    for pair in pairs:
+        run = axis_run(machine.referred_to_load(pair.free))
+        recordings = []
+        for assumption in assumptions_of(model):
+            contact = axis_contact(run, model, obstacle, pair.contact, 1.1, assumption)
+            recordings.append(injected_recording(pair.free, machine, contact.changes, contact.force, (0,)))
+        operations = [operations_of(machine.referred_to_load(item))[0] for item in (*recordings, pair.hit)]
+        for name, (detector, fitted) in judges.items():
+            latencies = []
+            for operation in operations:
+                verdict = detect_operation(operation, machine, detector, (fitted,), Activation()).verdict
+                after = [alarm.time for alarm in verdict.alarms if alarm.time > pair.contact]
+                latencies.append(1e3 * (after[0] - pair.contact) if after else math.nan)
+            found[name].append(latencies)
+    return {name: Latencies(np.array(items).T[:-1], np.array(items).T[-1]) for name, items in found.items()}
+
+
+def compare_gate(seed: int, model: AxisModel, kind: Impact, references: bool, pairs: int) -> dict[str, Latencies]:
+    """The latencies of every detector on injected and true contacts of the package's gate, of one seed."""
+    logged: Callable[[Recording], Recording] = (lambda item: item) if references else without_references
+    twins = []
     for number in range(pairs):
         rng = (seed, 1000 + number)
         hit = simulate_gate_run(GATE, np.random.default_rng(rng), kind)
         clean = as_recording(simulate_gate_run(GATE, np.random.default_rng(rng), "none"), "free", GATE)
-        clean = clean if references else without_references(clean)
         assert hit.contact_start is not None
-        run = axis_run(ON_LOAD_SIDE.referred_to_load(clean))
-        recordings = []
-        for assumption in assumptions_of(model):
-            contact = axis_contact(run, model, obstacle, hit.contact_start, 1.1, assumption)
-            injected = injected_recording(clean, ON_LOAD_SIDE, contact.changes, contact.force, (0,))
-            recordings.append(ON_LOAD_SIDE.referred_to_load(injected))
-        recordings.append(loaded(as_recording(hit, "hit", GATE), references))
-        for name, (detector, fitted) in judges.items():
-            latencies = []
-            for recording in recordings:
-                operation = operations_of(recording)[0]
-                verdict = detect_operation(operation, ON_LOAD_SIDE, detector, (fitted,), Activation()).verdict
-                after = [alarm.time for alarm in verdict.alarms if alarm.time > hit.contact_start]
-                latencies.append(1e3 * (after[0] - hit.contact_start) if after else math.nan)
-            found[name].append(latencies)
-    return {name: Latencies(np.array(items).T[:-1], np.array(items).T[-1]) for name, items in found.items()}
+        twins.append(Pair(logged(clean), logged(as_recording(hit, "hit", GATE)), hit.contact_start))
+    names = [name for name in DETECTORS.usable_names() if name not in LEFT_OUT]
+    names = [name for name in names if references or name not in WITH_REFERENCES]
+    if model.controller is None:
+        names = [name for name in names if name != "pure_torque"]
+    learned = [logged(free_recording(GATE, seed, number)) for number in range(LEARNED)]
+    obstacle: Obstacle = {"stiff": stiff_obstacle(GATE), "soft": soft_obstacle(GATE)}[kind]
+    return compare(ON_LOAD_SIDE, learned, twins, model, obstacle, names)
+
+
+def plain_columns(gate: plain_gate.PlainGate) -> dict[str, tuple[str, float]]:
+    """Unit and factor of each column: a rigid gate logs its load, an elastic one its motor."""
+    of_load = {name: (unit, 1.0) for name, unit in plain_gate.CHANNELS.items()}
+    return of_load if gate.is_rigid else of_load | MOTOR_SIDE
+
+
+def plain_machine(gate: plain_gate.PlainGate) -> str:
+    """The machine file that the maker of a plain gate would write, with masses that are 8 % too low."""
+    lines = ['[machine]\ntype = "linear_axis"\nname = "gate"']
+    if gate.is_rigid:
+        lines += ['coordinates = "load"', f"load_mass = {0.92 * (gate.motor_mass + gate.leaf_mass)}"]
+    else:
+        lines += [f"motor_inertia = {gate.motor_mass * RATIO**2}", f"load_mass = {0.92 * gate.leaf_mass}"]
+        lines += [f"transmission_ratio = {RATIO}"]
+    lines += ['[channels]\ntime = { column = "time", unit = "s" }']
+    lines += [f'{name} = {{ column = "{name}", unit = "{unit}" }}' for name, (unit, _) in plain_columns(gate).items()]
+    lines += ["[model.sensors]", f"torque_filter_time = {gate.torque_filter}"]
+    return "\n".join((*lines, f"accelerometer_hz = {gate.accelerometer_hz}\n"))
+
+
+def identified_plain(gate: plain_gate.PlainGate, learned: Sequence[Recording]) -> AxisModel:
+    """The model that `cdtool identify` writes from the logs of a plain gate."""
+    of_gate = plain_columns(gate)
+    with tempfile.TemporaryDirectory() as folder:
+        logs = [Path(folder) / f"{number}.csv" for number in range(len(learned))]
+        for log, recording in zip(logs, learned, strict=True):
+            columns = [factor * recording[name].values[:, 0] for name, (_, factor) in of_gate.items()]
+            rows = np.column_stack((recording["torque"].time, *columns))
+            np.savetxt(log, rows, "%.9g", ",", header=f"time,{','.join(of_gate)}", comments="")
+        given, written = Path(folder) / "machine.toml", Path(folder) / "identified.toml"
+        given.write_text(plain_machine(gate), encoding="utf-8")
+        cdtool.identify(logs, given, written)
+        machine_file = read_machine_file(written)
+        assert isinstance(machine_file.machine, LinearAxis)
+        return axis_model(machine_file.machine, machine_file.model)
+
+
+def compare_plain(
+    gate: plain_gate.PlainGate,
+    seed: int,
+    stiffnesses: Sequence[float] = PLAIN_STIFFNESSES,
+    pairs: int = PLAIN_PAIRS,
+    names: Sequence[str] = PLAIN_DETECTORS,
+) -> Mapping[float, dict[str, Latencies]]:
+    """The latencies on a plain gate by the stiffness of the obstacle, with the identified model."""
+    numbers = range(FIRST_PAIR, FIRST_PAIR + pairs)
+    free = plain_gate.strokes(gate, seed, [*range(LEARNED), *numbers]).recordings
+    struck = plain_gate.strokes(gate, seed, [*numbers] * len(stiffnesses), np.repeat(stiffnesses, pairs))
+    twins = [
+        Pair(*item)
+        for item in zip([*free[LEARNED:]] * len(stiffnesses), struck.recordings, struck.contacts, strict=True)
+    ]
+    model = identified_plain(gate, free[:LEARNED])
+    table = {"name": "gate", "coordinates": "load", "load_mass": model.drive.total_mass}
+    machine = LinearAxis.from_table(Table(table, "machine.toml"))
+    return {
+        stiffness: compare(
+            machine,
+            free[:LEARNED],
+            twins[pairs * index : pairs * (index + 1)],
+            model,
+            Obstacle.spring(stiffness, plain_gate.CONTACT_DAMPING),
+            names,
+        )
+        for index, stiffness in enumerate(stiffnesses)
+    }
+
+
+def measure_plain(machines: int) -> bool:
+    """Show how far the true means of plain gates are from the injected ones; at least 95 % within the stated range."""
+    cells: dict[tuple[float, str], list[Latencies]] = {}
+    for seed in range(machines):
+        for stiffness, of_detector in compare_plain(plain_gate.drawn_gate(seed), seed).items():
+            for name, item in of_detector.items():
+                cells.setdefault((stiffness, name), []).append(item)
+    for (stiffness, name), items in cells.items():
+        true = [float(np.nanmean(item.true)) for item in items]
+        pairs = np.concatenate([(item.injected - item.true)[0] for item in items])
+        shares = [100.0 * item.difference / mean for item, mean in zip(items, true, strict=True)]
+        missed = sum(not item.same_misses for item in items)
+        print(
+            f"{stiffness / 1e3:4.0f} N/mm {name:18s} true {np.mean(true):6.1f} ms, mean of a machine "
+            f"{min(shares):+4.0f} to {max(shares):+3.0f} %, one contact {np.nanmean(pairs):+5.1f} +- "
+            f"{np.nanstd(pairs):4.1f} ms, other misses on {missed} of {len(items)}"
+        )
+    within = np.array([[item.is_in_stated_range for item in items] for items in cells.values()])
+    whole = int(np.sum(within.all(axis=0)))
+    print(f"within the stated range: {np.sum(within)} of {within.size} means, all of {whole} of {machines} machines")
+    return bool(np.mean(within) >= 0.95)
 
 
 def measure(seeds: int, pairs: int, contacts: int) -> bool:
@@ -193,7 +337,7 @@ def measure(seeds: int, pairs: int, contacts: int) -> bool:
                 for seed in range(FIRST_SEED, FIRST_SEED + seeds):
                     is_true = parameters == "true"
                     model = gate_as_model(GATE) if is_true else identified_model(seed, references, contacts)
-                    for name, item in compare(seed, model, kind, references, pairs).items():
+                    for name, item in compare_gate(seed, model, kind, references, pairs).items():
                         merged.setdefault(name, []).append(item)
                 print(f"\n{parameters} parameters, {'with' if references else 'without'} references, {kind}")
                 for name, items in merged.items():
@@ -219,5 +363,9 @@ if __name__ == "__main__":
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--pairs", type=int, default=PAIRS)
     parser.add_argument("--contacts", type=int, default=0, help="real contacts with a load cell to identify from")
+    parser.add_argument("--plain", type=int, default=0, help="machines of the other simulator")
     chosen = parser.parse_args()
-    main("injected and true latencies", lambda: measure(chosen.seeds, chosen.pairs, chosen.contacts))
+    if chosen.plain:
+        main("injected and true latencies of plain gates", lambda: measure_plain(chosen.plain))
+    else:
+        main("injected and true latencies", lambda: measure(chosen.seeds, chosen.pairs, chosen.contacts))

@@ -61,7 +61,7 @@ class ModelTable:
             section = table.table(name)
             values: dict[str, tuple[float, ...]] = {}
             if name == "drive" and section.flag("rigid", False):
-                values["stated_rigid"] = (1.0,) * joints
+                values["stated_rigid"] = (True,) * joints
             for item in fields(part):
                 if item.name in section.values and item.name not in _NOT_KEYS:
                     values[item.name] = section.numbers(item.name, joints)
@@ -78,9 +78,10 @@ class ModelTable:
 def axis_model(machine: Axis, table: ModelTable | None, joint: int = 0) -> AxisModel:
     """Return the model of one axis: masses and friction of [machine] on the load side, and what [model] has.
 
-    Without [model.drive] stiffness the drive is rigid; without [model.friction] the friction is that of [machine]. A
-    Coulomb friction of one direction applies to both. Raises
-    ConfigurationError where the load's mass or inertia is missing, or values contradict one another.
+    Without [model.drive] stiffness the drive is rigid, and known to be if the log holds the load's motion: the contact
+    then acts on the one mass that the drive moves. Without [model.friction] the friction is that of [machine]. A
+    Coulomb friction of one direction applies to both. Raises ConfigurationError where the load's mass or inertia is
+    missing, or values contradict one another.
     """
     machine.require_inertia("a model of the axis")
     table = table or ModelTable({})
@@ -99,7 +100,6 @@ def joint_model(machine: JointMachine, table: ModelTable, joint: int, masses: tu
     """
     motor, load = masses
     drive: dict[str, Any] = {**table.of_joint("drive", joint)}
-    drive["stated_rigid"] = bool(drive.get("stated_rigid", False))
     if "motor_mass" in drive:
         if motor > 0.0:
             raise ConfigurationError(
@@ -113,8 +113,9 @@ def joint_model(machine: JointMachine, table: ModelTable, joint: int, masses: tu
         _require(machine.name, "model.controller", controller, Controller)
     if "speed_filter_order" in controller:
         controller["speed_filter_order"] = int(controller["speed_filter_order"])
+    one_mass = isinstance(machine, Axis) and machine.coordinates == "load" and not motor and "stiffness" not in drive
     return AxisModel(
-        drive=Drive(motor_mass=motor, load_mass=load, **drive),
+        drive=Drive(motor_mass=motor, load_mass=load, **{"stated_rigid": one_mass, **drive}),
         friction=_friction(machine, table, joint),
         controller=Controller(**controller) if controller else None,
         sensors=Sensors(**table.of_joint("sensors", joint)),

@@ -186,7 +186,7 @@ def _show_agreement(evaluated: Evaluated) -> None:
             typer.echo(f"{line} ms, n = {item.injected_count} and {item.real_count}")
         else:
             typer.echo(f"{line} ms, n = {item.injected_count}")
-    for assumed in dict.fromkeys(text for item in shown if item.is_range for text in item.assumed):
+    for assumed in dict.fromkeys(text for item in shown for text in item.assumed):
         typer.echo(f"bracket: {assumed}")
 
 

@@ -9,6 +9,7 @@ from enum import Enum
 
 import numpy as np
 
+from cdtool.evaluation.agreement import with_model_error
 from cdtool.evaluation.limits import ALL, LimitRule
 from cdtool.evaluation.results import ContactResult
 from cdtool.short_repr import short_repr
@@ -104,7 +105,8 @@ class Cell:
         error = self.two_standard_errors_ms
         if 0 < self.missed < self.assessable:
             return TellingReason.MISSED_IN_PART
-        if self.limit_ms is not None and low - error <= self.limit_ms <= high + error:
+        least, most = with_model_error(low, high)
+        if self.limit_ms is not None and least - error <= self.limit_ms <= most + error:
             return TellingReason.NEAR_LIMIT
         if not self.uncertainty_ms > 0.0:
             return None
@@ -115,7 +117,7 @@ class TellingReason(Enum):
     """Why a test at the rig would tell much about a cell; the first of these that applies, the most telling first."""
 
     MISSED_IN_PART = "some contacts missed, others detected"
-    NEAR_LIMIT = "a limit lies within the range and two standard errors"
+    NEAR_LIMIT = "a limit lies within the range, the error of the model and two standard errors"
     ASSUMPTIONS = "the latency depends on what is not known of the machine"
     SCATTER = "the latency differs from log to log"
 

@@ -117,3 +117,22 @@ stiffness = 8e4
     file = read(tmp_path, text)
     drive = axis_model(file.machine, file.model).drive  # type: ignore[arg-type]
     assert (drive.motor_mass, drive.load_mass) == (534.0, 620.0)
+
+
+LOAD_SIDE = '[machine]\ntype = "linear_axis"\ncoordinates = "load"\nload_mass = 95\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "is_known"),
+    [
+        (LOAD_SIDE, True),
+        (f"{LOAD_SIDE}[model.drive]\nrigid = true\n", True),
+        (f"{LOAD_SIDE}[model.drive]\nmotor_mass = 30\n", False),
+        (f"{LOAD_SIDE}[model.drive]\nmotor_mass = 30\nstiffness = 8e4\n", False),
+        (GATE, False),
+        (f"{GATE}[model.drive]\nrigid = true\n", True),
+    ],
+)
+def test_an_axis_of_one_mass_that_logs_its_load_is_rigid(tmp_path: Path, text: str, is_known: bool) -> None:
+    file = read(tmp_path, text)
+    assert bool(axis_model(file.machine, file.model).drive.stated_rigid) is is_known  # type: ignore[arg-type]

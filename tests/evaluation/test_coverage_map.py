@@ -119,11 +119,11 @@ def test_a_cell_whose_missed_contacts_are_all_of_it_is_certain() -> None:
 
 @pytest.mark.parametrize(
     ("limit", "reason"),
-    [(66.0, TellingReason.NEAR_LIMIT), (80.0, TellingReason.SCATTER), (40.0, TellingReason.SCATTER)],
+    [(75.0, TellingReason.NEAR_LIMIT), (80.0, TellingReason.SCATTER), (40.0, TellingReason.SCATTER)],
 )
-def test_a_limit_within_two_standard_errors_tells_much(limit: float, reason: TellingReason) -> None:
+def test_a_limit_within_two_errors_and_that_of_the_model_tells_much(limit: float, reason: TellingReason) -> None:
     names = dict.fromkeys("abc", (NEAR, "k"))
-    rows = [row("a", 55.0), row("b", 60.0), row("c", 65.0)]  # 60 +- 5.8 ms
+    rows = [row("a", 55.0), row("b", 60.0), row("c", 65.0)]  # 60 +- 5.8 ms, the model's error is 9 ms
     assert math.isclose(2.0 * 5.0 / math.sqrt(3.0), 5.77, abs_tol=0.01)
     rules = (LimitRule("gm.injected_x.p95_ms", "gm", "injected_x", "p95_ms", largest=limit - 0.5),)
     cell = made(rows, names, rules).cells["gm"][NEAR]

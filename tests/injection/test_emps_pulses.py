@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cdtool.axis_model.obstacle import Obstacle
 from cdtool.axis_model.parameters import AxisModel
+from cdtool.detectors.momentum import Momentum
+from cdtool.identification.axis_run import axis_run
+from cdtool.injection.assumption import ControllerReaction
+from cdtool.injection.axis_contact import axis_contact
+from cdtool.injection.injected_recording import injected_recording
+from cdtool.injection.refusal import refusal
 from cdtool.machine_file import MachineFile
 from tests.data_folder import data, needs_data
 from tests.project.pages import benchmark_script
@@ -119,3 +126,22 @@ def test_recordings_of_different_references_are_not_compared(
         savemat(tmp_path / name, {**values, "qg": values["qg"] + shift})
     with pytest.raises(SystemExit, match="different references"):
         script.compared(tmp_path, *identified)
+
+
+@needs_data(*RECORDINGS)
+@pytest.mark.parametrize("at", [5.0, 7.5])  # s, in either direction
+def test_an_obstacle_can_be_put_before_the_real_axis(
+    identified: tuple[MachineFile, AxisModel], axes: Any, at: float
+) -> None:
+    _, model = identified
+    assert refusal(Momentum.needs, model, ControllerReaction.KNOWN) is None
+    observer = Momentum(bandwidth=100.0)
+    delays = []
+    for stiffness in (5e3, 500e3):
+        contact = axis_contact(axis_run(axes.free), model, Obstacle.spring(stiffness), at, 0.3)
+        recording = injected_recording(axes.free, axes.machine, contact.changes, contact.force, (0,))
+        signal = observer.signal(axes.machine.referred_to_load(recording), axes.machine)
+        opposed = np.sign(contact.speed) * signal.values[:, 0]
+        assert np.max(opposed[(signal.time > at - 0.5) & (signal.time <= at)]) < 25.0
+        delays.append(1e3 * (signal.time[np.argmax((signal.time > at) & (opposed > 40.0))] - at))
+    assert 3.0 < delays[1] < 12.0 < delays[0] < 100.0

@@ -1,4 +1,4 @@
-"""Table of injected contacts: median latencies, their range where parameters are not known, and those of real ones."""
+"""Table of injected contacts: the range of the median latencies, and those of real contacts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def injected_table(evaluated: Evaluated) -> Table:
             lambda item: Cell(milliseconds(item.real_ms), key=key_of(item.real_ms)),
         ),
         (Column("real n", numeric=True), lambda item: Cell(str(item.real_count), key=item.real_count)),
-        (Column("assumed"), lambda item: Cell("; ".join(item.assumed)) if item.is_range else empty_cell()),
+        (Column("assumed"), lambda item: Cell("; ".join(item.assumed))),
     )
     return tabulate("injected", "Injected contacts", fields, agreements(evaluated))
 
@@ -35,9 +35,9 @@ def milliseconds(value: float) -> str:
 
 
 def median_range(item: Agreement) -> str:
-    """Return the median latency of injected contacts in ms, from the least to the greatest where they differ."""
-    low, high = map(milliseconds, item.injected_ms)
-    return f"{low} to {high}" if item.is_range and low != high else low
+    """Return the range of the true median latency [ms] that injected contacts show."""
+    low, high = map(milliseconds, item.range_ms)
+    return f"{low} to {high}" if low != high else low
 
 
 def _injected(item: Agreement) -> Cell:

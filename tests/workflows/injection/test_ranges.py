@@ -64,12 +64,16 @@ def test_the_range_contains_the_real_contacts_and_is_in_every_report(gate: Path)
     assert momentum.is_range
     assert momentum.injected_ms[0] < momentum.real_ms < momentum.injected_ms[1] + 2.0
     assert torque.injected_ms[0] < torque.real_ms < torque.injected_ms[1]
+    # Whatever is known of the machine, the parameters of its model have an error.
+    for item in found.values():
+        assert item.range_ms[0] <= 0.85 * item.injected_ms[0] and item.range_ms[1] >= 1.15 * item.injected_ms[1]
     # Acceleration alone sees the contact before the drive matters.
     assert not found["pure_inertia"].is_range
     line = next(line for line in done.out.splitlines() if line.startswith("momentum: injected_stiff "))
     assert " to " in line and "real (real)" in line
     assert "bracket: drive rigid beyond its observed wind-up" in done.out
     assert done.out.startswith("1 detection missed without a limit; "), "the verdict is the first sentence"
+    assert "bracket: parameters of a model from impact-free logs, 15 %" in done.out
     stated = json.loads((gate / "r.json").read_text(encoding="utf-8"))["provenance"]["injected"]
     assert {f"injected_stiff{end}" for end in ("", "_rigid", "_limited", "_rigid_limited")} <= set(stated)
     assert stated["injected_stiff_rigid"]["assumed"] == ["drive rigid beyond its observed wind-up"]
