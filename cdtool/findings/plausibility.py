@@ -22,7 +22,7 @@ _CONTRADICTIONS = {
     ),
     "other joint": ("follows the motion of {other} and not its own", "put the columns in the order of the joints"),
     "inertia": (
-        "the starts show an inertia of {value:.3g} {unit}, the machine file has {expected:.3g} {unit}",
+        "the starts show an inertia of {value:.4g} {unit}, the machine file has {expected:.4g} {unit}",
         "correct mass, inertia, transmission ratio or the scale of the torque",
     ),
     "sign": ("has the opposite sign of the derivative of the {other}", "reverse the sign of its scale"),
@@ -41,8 +41,8 @@ _CONTRADICTIONS = {
 }
 _AGREES = {
     "friction": "friction takes power: {value:.3g} {unit} at steady speed, {share:.0f} standard errors",
-    "inertia": "the starts show an inertia of {value:.3g} {unit}, the machine file has {expected:.3g} {unit}",
-    "size": "is {value:.3g} times the derivative of the {other}",
+    "inertia": "the starts show an inertia of {value:.4g} {unit}, the machine file has {expected:.4g} {unit}",
+    "size": "fits the derivative of the {other} (ratio {value:.3f})",
 }
 _WHY_NOT = {
     "rest": "the joint hardly moves",

@@ -51,7 +51,7 @@ class Windows:
 
 
 def windows_of(recordings: Sequence[Recording], channels: Sequence[str]) -> Windows | None:
-    """Return the windows of the logs that have all the channels; None if there are none."""
+    """Return the windows of the logs that have all the channels; None without one."""
     chosen = [[item[name] for name in channels] for item in recordings if all(name in item for name in channels)]
     parts = [part for series in chosen if (part := _windows(series)) is not None]
     if not parts:

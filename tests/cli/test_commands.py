@@ -46,7 +46,7 @@ def test_info_shows_columns_without_and_channels_with_a_machine_file(gate_folder
         "speed",
         "m/s",
         "1000",
-        "times the derivative of the speed",
+        "fits the derivative of the speed",
         "friction takes power",
         "poles at 0.2",
     ):

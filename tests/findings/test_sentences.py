@@ -611,7 +611,7 @@ SENTENCES: list[tuple[Fact, str]] = [
     ),
     (
         ChannelCheck("derivative", "agrees", "size", "", "speed", 0.998, other="position"),
-        "is 0.998 times the derivative of the position",
+        "fits the derivative of the position (ratio 0.998)",
     ),
     (
         ChannelCheck(
