@@ -141,7 +141,7 @@ def _mapped(draft: Draft, name: str, logged: Logged | None, reverse: Sequence[Ch
         checks.append("ground truth only: is it the load cell of the test?")
     if name == CONTACT_PRESSURE:
         checks.append("ground truth only: is it the pressure of the contact, not of oil or air?")
-    turned = {item.joint or draft.joints[0] for item in reverse}
+    turned = {joint for item in reverse for joint in ([item.joint] if item.joint else draft.joints)}
     signs = [-1.0 if joint in turned else 1.0 for joint in draft.joints]
     line = f"{name} = {_channel(draft, name, logged, signs)}"
     return _commented(line, _marked(why, "; ".join(check for check in checks if check)))

@@ -219,17 +219,16 @@ def _settled(log: Path, draft: Draft) -> Drafted:
                     raise
                 left_out[fault.channel] = ""
                 continue
-            wrong = [
-                item.fact
-                for item in findings
-                if isinstance(item.fact, ChannelCheck) and item.fact.answer == "contradicts"
-            ]
+            checks = [item.fact for item in findings if isinstance(item.fact, ChannelCheck)]
+            wrong = [item for item in checks if item.answer == "contradicts"]
+            agreed = {(item.channel, item.check) for item in checks if item.answer == "agrees"}
             turned = {item.channel for item in reverse}
             signs = [item for item in wrong if item.found in _REVERSED and item.channel not in turned]
             others = {item.channel: item.seen for item in wrong if item.found in _ANOTHER or item.channel in turned}
             if not signs and not others:
                 return Drafted("", text, mapped, tuple(left_out), findings, draft.unmapped)
-            reverse += signs
+            # The sign of a channel is usually that of all its joints, also of those whose motion does not show it.
+            reverse += [item if (item.channel, item.check) in agreed else replace(item, joint="") for item in signs]
             left_out |= others
 
 

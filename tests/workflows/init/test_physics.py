@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.streams import Stream
-from tests.workflows.init.drafts import drafted_columns, stroke
+from tests.data_folder import data, needs_data
+from tests.workflows.init.drafts import drafted, drafted_columns, stroke
 from tests.workflows.init.layouts.motion import arm_motion
 
 
@@ -206,3 +207,17 @@ def test_a_fine_position_or_a_logged_speed_needs_no_low_pass(tmp_path):
     fine = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": run.travel})
     logged = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": np.round(run.travel, 2), "vel [m/s]": run.speed})
     assert "speed_low_pass_hz" not in fine.channels and "speed_low_pass_hz" not in logged.channels
+
+
+@needs_data("ur3/id1.bag")
+def test_the_sign_of_a_real_robots_torque_is_reversed_with_the_reason(tmp_path):
+    """The log has the torque that the load exerts on the drive; the motion of two joints is too small to show it."""
+    draft = drafted(data("ur3/id1.bag"), tmp_path)
+    assert draft.channels["torque"]["scale"] == -1.0
+    assert "gives power to the machine where friction takes it" in draft.said("torque")
+
+
+@needs_data("ur_collisions/onsets.csv")
+def test_a_joint_angle_is_not_drafted_as_torque(tmp_path):
+    draft = drafted(data("ur_collisions/Drift00_NF_1.csv"), tmp_path, left_out=("torque",))
+    assert "left out: it is a function of position and speed alone" in " ".join(draft.text.split("\n# "))
