@@ -63,7 +63,7 @@ def drive_checks(recordings: Sequence[Recording], machine: Machine) -> Iterator[
 def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) -> Iterator[ChannelCheck]:
     speed, torque = windows.means["speed"], windows.means["torque"][:, j]
     position = windows.means.get("position", np.empty((len(torque), 0)))
-    known: BoolArray = np.isfinite(np.column_stack([speed, torque, position])).all(axis=1)
+    known: BoolArray = np.all(np.isfinite(np.column_stack([speed, torque, position])), axis=1)
     usual = np.quantile(np.abs(speed[known]), 0.99, axis=0) if known.any() else np.zeros(speed.shape[1])
     if not usual[j] > _HARDLY * usual.max():
         yield replace(check, found="rest")
