@@ -1,14 +1,17 @@
 """Identified parameters of the simulated gate against the true ones, set by set, and how often the errors cover.
 
 Every set is a gate on another track (the friction's waves with other phases) with 14 impact-free runs of its own.
+The robots are four kinds with random parameters, by dynamics that share nothing with cdtool (tests/synthetic).
 
-python benchmarks/identification.py [SETS]      # 50 sets with references and 50 without: 4 min
+python benchmarks/identification.py [SETS]              # 50 sets with references and 50 without: 4 min
+python benchmarks/identification.py robots [OF A KIND]  # 5 robots of each of four kinds: 10 min
 """
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from timing import main
@@ -18,7 +21,15 @@ sys.path.insert(0, str(ROOT))
 
 from cdtool.axis_model.parameters import Sensors  # noqa: E402
 from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass  # noqa: E402
+from tests.identification.robot_coverage import (  # noqa: E402
+    Value,
+    friction_values,
+    gain_values,
+    gain_values_with_centre,
+    table_of,
+)
 from tests.synthetic.gate_runs import GATE, free_runs, on_any_track  # noqa: E402
+from tests.synthetic.strange_robots import KINDS  # noqa: E402
 
 SETS, RUNS, FIRST_SEED = 50, 14, 1000
 SENSORS = Sensors(accelerometer_hz=GATE.accelerometer_frequency, accelerometer_damping=GATE.accelerometer_damping)
@@ -69,6 +80,26 @@ def two_mass(sets: int) -> bool:
     return met
 
 
+def robots(of_a_kind: int) -> bool:
+    """Whether each parameter that is printed with an error is within 1.96 errors for nine robots of ten."""
+    values: list[Value] = []
+    for kind in KINDS:
+        for seed in range(of_a_kind):
+            for values_of_robot in (friction_values, gain_values, gain_values_with_centre):
+                with TemporaryDirectory() as folder:
+                    values += values_of_robot(kind, seed, Path(folder))
+    met = True
+    for key, count, refused, covered, largest in table_of(values):
+        met &= not covered < 0.9
+        print(
+            f"{key:18s} {count:4d} values, refused {100 * refused:3.0f} %, of the others within 1.96 errors "
+            f"{100 * covered:3.0f} %, at most {largest:.1f} errors off"
+        )
+    return met
+
+
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["robots"]:
+        main("robots", lambda: robots(int(sys.argv[2]) if len(sys.argv) > 2 else 5))
     count = int(sys.argv[1]) if len(sys.argv) > 1 else SETS
     main("identified and true parameters", lambda: two_mass(count))

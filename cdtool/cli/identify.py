@@ -66,7 +66,7 @@ def identify(
     ] = None,
     payload_centre: Annotated[
         str | None,
-        typer.Option("--payload-centre", help="Its centre of mass in the link's frame [m]. Default: 0,0,0."),
+        typer.Option("--payload-centre", help="Its centre of mass in the link's frame [m]. Default: not known."),
     ] = None,
     contacts: Annotated[
         list[str] | None,
@@ -144,10 +144,10 @@ def _contact_logs(contacts: Sequence[str], presses: Sequence[str], lever_arm: fl
     return ContactLogs(tuple(contacts), tuple(presses), lever_arm)
 
 
-def _centre(text: str | None) -> tuple[float, float, float]:
-    """Return the numbers of --payload-centre; raises UsageError."""
+def _centre(text: str | None) -> tuple[float, float, float] | None:
+    """Return the numbers of --payload-centre, None without it; raises UsageError."""
     if text is None:
-        return (0.0, 0.0, 0.0)
+        return None
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
@@ -315,7 +315,7 @@ def _show_robot(
 
 
 def _show_robot_joint(joint: JointIdentification, shown: JointEvidence) -> None:
-    from cdtool.report.identification_words import words_of_joint_plan, words_of_load_friction
+    from cdtool.report.identification_words import words_of_joint_plan
 
     name, robot = plain(joint.joint), shown.robot
     for item in joint.not_identifiable:
@@ -325,9 +325,6 @@ def _show_robot_joint(joint: JointIdentification, shown: JointEvidence) -> None:
         typer.echo(f"{name}: plan: {words}: for {', '.join(plan.keys)}")
     for reason in joint.refused.values():
         typer.echo(f"{name}: {plain(reason)}")
-    if joint.robot is not None and joint.robot.load_friction is not None and robot is not None:
-        words = words_of_load_friction(joint.robot.load_friction, joint.robot.load_error, robot.units[0])
-        typer.echo(f"{name}: {words}")
 
 
 def _show_whole_robot(done: IdentifiedMachine, robot: RobotIdentification, evidence: Sequence[JointEvidence]) -> None:
@@ -335,7 +332,8 @@ def _show_whole_robot(done: IdentifiedMachine, robot: RobotIdentification, evide
     from cdtool.workflows.identification.identification_outputs import robot_plan_of
 
     travel = [item.robot.units[1] if item.robot else "rad" for item in evidence]
-    for line in words_of_robot(robot, robot_plan_of(done, evidence), [joint.joint for joint in done.joints], travel):
+    names = [joint.joint for joint in done.joints]
+    for line in words_of_robot(robot, robot_plan_of(done, evidence), names, travel, len(done.runs)):
         typer.echo(plain(line))
 
 
@@ -343,7 +341,7 @@ def _show_changes(done: IdentifiedMachine) -> None:
     rows = [("key", "old", "new", "standard error", "unit")]
     for change in done.changes:
         old = "-" if change.old[0] is None else _numbers([item or 0.0 for item in change.old])
-        errors = _numbers([float(f"{item:.2g}") for item in change.standard_errors if item == item]) or "-"
+        errors = _numbers([float(f"{item:.2g}") for item in change.standard_errors])
         rows.append((f"{change.section}.{change.key}", old, _numbers(change.values), errors, change.unit))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
@@ -351,7 +349,7 @@ def _show_changes(done: IdentifiedMachine) -> None:
 
 
 def _numbers(values: Any) -> str:
-    texts = [digits(float(f"{value:.6g}")) for value in values]
+    texts = [digits(float(f"{value:.6g}")) if math.isfinite(value) else "-" for value in values]
     return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
 
 

@@ -15,10 +15,9 @@ from cdtool.identification.robot_regressor import Column, Regressor, stacked_tor
 from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 
-# A column whose rest, after the projection on the others, is below this share of it is dependent on them.
+# A column whose rest, after the projection on the others, is below this share of it is dependent on them; a factor
+# below it is rounding.
 _DEPENDENT = 1e-9
-# A combination's factor below this is rounding.
-_NO_FACTOR = 1e-9
 _FEWEST_STATES = 200
 # The rounding of columns that are equal, or zero, relative to the largest.
 _ROUNDING, _ZERO = 1e-8, 1e-10
@@ -65,7 +64,7 @@ class Grouping:
         parts = [columns[own].name]
         for place, factor in zip(self.columns, self.combination[row].tolist(), strict=True):
             if place != own and factor:
-                size = "" if abs(abs(factor) - 1.0) < _NO_FACTOR else f"{abs(factor):.6g} "
+                size = "" if abs(abs(factor) - 1.0) < _DEPENDENT else f"{abs(factor):.6g} "
                 parts.append(f"{'+' if factor > 0.0 else '-'} {size}{columns[place].name}")
         return " ".join(parts)
 
@@ -114,7 +113,7 @@ def group_columns(regressor: Regressor, columns: tuple[int, ...], limits: Range 
     factors = factors / norms[kept][:, np.newaxis] * norms[rest]
     combination = np.zeros((rank, len(columns)))
     combination[np.arange(rank), kept] = 1.0
-    combination[:, rest] = np.where(np.abs(factors) > _NO_FACTOR, factors, 0.0)
+    combination[:, rest] = np.where(np.abs(factors) > _DEPENDENT, factors, 0.0)
     sequence = np.argsort(kept)
     absent = sorted(set(range(len(columns))) - set(present.tolist()))
     return Grouping(

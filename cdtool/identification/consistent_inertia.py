@@ -32,7 +32,7 @@ _MARGIN = 1e-7
 _FLAT = 1e-12
 # How much the distance to the machine's parameters counts beside the residual.
 _NEARNESS = 1e-8
-_NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.LOAD)
+_NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB)
 # Relative to the torques: a rise of the residual below it is the solver's.
 _ROUNDING = 1e-7
 _TOLERANCES = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}

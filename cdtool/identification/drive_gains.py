@@ -6,22 +6,22 @@ masses and twice the factor look alike. A known payload does not (Gautier, Briot
     i_j = (1 / k_j) [Y_j beta_j + payload torque_j]
 
 with an unknown beta_j of the unloaded robot and its friction. Each joint is fitted on its own, with the noisy current
-on the left: as a regressor, its noise would make the constant too small. Friction that grows with the load of a joint
-is mistaken for current of the payload.
+on the left: as a regressor, its noise would make the constant too small. The payload's inertia is free, and so is its
+centre of mass unless it is given. So is the friction with the payload: it may grow with the load, and from day to day.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdtool.errors import ConfigurationError, UsageError, nearest
-from cdtool.identification.consistent_inertia import body_of, pseudo_inertia
 from cdtool.identification.estimate import Estimate, IdentificationError, Identified, Method, Missing, NotIdentifiable
 from cdtool.identification.robot_dynamics import (
+    HALF_WIDTH,
     Equations,
     Window,
     jackknife_blocks,
@@ -32,44 +32,39 @@ from cdtool.identification.robot_dynamics import (
 from cdtool.identification.robot_regressor import Group, Regressor, TreeRegressor, regressor_of
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.coupled import CoupledMachine
-from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.planar_arm import PlanarArm
 from cdtool.recording import BoolArray, FloatArray
 from cdtool.short_repr import short_repr
 
 # Directions of the unloaded robot's parameters that are excited less than this, relative to the most, are not fitted.
 _UNSEEN = 1e-7
-# The payload's torque must have a part of at least this share that the unloaded robot cannot explain.
+# The payload's torque must have a part of at least this share that nothing else explains.
 _INDEPENDENT = 0.05
+# A joint that the payload loads by less than this share of the most loaded one is not loaded: that is rounding.
+_LOADED = 1e-6
+# A centre of mass from a drawing, or found by balancing, is this uncertain along each axis [m].
+_CENTRE_ERROR = 5e-3
 # A constant with a larger relative standard error says nothing.
 _WORST_ERROR = 0.2
-_FEWEST_EQUATIONS = 10
+# Of these a joint has its own with the payload.
+_FRICTION = (Group.VISCOUS, Group.COULOMB)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Payload:
-    """A known body fixed to a link: `mass` [kg], `centre` of mass (3) in the link's frame [m].
+    """A known body fixed to a link: `mass` [kg], `centre` of mass (3) in the link's frame [m], None if not known.
 
-    `inertia` (6: xx, xy, xz, yy, yz, zz) about the centre, axes of the link [kg m2]. A planar arm's links are "arm" and
-    "forearm", x along the link. Raises ConfigurationError for a mass that is not above 0.
+    A planar arm's links are "arm" and "forearm", x along the link. Raises ConfigurationError for a mass that is not
+    above 0.
     """
 
     link: str
     mass: float
-    centre: tuple[float, float, float]
-    inertia: tuple[float, float, float, float, float, float] = (0.0,) * 6
+    centre: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.mass < math.inf:
             raise ConfigurationError(f"payload: mass is {self.mass} kg", "weigh it; it must be above 0")
-
-    def parameters(self) -> FloatArray:
-        """Return its ten parameters about the origin of the link's frame."""
-        xx, xy, xz, yy, yz, zz = self.inertia
-        shift = np.eye(4)
-        shift[:3, 3] = self.centre
-        at_centre = pseudo_inertia(np.array([self.mass, 0.0, 0.0, 0.0, xx, xy, yy, xz, yz, zz]))
-        return body_of(shift @ at_centre @ shift.T)
 
 
 def drive_gains(
@@ -83,8 +78,8 @@ def drive_gains(
 
     `unloaded`, `loaded`: contact-free runs without and with the payload. `scale`: the present scale of the torque
     channel, one per joint; without it the estimates are factors of the logged torque. NotIdentifiable for a joint that
-    the payload does not load, or not independently of its other torques. Raises IdentificationError without runs of
-    both kinds, ConfigurationError for an unknown link.
+    the payload does not load, or not independently of its other torques, as with an unknown centre of mass. Raises
+    IdentificationError without runs of both kinds, ConfigurationError for an unknown link.
     """
     if not unloaded or not loaded:
         raise IdentificationError("torque constants need runs with and without the payload", "give both")
@@ -92,85 +87,113 @@ def drive_gains(
     if present.shape != (len(machine.joints),):
         raise UsageError(f"{len(present)} values of scale", f"the machine has {len(machine.joints)} joints")
     regressor = regressor_of(machine)
-    weights = _payload_columns(machine, regressor, payload)
-    parts = [_run_part(run, index, regressor, None) for index, run in enumerate(unloaded)]
-    parts += [_run_part(run, index, regressor, weights) for index, run in enumerate(loaded, len(unloaded))]
-    estimates: list[Estimate] = []
-    missing: list[NotIdentifiable] = []
-    for joint in range(len(machine.joints)):
-        found = _of_joint(joint, parts, float(present[joint]), "N m/A" if scale is not None else "1")
-        if isinstance(found, Estimate):
-            estimates.append(found)
-        else:
-            missing.append(found)
-    return Identified(tuple(estimates), tuple(missing))
+    columns = _payload_columns(machine, regressor, payload)
+    parts = [_part(run, index, regressor, index >= len(unloaded)) for index, run in enumerate((*unloaded, *loaded))]
+    joints = [_Joint.of(joint, parts, regressor, columns) for joint in range(len(machine.joints))]
+    most = max(float(np.linalg.norm(joint.load)) for joint in joints)
+    unit = "N m/A" if scale is not None else "1"
+    found = [
+        item.constant(float(value), unit, most, has_centre=payload.centre is not None)
+        for item, value in zip(joints, present, strict=True)
+    ]
+    estimates = tuple(item for item in found if isinstance(item, Estimate))
+    return Identified(estimates, tuple(item for item in found if isinstance(item, NotIdentifiable)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """The windows of a run: `rows` (K, J, P), `torques`, `load` of the payload, `moves` (K, J), `times` (K,)."""
+class _PayloadColumns:
+    """The regressor's columns, as weights (k, P), of a payload's `mass` (1) where it is said to be.
 
-    index: int
-    rows: FloatArray
-    torques: FloatArray
-    load: FloatArray
-    moves: BoolArray
-    times: FloatArray
+    `shifts`: of a mass that is off by one standard error of its centre; `free`: of what of the payload is not known.
+    """
+
+    mass: FloatArray
+    shifts: FloatArray
+    free: FloatArray
 
     __repr__ = short_repr
 
 
-def _run_part(run: RobotRun, index: int, regressor: Regressor, weights: FloatArray | None) -> _Part:
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The windows of a run: `rows` (K, J, P), `torques`, `moves` (K, J), `times` and the run's `index` (K,)."""
+
+    rows: FloatArray
+    torques: FloatArray
+    moves: BoolArray
+    times: FloatArray
+    index: FloatArray
+    is_loaded: bool
+
+    __repr__ = short_repr
+
+
+def _part(run: RobotRun, index: int, regressor: Regressor, is_loaded: bool) -> _Part:
     if run.joint_count != len(regressor.machine.joints):
         raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(regressor.machine.joints)}")
-    window = Window.of(0.1, run.period)
-    chosen = [i for i, column in enumerate(regressor.columns) if column.group is not Group.LOAD]
-    rows = np.stack([window_of_column(run, regressor, window, i) for i in chosen], axis=2)
-    torques = window.average(run.torque)
-    load = np.zeros_like(torques)
-    if weights is not None:
-        for column in np.flatnonzero(weights).tolist():
-            load += weights[column] * window_of_column(run, regressor, window, column)
+    window = Window.of(HALF_WIDTH, run.period)
+    columns = [window_of_column(run, regressor, window, column) for column in range(len(regressor.columns))]
+    rows, torques = np.stack(columns, axis=2), window.average(run.torque)
     times = run.start + run.period * (np.arange(len(torques)) * float(window.step) + len(window.weights) // 2)
-    moves = ~resting_windows(run, regressor.machine, window)
-    return _Part(index, rows, torques, load, moves, np.asarray(times, dtype=np.float64))
+    known = np.isfinite(torques) & np.isfinite(rows).all(axis=2)
+    moves = known & ~resting_windows(run, regressor.machine, window)
+    return _Part(rows, torques, moves, np.asarray(times, np.float64), np.full(len(times), float(index)), is_loaded)
 
 
-def _of_joint(joint: int, parts: Sequence[_Part], present: float, unit: str) -> Estimate | NotIdentifiable:
-    equations = _equations(joint, parts)
-    rows, load = equations.rows[:, :-1], equations.rows[:, -1]
-    if len(load) < _FEWEST_EQUATIONS or not load.any():
-        return _refused(joint, Missing.PAYLOAD, {"equations": float(len(load))})
-    basis = _basis(rows)
-    rest = load - basis @ (basis.T @ load)
-    share = float(np.linalg.norm(rest) / np.linalg.norm(load))
-    if share < _INDEPENDENT:
-        return _refused(joint, Missing.OTHER_MOTION, {"independent_share": share})
-    # With the part of the load that nothing else explains, 1 / k does not depend on the basis.
-    inverse = float(rest @ equations.torques / (rest @ rest))
-    values = np.append(basis.T @ (equations.torques - inverse * load), inverse)
-    whole = Equations(
-        np.column_stack((basis, load)), equations.torques, equations.joints, equations.times, equations.runs
-    )
-    blocks = jackknife_blocks(whole, whole.torques - whole.rows @ values)
-    error = math.sqrt(float(jackknife_covariance(whole, values, blocks)[-1, -1]))
-    if not error < _WORST_ERROR * inverse:
-        return _refused(joint, Missing.PAYLOAD, {"inverse": inverse, "standard_error_of_inverse": error})
-    value = present / inverse
-    relative = error / inverse
-    return Estimate("channels.torque", "scale", value, abs(value) * relative, unit, Method.LOADED_RUNS, joint)
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """A joint's windows: what they contain beside the payload, its `load` (m,), that of its `shifts` (m, k)."""
 
+    joint: int
+    rows: FloatArray
+    load: FloatArray
+    shifts: FloatArray
+    equations: Equations
 
-def _equations(joint: int, parts: Sequence[_Part]) -> Equations:
-    pieces = []
-    for part in parts:
-        rows = np.column_stack((part.rows[:, joint], part.load[:, joint]))
-        torques = part.torques[:, joint]
-        valid = part.moves[:, joint] & np.isfinite(torques) & np.isfinite(rows).all(axis=1)
-        count = int(valid.sum())
-        one = np.ones(count)
-        pieces.append((rows[valid], torques[valid], joint * one, part.times[valid], part.index * one))
-    return Equations(*(np.concatenate(item) for item in zip(*pieces, strict=True)))
+    __repr__ = short_repr
+
+    @classmethod
+    def of(cls, joint: int, parts: Sequence[_Part], regressor: Regressor, columns: _PayloadColumns) -> _Joint:
+        # Friction of its own for the runs with the payload.
+        own = [column.joint == joint and column.group in _FRICTION for column in regressor.columns]
+        free = np.concatenate((columns.free, np.eye(len(own))[own]))
+        rows, torques, times, runs = (
+            np.concatenate([getattr(part, name)[part.moves[:, joint]] for part in parts])
+            for name in ("rows", "torques", "times", "index")
+        )
+        plain = rows[:, joint]
+        loaded = plain * np.isin(runs, [part.index[0] for part in parts if part.is_loaded])[:, np.newaxis]
+        equations = Equations(plain, torques[:, joint], np.full(len(times), float(joint)), times, runs, 0.0 * times)
+        everything = np.column_stack((plain, loaded @ free.T))
+        return cls(joint, everything, loaded @ columns.mass, loaded @ columns.shifts.T, equations)
+
+    def constant(self, present: float, unit: str, most: float, *, has_centre: bool) -> Estimate | NotIdentifiable:
+        """Return the torque constant; `most`: the norm of the load of the joint with the largest."""
+        load, torques = self.load, self.equations.torques
+        size = float(np.linalg.norm(load))
+        if size <= _LOADED * most:
+            return self._refused(Missing.PAYLOAD, {"equations": float(len(load))})
+        basis = _basis(self.rows)
+        rest = load - basis @ (basis.T @ load)
+        share = float(np.linalg.norm(rest)) / size
+        if share < _INDEPENDENT:
+            missing = Missing.OTHER_MOTION if has_centre else Missing.PAYLOAD_CENTRE
+            return self._refused(missing, {"independent_share": share})
+        # With the part of the load that nothing else explains, 1 / k does not depend on the basis.
+        inverse = float(rest @ torques / (rest @ rest))
+        values = np.append(basis.T @ (torques - inverse * load), inverse)
+        whole = replace(self.equations, rows=np.column_stack((basis, load)))
+        blocks = jackknife_blocks(whole, torques - whole.rows @ values)
+        spread = math.sqrt(float(jackknife_covariance(whole, values, blocks)[-1, -1]))
+        error = math.hypot(spread, inverse * float(np.linalg.norm(rest @ self.shifts / (rest @ rest))))
+        if not error < _WORST_ERROR * inverse:
+            return self._refused(Missing.PAYLOAD, {"inverse": inverse, "standard_error_of_inverse": error})
+        value = present / inverse
+        relative = error / inverse
+        return Estimate("channels.torque", "scale", value, abs(value) * relative, unit, Method.LOADED_RUNS, self.joint)
+
+    def _refused(self, missing: Missing, numbers: dict[str, float]) -> NotIdentifiable:
+        return NotIdentifiable("channels.torque", "scale", (missing,), numbers, self.joint)
 
 
 def _basis(rows: FloatArray) -> FloatArray:
@@ -185,40 +208,31 @@ def _refused(joint: int, missing: Missing, numbers: dict[str, float]) -> NotIden
     return NotIdentifiable("channels.torque", "scale", (missing,), numbers, joint)
 
 
-def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Payload) -> FloatArray:
-    """Return the payload as weights of the regressor's columns (P,)."""
-    weights = np.zeros(len(regressor.columns))
+def _payload_columns(machine: CoupledMachine, regressor: Regressor, payload: Payload) -> _PayloadColumns:
+    """Return what a payload adds to the regressor: its mass, first moments and inertias are columns of its link."""
+    unit = np.eye(len(regressor.columns))
     if isinstance(regressor, TreeRegressor):
-        body, parameters = _in_tree(regressor.tree, payload)
-        weights[10 * body : 10 * (body + 1)] = parameters
-        return weights
-    assert isinstance(machine, PlanarArm)
-    if payload.link not in machine.joints:
-        raise ConfigurationError(f"payload: unknown link '{payload.link}'", nearest(payload.link, machine.joints))
-    if payload.centre[2]:
-        raise ConfigurationError("payload: its centre is off the link's axis", "give z = 0")
-    own, mass, along, gravity = (
-        machine.joints.index(payload.link),
-        payload.mass,
-        payload.centre[0],
-        machine.gravity_acceleration,
-    )
-    weights[own] = mass * along**2 + payload.inertia[3]
-    weights[3 + own] = mass * along * gravity
-    if own:
-        weights[0] = mass * machine.link_length**2
-        weights[2] = mass * machine.link_length * along
-        weights[3] = mass * machine.link_length * gravity
-    return weights
-
-
-def _in_tree(tree: KinematicTree, payload: Payload) -> tuple[int, FloatArray]:
-    """Return the index of the body that carries the payload, and its parameters in the joint's frame."""
-    link = next((item for item in tree.links if item.name == payload.link), None)
-    if link is None or link.joint < 0:
-        moving = [item.name for item in tree.links if item.joint >= 0]
-        raise ConfigurationError(f"payload: no moving link '{payload.link}'", nearest(payload.link, moving))
-    placement = np.eye(4)
-    placement[:3, :3] = np.reshape(link.rotation, (3, 3))
-    placement[:3, 3] = link.translation
-    return link.joint, body_of(placement @ pseudo_inertia(payload.parameters()) @ placement.T)
+        link = next((item for item in regressor.tree.links if item.name == payload.link), None)
+        if link is None or link.joint < 0:
+            moving = [item.name for item in regressor.tree.links if item.joint >= 0]
+            raise ConfigurationError(f"payload: no moving link '{payload.link}'", nearest(payload.link, moving))
+        own = unit[10 * link.joint : 10 * (link.joint + 1)]
+        mass, moments, inertias = own[0], own[1:4], own[4:]
+        turn, shift = np.reshape(link.rotation, (3, 3)), np.array(link.translation)
+        centre = None if payload.centre is None else turn @ np.array(payload.centre) + shift
+    else:
+        assert isinstance(machine, PlanarArm)
+        if payload.link not in machine.joints:
+            raise ConfigurationError(f"payload: unknown link '{payload.link}'", nearest(payload.link, machine.joints))
+        if payload.centre is not None and any(payload.centre[1:]):
+            raise ConfigurationError("payload: its centre is off the link's axis", "give y = z = 0")
+        place, length, gravity = machine.joints.index(payload.link), machine.link_length, machine.gravity_acceleration
+        # On the forearm its mass moves with the end of the arm, and couples both links.
+        mass = place * (length**2 * unit[0] + length * gravity * unit[3])
+        moments = (place * length * unit[2] + gravity * unit[3 + place])[np.newaxis]
+        inertias = unit[place : place + 1]
+        centre = None if payload.centre is None else np.array(payload.centre[:1])
+    if centre is None:
+        return _PayloadColumns(payload.mass * mass, np.zeros((0, len(unit))), np.concatenate((moments, inertias)))
+    shifts = payload.mass * _CENTRE_ERROR * moments
+    return _PayloadColumns(payload.mass * (mass + centre @ moments), shifts, inertias)

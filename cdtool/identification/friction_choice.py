@@ -3,18 +3,19 @@
 The inertias of the links are taken as known, so that no joint's friction depends on that of another one. Each form of
 friction is fitted without a run, or without a fifth of the only one, and predicts it. New friction replaces the present
 one of a joint only where it predicts better by more than one standard error, over blocks of the log, of the difference
-(the one-standard-error rule of Breiman and others, 1984); a slope or drive inertia is added for more than two.
+(the one-standard-error rule of Breiman and others, 1984); a drive inertia is added for more than two.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 
-from cdtool.identification.estimate import Estimate, Identified, Method, Missing, NotIdentifiable
+from cdtool.identification.estimate import Estimate, Identified, Missing, NotIdentifiable
 from cdtool.identification.robot_dynamics import RobotFit, RobotParameters, identify_robot
 from cdtool.identification.robot_regressor import Group
 from cdtool.identification.robot_run import RobotRun
@@ -22,8 +23,6 @@ from cdtool.machines.coupled import CoupledMachine
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recording import FloatArray
 
-# Slopes of dry friction that are tried [s/rad, s/m].
-_SLOPES = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 # With a larger relative standard error viscous friction predicts faster motion wrong, however well that of the logs.
 _WORST_VISCOUS = 0.5
 _FRICTION = (Group.VISCOUS.value, Group.COULOMB.value)
@@ -37,7 +36,6 @@ class FrictionForm(Enum):
     FRICTION_ALONE = "viscous and Coulomb friction"
     FRICTION = "viscous and Coulomb friction, constant force"
     DRIVE_INERTIA = "viscous and Coulomb friction, constant force, drive inertia"
-    SLOPE = "viscous and Coulomb friction, its slope, constant force"
     WITH_INERTIAS = "viscous and Coulomb friction, constant force, with the inertias of all links"
 
 
@@ -48,8 +46,7 @@ class JointFriction:
     `identified`: the estimates of the `form`, and what the runs cannot show. `together`: values that are not
     identifiable alone. `refitted`: estimates of the full friction, also where they do not replace the present ones.
     `errors`: RMS [N m, N] of the torque that each form does not explain in parts left out of its fit; NaN: no motion.
-    `torque`: RMS of the joint's torque in motion [N m, N]. `load_friction`: dry friction per torque of gravity [-],
-    where it explains clearly more, and with it `load_error` (RMS); no machine file has such a friction.
+    `torque`: RMS of the joint's torque in motion [N m, N].
     """
 
     joint: int
@@ -59,8 +56,6 @@ class JointFriction:
     refitted: tuple[Estimate, ...]
     errors: Mapping[FrictionForm, float]
     torque: float
-    load_friction: Estimate | None = None
-    load_error: float = float("nan")
 
     @property
     def explained_share(self) -> float:
@@ -82,12 +77,11 @@ def choose_friction(runs: Sequence[RobotRun], machine: CoupledMachine, half_widt
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A form, its fit, and the keys that it must have identified; `slope`: of dry friction, 0 for the machine's own."""
+    """A form, its fit, and the keys that it must have identified."""
 
     form: FrictionForm
     fit: RobotFit
     keys: tuple[str, ...]
-    slope: float = 0.0
 
     def estimates(self, joint: int) -> tuple[Estimate, ...]:
         """Return the estimates of a joint; empty if one is not identifiable."""
@@ -123,16 +117,6 @@ class _Choice:
         self.drive = candidate(
             FrictionForm.DRIVE_INERTIA, (Group.DRIVE_INERTIA.value, *_FRICTION, constant), drive_inertia=True
         )
-        self.load = candidate(FrictionForm.FRICTION, (*_FRICTION, constant, Group.LOAD.value), load_friction=True)
-        self.slopes = [
-            _Candidate(
-                FrictionForm.SLOPE,
-                identify_robot(runs, with_slope(machine, slope), what),
-                (*_FRICTION, constant),
-                slope,
-            )
-            for slope in (_SLOPES if any(machine.coulomb_slope) else ())
-        ]
 
     def of_joint(self, joint: int) -> JointFriction:
         """Return the friction of a joint."""
@@ -140,8 +124,7 @@ class _Choice:
         errors = {item.form: item.error(joint) for item in self._candidates(joint)}
         errors[FrictionForm.PREVIOUS] = float(self.friction.fit.torque_error.previous[joint])
         missing = tuple(item for item in self.friction.fit.identified.not_identifiable if item.joint == joint)
-        load, load_error = self._load_friction(joint)
-        known = _known_values(chosen, joint, self._machine)
+        known = chosen.estimates(joint) if chosen else ()
         one_way = self._is_one_way(joint)
         alone = tuple(item for item in known if not one_way and not _is_vague(item))
         missing += tuple(_as_missing(item) for item in known if not one_way and _is_vague(item))
@@ -149,12 +132,10 @@ class _Choice:
             joint=joint,
             form=FrictionForm.PREVIOUS if chosen is None else chosen.form,
             identified=Identified(alone, missing),
-            together=tuple(item for item in known if item not in alone),
+            together=tuple(replace(item, standard_error=math.nan) for item in known if item not in alone),
             refitted=self.friction.estimates(joint),
             errors=errors,
             torque=self._moving_torque(joint),
-            load_friction=load,
-            load_error=load_error,
         )
 
     def _moving_torque(self, joint: int) -> float:
@@ -164,23 +145,16 @@ class _Choice:
         return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
     def _candidates(self, joint: int) -> Iterator[_Candidate]:
-        """Yield the best of each form of which a joint's parameters are all identifiable."""
+        """Yield each form of which a joint's parameters are all identifiable."""
         for item in (self.friction, self.friction_alone, self.offset, self.drive):
-            if item.estimates(joint) and self._fits(item, joint):
+            if item.estimates(joint) and (item is not self.drive or self._has_unknown_drive(joint)):
                 yield item
-        slopes = [item for item in self.slopes if item.estimates(joint) and self._fits(item, joint)]
-        if slopes:
-            yield min(slopes, key=lambda item: item.error(joint))
 
-    def _fits(self, item: _Candidate, joint: int) -> bool:
-        """Return whether the machine file can have a form of friction."""
-        if item.form is FrictionForm.DRIVE_INERTIA:
-            # A data sheet knows it better. With load coordinates, only a robot from a URDF has a key for it.
-            has_key = self._machine.coordinates == "motor" or isinstance(self._machine, UrdfRobot)
-            return has_key and not self._machine.motor_inertia[joint]
-        if item.form is FrictionForm.SLOPE:
-            return bool(self._machine.coulomb_slope[joint])
-        return True
+    def _has_unknown_drive(self, joint: int) -> bool:
+        """Return whether the machine file can have a drive inertia and has none: a data sheet knows it better."""
+        # With load coordinates, only a robot from a URDF has a key for it.
+        has_key = self._machine.coordinates == "motor" or isinstance(self._machine, UrdfRobot)
+        return has_key and not self._machine.motor_inertia[joint]
 
     def _chosen(self, joint: int) -> _Candidate | None:
         """Return the form that replaces the present friction; None: it stays."""
@@ -189,42 +163,16 @@ class _Choice:
         chosen = min(simple, key=lambda item: item.error(joint)) if simple else forms.get(FrictionForm.OFFSET)
         if chosen is None:
             return None
-        for form in (FrictionForm.SLOPE, FrictionForm.DRIVE_INERTIA):
-            larger = forms.get(form)
-            if larger is not None and larger.fit.left_out.is_better(joint, chosen.residual(joint), 2.0):
-                chosen = larger
-        # Not that of the form's own fit, whose machine may have another slope.
-        previous = self.friction.fit.left_out.of_joint(joint, is_previous=True)
+        drive = forms.get(FrictionForm.DRIVE_INERTIA)
+        if drive is not None and drive.fit.left_out.is_better(joint, chosen.residual(joint), 2.0):
+            chosen = drive
+        previous = chosen.fit.left_out.of_joint(joint, is_previous=True)
         return chosen if chosen.fit.left_out.is_better(joint, previous, 1.0) else None
 
     def _is_one_way(self, joint: int) -> bool:
         """Return whether a joint moves in one direction only, so that its constant force is not identifiable."""
         refused = [item for item in self.friction.fit.identified.not_identifiable if item.joint == joint]
         return any(Missing.REVERSALS in item.missing for item in refused)
-
-    def _load_friction(self, joint: int) -> tuple[Estimate | None, float]:
-        """Return the load friction of a joint if it explains clearly more than friction without it, and its error."""
-        estimates = {item.key: item for item in self.load.estimates(joint)}
-        found = estimates.get(Group.LOAD.value)
-        if found is None or not self.load.fit.left_out.is_better(joint, self.friction.residual(joint), 2.0):
-            return None, float("nan")
-        return found, self.load.error(joint)
-
-
-def with_slope(machine: CoupledMachine, slope: float) -> CoupledMachine:
-    """Return the machine with a slope of dry friction at every joint that has one [s/rad, s/m]."""
-    return replace(machine, coulomb_slope=tuple(slope if own else 0.0 for own in machine.coulomb_slope))
-
-
-def _known_values(chosen: _Candidate | None, joint: int, machine: CoupledMachine) -> tuple[Estimate, ...]:
-    if chosen is None:
-        return ()
-    found = chosen.estimates(joint)
-    if chosen.slope and chosen.slope != machine.coulomb_slope[joint]:
-        unit = found[0].unit.replace("N m s/rad", "s/rad").replace("N s/m", "s/m")
-        slope = Estimate("machine", "coulomb_slope", chosen.slope, float("nan"), unit, Method.LEAST_SQUARES, joint)
-        return (*found, slope)
-    return found
 
 
 def _is_vague(estimate: Estimate) -> bool:

@@ -47,11 +47,10 @@ from cdtool.short_repr import short_repr
 
 Index = npt.NDArray[np.int64]
 
+# A window reaches this far to either side of its centre [s]: it passes the motion of robots, up to about 5 Hz.
+HALF_WIDTH = 0.1
 # A window has at least this many samples on either side of its centre: else its sums are no integrals.
 _FEWEST_BESIDE = 10
-# At rest dry friction takes any value: an equation of a joint that rests for more than this share of a window is left
-# out. A joint rests below its stick speed.
-_REST_SHARE = 0.1
 # Directions of the parameters that are excited less than this, relative to the most, keep the machine's values.
 _UNSEEN = 1e-9
 # A column of a joint, or an inertial one, that is independent of the others to less than this share of what it is in
@@ -64,6 +63,10 @@ _UNCERTAIN_TORQUE, _UNCERTAIN_TORQUE_OF_JOINT = 0.1, 0.5
 _WORST_CONDITION = 100.0
 # A block has at least this length [s] and this many correlation times of the residual; fewer blocks are no sample.
 _SHORTEST_BLOCK, _CORRELATION_TIMES, _FEWEST_BLOCKS = 0.5, 4.0, 8
+# From this number on, the spread between runs is the error.
+FEWEST_RUNS = 3
+# The masses of a URDF are those of drawings, without cables and screws: they are wrong by about this share.
+_WRONG_LINKS = 0.02
 _FOLDS = 5
 _WEIGHT_PASSES = 3
 _BEST_SENSOR = 1e-3
@@ -76,26 +79,23 @@ _UNITS = {
     Group.VISCOUS: ("N m s/rad", "N s/m"),
     Group.COULOMB: ("N m", "N"),
     Group.CONSTANT: ("N m", "N"),
-    Group.LOAD: ("1", "1"),
 }
-_NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.LOAD)
+_NOT_NEGATIVE = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotParameters:
     """Which groups are identified; those that are not keep the machine's values.
 
-    `friction`: viscous and Coulomb; `offsets`: constant force; `inertial`: base inertial parameters; `load_friction`:
-    dry friction in proportion to the joint's gravity torque, which no machine file has. `half_width` [s]: of the
-    window, a zero-phase low-pass of about 0.5 / half_width Hz; at least ten samples. Raises UsageError.
+    `friction`: viscous and Coulomb; `offsets`: constant force; `inertial`: base inertial parameters. `half_width` [s]:
+    of the window, a zero-phase low-pass of about 0.5 / half_width Hz; at least ten samples. Raises UsageError.
     """
 
     friction: bool = True
     offsets: bool = True
     drive_inertia: bool = False
     inertial: bool = False
-    load_friction: bool = False
-    half_width: float = 0.1
+    half_width: float = HALF_WIDTH
 
     def __post_init__(self) -> None:
         if not 0.0 < self.half_width < math.inf:
@@ -112,7 +112,6 @@ class RobotParameters:
             Group.CONSTANT: self.offsets,
             Group.DRIVE_INERTIA: self.drive_inertia,
             Group.INERTIAL: self.inertial,
-            Group.LOAD: self.load_friction,
         }
         return frozenset(group for group, is_free in free.items() if is_free)
 
@@ -180,7 +179,8 @@ class LeftOut:
 class Equations:
     """Weighted equations of the runs: `rows` (m, B) of the base parameters, `torques` (m,), both times the weight.
 
-    `joints`, `times` [s], `runs` (m,): the joint, the window's centre and the index of the run of each.
+    `joints`, `times` [s], `runs` (m,): the joint, the window's centre and the index of the run of each. `rigid` (m,):
+    the torque of the links, of which the inertias are taken as known; 0 where they are free.
     """
 
     rows: FloatArray
@@ -188,6 +188,7 @@ class Equations:
     joints: FloatArray
     times: FloatArray
     runs: FloatArray
+    rigid: FloatArray
 
     __repr__ = short_repr
 
@@ -335,9 +336,8 @@ class Window:
 
 
 def resting_windows(run: RobotRun, machine: CoupledMachine, window: Window) -> BoolArray:
-    """Return in which windows (K, J) a joint rests, so that its dry friction is unknown."""
-    rests = np.abs(np.nan_to_num(run.speed, nan=np.inf)) < np.array(machine.stick_speed)
-    return window.average(rests.astype(np.float64)) > _REST_SHARE
+    """Return which windows (K, J) hold a sample of a joint at rest or so slow that its dry friction is unknown."""
+    return window.average(run.slow(machine.stick_speed).astype(np.float64)) > 0.0
 
 
 def _windows_of(runs: Sequence[RobotRun], regressor: Regressor, grouping: Grouping, what: RobotParameters) -> Equations:
@@ -347,12 +347,22 @@ def _windows_of(runs: Sequence[RobotRun], regressor: Regressor, grouping: Groupi
         if run.joint_count != len(machine.joints):
             raise UsageError(f"{run.name}: {run.joint_count} joints", f"the machine has {len(machine.joints)}")
         window = Window.of(what.half_width, run.period)
-        torque = window.average(run.torque) - _known_torque(run, regressor, window, what.groups)
+        rigid = _rigid_torque(run, machine, window) * (Group.INERTIAL not in what.groups)
+        torque = window.average(run.torque) - rigid - _known_torque(run, regressor, window, what.groups)
         rows = np.stack([window_of_column(run, regressor, window, own) for own in grouping.base], axis=2)
         valid = ~resting_windows(run, machine, window) & np.isfinite(torque) & np.isfinite(rows).all(axis=2)
         place, joint = np.nonzero(valid)
         times = run.start + run.period * (place * window.step + len(window.weights) // 2)
-        parts.append((rows[valid], torque[valid], joint.astype(np.float64), times, np.full(len(place), 1.0 * index)))
+        parts.append(
+            (
+                rows[valid],
+                torque[valid],
+                joint.astype(np.float64),
+                times,
+                np.full(len(place), 1.0 * index),
+                rigid[valid],
+            )
+        )
     if not any(len(part[1]) for part in parts):
         raise IdentificationError(
             "no joint moves in these runs for longer than a window", "use runs with motion, without contact"
@@ -366,13 +376,16 @@ def window_of_column(run: RobotRun, regressor: Regressor, window: Window, column
     return window.rate(momentum) + window.average(rest)
 
 
+def _rigid_torque(run: RobotRun, machine: CoupledMachine, window: Window) -> FloatArray:
+    """Return the windows' torques (K, J) of inertia and gravity, drives included."""
+    momentum, velocity_force, gravity = machine.momentum_terms(run.position, run.speed)
+    return window.rate(momentum) + window.average(gravity - velocity_force)
+
+
 def _known_torque(run: RobotRun, regressor: Regressor, window: Window, free: frozenset[Group]) -> FloatArray:
-    """Return the windows' torques (K, J) of the parameters that are not free."""
+    """Return the windows' torques (K, J) of friction and drives that are not free, beside those of _rigid_torque."""
     values = regressor.values
     total = np.zeros_like(window.average(run.position))
-    if Group.INERTIAL not in free:
-        momentum, velocity_force, gravity = regressor.machine.momentum_terms(run.position, run.speed)
-        total += window.rate(momentum) + window.average(gravity - velocity_force)
     for column, item in enumerate(regressor.columns):
         # The machine's momentum contains its drives.
         contained = item.group is Group.DRIVE_INERTIA and Group.INERTIAL not in free
@@ -435,7 +448,8 @@ class _Solution:
 
 
 def _weighted(plain: Equations, weights: FloatArray) -> Equations:
-    return replace(plain, rows=plain.rows * weights[:, np.newaxis], torques=plain.torques * weights)
+    rows, torques, rigid = plain.rows * weights[:, np.newaxis], plain.torques * weights, plain.rigid * weights
+    return replace(plain, rows=rows, torques=torques, rigid=rigid)
 
 
 def _whitening(rows: FloatArray) -> FloatArray:
@@ -509,14 +523,35 @@ def _correlation_time(times: FloatArray, residual: FloatArray) -> float:
 
 
 def jackknife_covariance(equations: Equations, values: FloatArray, blocks: Index) -> FloatArray:
-    """Return the jackknife's covariance (B, B), from the fits without one block each; infinite below 3 blocks.
+    """Return the covariance (B, B) of the values, infinite below 3 blocks.
 
-    beta without block b = beta - (Y'Y - Y_b'Y_b)^-1 Y_b' e_b with its residual e_b, in orthonormal coordinates.
+    It is that between blocks of time. With three runs or more no error is below that between runs: friction differs
+    from day to day by more than within one. Inertias that are taken as known add theirs.
     """
+    covariance = _jackknife(equations, values, blocks)
+    runs = np.unique(equations.runs, return_inverse=True)[1].ravel()
+    if np.isfinite(covariance).all() and runs.max() + 1 >= FEWEST_RUNS:
+        own, between = np.diag(covariance), np.diag(_jackknife(equations, values, runs))
+        wider = np.sqrt(np.maximum(between / np.maximum(own, 1e-300), 1.0))
+        covariance = covariance * np.outer(wider, wider)
+    # What the parameters take up of links that are heavier than they are said to be.
+    whitening = _whitening(equations.rows)
+    heavier = _WRONG_LINKS * whitening @ (whitening.T @ (equations.rows.T @ equations.rigid))
+    return np.asarray(covariance + np.outer(heavier, heavier))
+
+
+def _jackknife(equations: Equations, values: FloatArray, blocks: Index) -> FloatArray:
+    """Return the covariance (B, B) from the fits without one block each; infinite below 3 blocks.
+
+    beta without block b = beta - (Y'Y - Y_b'Y_b)^-1 Y_b' e_b with its residual e_b, in orthonormal coordinates. Few
+    blocks know their own spread badly: 1.96 of these standard errors are as many as Student's t needs for 95 %.
+    """
+    from scipy.stats import t
+
     whitening = _whitening(equations.rows)
     residual = equations.torques - equations.rows @ values
     count = int(blocks.max()) + 1
-    if count < 3:
+    if count < FEWEST_RUNS:
         return np.full((len(values), len(values)), np.inf)
     changes = np.empty((count, len(values)))
     for block in range(count):
@@ -525,7 +560,8 @@ def jackknife_covariance(equations: Equations, values: FloatArray, blocks: Index
         left = np.eye(whitening.shape[1]) - rows.T @ rows
         changes[block] = whitening @ np.linalg.lstsq(left, rows.T @ residual[own], rcond=1e-10)[0]
     changes -= changes.mean(axis=0)
-    return np.asarray((count - 1.0) / count * changes.T @ changes)
+    factor = float(t.ppf(0.975, count - 1) / t.ppf(0.975, np.inf)) ** 2 * (count - 1.0) / count
+    return np.asarray(factor * changes.T @ changes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ The dynamics are linear in mass, first moment and inertia of each moving body, s
 equation with this parameter 1 and all others 0 (Atkeson, An, Hollerbach, 1986). This holds for the torque, and for
 momentum p = M v and rest h = g - C'v of dp/dt + h = tau too, which need no acceleration.
 
-Columns: the inertial parameters, then drive inertia, viscous friction, Coulomb friction, constant force and load
-friction (dry friction per torque of gravity, 0 in the machine), one per joint each. All on the load side.
+Columns: the inertial parameters, then drive inertia, viscous friction, Coulomb friction and constant force, one per
+joint each. All on the load side.
 """
 
 from __future__ import annotations
@@ -39,10 +39,9 @@ class Group(Enum):
     VISCOUS = "viscous_friction"
     COULOMB = "coulomb_friction"
     CONSTANT = "constant_force"
-    LOAD = "load_friction"
 
 
-PER_JOINT = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.CONSTANT, Group.LOAD)
+PER_JOINT = (Group.DRIVE_INERTIA, Group.VISCOUS, Group.COULOMB, Group.CONSTANT)
 
 
 @dataclass(frozen=True)
@@ -106,13 +105,13 @@ class _JointColumns:
         self._inertial_count = len(inertial)
 
     def joint_values(self) -> FloatArray:
-        """Return viscous, Coulomb, constant and load friction on the load side (4 J,)."""
+        """Return viscous, Coulomb and constant friction on the load side (3 J,)."""
         ratio = np.array(self.machine.transmission_ratio)
         viscous = np.array(self.machine.viscous_friction) / ratio**2
         coulomb = np.array(self.machine.coulomb_friction) / np.abs(ratio)
-        return np.concatenate((viscous, coulomb, np.array(self.machine.constant_force) / ratio, np.zeros(len(ratio))))
+        return np.concatenate((viscous, coulomb, np.array(self.machine.constant_force) / ratio))
 
-    def friction(self, column: Column, position: FloatArray, speed: FloatArray) -> FloatArray:
+    def friction(self, column: Column, speed: FloatArray) -> FloatArray:
         """Return the torque (n, J) of a friction of 1."""
         torque, joint = np.zeros_like(speed), column.joint
         v = speed[:, joint]
@@ -122,8 +121,6 @@ class _JointColumns:
             torque[:, joint] = np.where(np.isfinite(v), 1.0, np.nan)
         else:
             torque[:, joint] = self._direction(joint, v)
-        if column.group is Group.LOAD:
-            torque[:, joint] *= np.abs(self.machine.gravity(position)[:, joint])
         return torque
 
     def _direction(self, joint: int, speed: FloatArray) -> FloatArray:
@@ -139,7 +136,7 @@ class _JointColumns:
         if what.group is Group.INERTIAL:
             return self._inertial_torque(column, position, speed, acceleration)
         if what.group is not Group.DRIVE_INERTIA:
-            return self.friction(what, position, speed)
+            return self.friction(what, speed)
         torque = np.zeros_like(speed)
         torque[:, what.joint] = acceleration[:, what.joint]
         return torque
@@ -150,7 +147,7 @@ class _JointColumns:
         if what.group is Group.INERTIAL:
             return self._inertial_momentum(column, position, speed)
         if what.group is not Group.DRIVE_INERTIA:
-            return np.zeros_like(speed), self.friction(what, position, speed)
+            return np.zeros_like(speed), self.friction(what, speed)
         momentum = np.zeros_like(speed)
         momentum[:, what.joint] = speed[:, what.joint]
         return momentum, np.zeros_like(speed)

@@ -7,6 +7,7 @@ used by a detector.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +20,10 @@ from cdtool.short_repr import short_repr
 
 # A derivative is that of the cubic that fits best over this time to either side [s], or this number of samples.
 _HALF_WIDTH, _FEWEST_BESIDE = 0.05, 3
+# Noise of this many standard deviations changes the sign of a speed in one of a thousand samples.
+_NOISE_DEVIATIONS = 3.0
+# Below this share of its fastest motion, the friction of a joint rises towards rest (Stribeck) in many drives.
+_CREEPING = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +67,27 @@ class RobotRun:
     def acceleration(self) -> FloatArray:
         """Return the central derivative of the speed (n, J); NaN within 0.05 s of a gap, the start and the end."""
         return central_derivative(self.speed, self.period)
+
+    def slow(self, stick_speed: Sequence[float]) -> BoolArray:
+        """Return where (n, J) the direction, or the kind, of a joint's friction is uncertain.
+
+        That is below its stick speed, three times the noise of its speed, and 2 % of its fastest motion. The noise is
+        that of third differences, to which smooth motion adds nothing.
+        """
+        from scipy.stats import median_abs_deviation
+
+        speed = np.abs(self.speed)
+        moves = np.where(speed > stick_speed, self.speed, np.nan)
+        least = np.array(stick_speed, dtype=np.float64)
+        for joint, own in enumerate(moves.T):
+            changes = np.diff(own, 3)
+            changes = changes[np.isfinite(changes)]
+            if len(changes):
+                # The third difference of noise has 1 + 9 + 9 + 1 times its variance.
+                noise = float(median_abs_deviation(changes, scale="normal")) / math.sqrt(20.0)
+                fastest = float(np.nanpercentile(np.abs(own), 99.0))
+                least[joint] = max(least[joint], _NOISE_DEVIATIONS * noise, _CREEPING * fastest)
+        return np.asarray(~(speed >= least) & np.isfinite(speed))
 
     def without(self, excluded: BoolArray) -> RobotRun:
         """Return the run with NaN for the torques of the excluded samples, (n,) or (n, J)."""

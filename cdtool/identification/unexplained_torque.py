@@ -17,8 +17,6 @@ from cdtool.recording import BoolArray
 
 # A residual beyond so many robust standard deviations is no friction and no noise.
 _BEYOND = 8.0
-# The median of the magnitude of normal noise over its standard deviation.
-_MEDIAN_TO_DEVIATION = 0.6745
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +45,8 @@ def without_unexplained(runs: Sequence[RobotRun], machine: CoupledMachine, half_
 
 def _outside(fit: RobotFit) -> BoolArray:
     """Return which equations (m,) are unexplained by the fit to all of them; one without a run may be a worse fit."""
+    from scipy.stats import norm
+
     equations, joints = fit.equations, fit.left_out.joints
     size = np.abs(equations.torques - equations.rows @ fit.base.values)
     outside: BoolArray = np.zeros(len(size), dtype=np.bool_)
@@ -54,7 +54,7 @@ def _outside(fit: RobotFit) -> BoolArray:
         own = joints == joint
         # No sensor resolves 1e-9 of its range: less is rounding.
         least = 1e-9 * float(np.max(np.abs(equations.torques[own])))
-        outside[own] = size[own] > _BEYOND * max(float(np.median(size[own])), least) / _MEDIAN_TO_DEVIATION
+        outside[own] = size[own] > _BEYOND * max(float(np.median(size[own])), least) / norm.ppf(0.75)
     return outside
 
 

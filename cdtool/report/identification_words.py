@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from cdtool.identification.estimate import Estimate, Missing, NotIdentifiable
+from cdtool.identification.estimate import Missing, NotIdentifiable
 from cdtool.identification.excitation import Excitation, PlannedMotion
+from cdtool.identification.robot_dynamics import FEWEST_RUNS
 from cdtool.identification.robot_excitation import JointMotion, PlannedRobotMotion
 from cdtool.plain_text import counted, digits
 from cdtool.report.number_text import number, percent
@@ -87,13 +88,6 @@ def words_of_base_set(item: NotIdentifiable) -> str:
     )
 
 
-def words_of_load_friction(load: Estimate, error: float, unit: str) -> str:
-    """Return the friction that grows with the load of a joint; `error`: RMS on unseen parts with it."""
-    value = f"{short_number(load.value, 2)} ± {short_number(load.standard_error, 1)} {unit} per {unit} of gravity"
-    reached = f"with it {number(error)} {unit} on unseen parts"
-    return f"friction grows with the load: {value}; {reached}; the machine file has no key for it"
-
-
 def words_of_robot_plan(plan: PlannedRobotMotion, names: Sequence[str], units: Sequence[str]) -> str:
     """Return the motion that would show the inertias of all links: duration, and range and speed of each joint."""
     parts = []
@@ -109,9 +103,9 @@ def words_of_robot_plan(plan: PlannedRobotMotion, names: Sequence[str], units: S
 
 
 def words_of_robot(
-    robot: RobotIdentification, plan: PlannedRobotMotion | None, names: Sequence[str], units: Sequence[str]
+    robot: RobotIdentification, plan: PlannedRobotMotion | None, names: Sequence[str], units: Sequence[str], runs: int
 ) -> list[str]:
-    """Return what is known of a whole robot, a line each: inertias, torque constants, unexplained torque."""
+    """Return what is known of a whole robot from so many runs, a line each: inertias, torque constants, and so on."""
     lines = [words_of_base_set(item) for item in (robot.inertias.not_identifiable if robot.inertias else ())]
     if plan is not None:
         lines.append(f"plan: {words_of_robot_plan(plan, names, units)}")
@@ -129,6 +123,8 @@ def words_of_robot(
             f"left out: {percent(robot.unexplained_share)} of the motion, of which no friction explains the torque "
             "(contact, stop?)"
         )
+    if runs < FEWEST_RUNS:
+        lines.append("the standard errors do not contain how friction differs from day to day: add logs of three days")
     if not robot.repeated.pairs:
         lines.append("no motion is repeated: the deviation between equal runs is not known")
     return lines

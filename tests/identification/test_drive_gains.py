@@ -20,7 +20,7 @@ from tests.synthetic.robots import six_joint_robot, six_joint_urdf, urdf_robot
 
 FACTORS = (1.2, 0.8)
 MASS, ALONG, TURNING = 0.7, 0.25, 0.002
-TOOL = Payload(link="forearm", mass=MASS, centre=(ALONG, 0.0, 0.0), inertia=(0.0, 0.0, 0.0, TURNING, 0.0, 0.0))
+TOOL = Payload(link="forearm", mass=MASS, centre=(ALONG, 0.0, 0.0))
 ARM = planar_arm(coulomb_slope=50.0)
 
 
@@ -73,7 +73,7 @@ def test_the_standard_errors_cover() -> None:
 def test_a_payload_on_a_turned_link_of_a_robot(tmp_path: Path) -> None:
     pytest.importorskip("pinocchio")
     machine = six_joint_robot(tmp_path)
-    payload = Payload(link="link6", mass=4.0, centre=(0.1, -0.05, 0.2), inertia=(0.02, 0.001, 0.0, 0.03, 0.0, 0.01))
+    payload = Payload(link="link6", mass=4.0, centre=(0.1, -0.05, 0.2))
     # The reader of URDFs is what adds the payload here: as a link that is fixed to the last one.
     numbers = 'ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0" izz="0.01"'
     extra = f"""<link name="load"><inertial><origin xyz="0.1 -0.05 0.2" rpy="0 0 0"/><mass value="4"/>
@@ -99,7 +99,7 @@ def test_a_joint_that_the_payload_does_not_load_is_refused() -> None:
 
 
 def test_a_payload_below_the_noise_is_refused() -> None:
-    tiny = replace(TOOL, mass=0.001, inertia=(0.0,) * 6)
+    tiny = replace(TOOL, mass=0.001)
     runs = [currents(ARM, fourier(seed, 2, 15.0), FACTORS, 0.3, seed) for seed in (1, 2)]
     found = drive_gains(runs[:1], runs[1:], tiny, ARM)
     assert not found.estimates

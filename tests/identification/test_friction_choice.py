@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.errors import UsageError
 from cdtool.identification.estimate import Missing
-from cdtool.identification.friction_choice import FrictionForm, JointFriction, choose_friction, with_slope
+from cdtool.identification.friction_choice import FrictionForm, JointFriction, choose_friction
 from cdtool.identification.robot_run import RobotRun
 from cdtool.machines.planar_arm import PlanarArm
 from tests.identification.robot_motion import Motion, coloured, fourier, planar_arm
@@ -56,14 +56,6 @@ def test_only_the_joint_whose_friction_changed_gets_a_new_one() -> None:
     assert second.form is FrictionForm.PREVIOUS
 
 
-def test_another_slope_of_dry_friction_is_found() -> None:
-    first, second = choose_friction(runs_of(replace(ARM, coulomb_slope=(10.0, 50.0)), 0.1), ARM, 0.1)
-    assert first.form is FrictionForm.SLOPE
-    assert values_of(first)["coulomb_slope"] == 10.0
-    assert "coulomb_slope" not in values_of(second)
-    assert with_slope(replace(ARM, coulomb_slope=(0.0, 50.0)), 10.0).coulomb_slope == (0.0, 10.0)
-
-
 def test_a_missing_motor_inertia_is_found_and_one_from_a_data_sheet_is_kept() -> None:
     without = replace(ARM, motor_inertia=(0.0, 0.0))
     first, _ = choose_friction(runs_of(ARM), without, 0.1)
@@ -75,20 +67,6 @@ def test_a_missing_motor_inertia_is_found_and_one_from_a_data_sheet_is_kept() ->
         FrictionForm.FRICTION_ALONE,
         FrictionForm.PREVIOUS,
     }
-
-
-def test_friction_that_grows_with_gravity_is_reported_and_not_an_estimate_of_the_file() -> None:
-    runs = runs_of(ARM)
-    loaded = [
-        replace(run, torque=run.torque + 0.1 * np.abs(ARM.gravity(run.position)) * np.tanh(50.0 * run.speed))
-        for run in runs
-    ]
-    for friction in choose_friction(loaded, ARM, 0.1):
-        assert friction.load_friction is not None
-        assert friction.load_friction.value == pytest.approx(0.1, abs=0.02)
-        assert friction.load_error < friction.errors[FrictionForm.FRICTION]
-        assert "load_friction" not in values_of(friction)
-    assert [item.load_friction for item in choose_friction(runs, ARM, 0.1)] == [None, None]
 
 
 def test_viscous_friction_of_slow_motion_is_known_only_together_with_the_rest() -> None:

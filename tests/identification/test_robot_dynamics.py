@@ -223,16 +223,6 @@ def test_a_torque_of_the_wrong_sign_is_not_explained_by_negative_friction() -> N
     assert all(item["least_squares"] < 0.0 for item in numbers)
 
 
-def test_friction_in_proportion_to_gravity_is_separated_from_coulomb_friction() -> None:
-    motion = fourier(14, 2)
-    run = motion.run(PLANAR, 0.02 * coloured(14, (4000, 2), 5.0))
-    load = 0.1 * np.abs(PLANAR.gravity(run.position)) * np.tanh(50.0 * run.speed)
-    fit = identify_robot([replace(run, torque=run.torque + load)], PLANAR, RobotParameters(load_friction=True))
-    for joint, item in by_joint(fit, "load_friction").items():
-        assert abs(item.value - 0.1) < 3.0 * item.standard_error + 1e-3
-        assert by_joint(fit, "coulomb_friction")[joint].value == pytest.approx((2.4, 1.8)[joint], abs=0.05)
-
-
 def test_without_a_slope_dry_friction_has_the_sign_of_the_speed() -> None:
     sign = planar_arm()
     fit = identify_robot([fourier(15, 2, 20.0, 0.002).run(sign)], unknown(sign))
@@ -272,20 +262,6 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> tuple[CoupledMachine, Robot
     machine = file.machine
     assert isinstance(machine, CoupledMachine)
     return machine, first, second, third
-
-
-def moving_error(run: RobotRun, torque: FloatArray, joint: int) -> float:
-    moves = np.abs(run.speed[:, joint]) > 1e-3
-    error = (run.torque - torque)[moves, joint]
-    return float(np.sqrt(np.nanmean(error**2)))
-
-
-def test_friction_that_grows_with_gravity_halves_the_error_of_shoulder_and_elbow(arm) -> None:
-    machine, learned, other, _ = arm
-    plain, load = (identify_robot([learned], machine, RobotParameters(load_friction=item)) for item in (False, True))
-    assert load.torque_error.cross_validated[1] < 0.5 * plain.torque_error.cross_validated[1]
-    errors = [moving_error(other, predicted_torque(fit, other), 1) for fit in (plain, load)]
-    assert errors[1] < errors[0]
 
 
 def test_five_seconds_of_the_ur10e_do_not_determine_its_base_parameters(arm) -> None:

@@ -98,3 +98,13 @@ def test_a_robot_needs_torque_and_pose(missing: str, message: str) -> None:
 def test_channels_of_different_shape_are_refused() -> None:
     with pytest.raises(RecordingError, match="differ in shape"):
         RobotRun("log", 0.0, 0.01, np.zeros((9, 2)), np.zeros((9, 3)), np.zeros((9, 2)))
+
+
+def test_a_sample_is_slow_below_three_times_the_noise_and_below_two_percent_of_the_fastest() -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    speed = np.column_stack((np.sin(time), np.sin(time), np.zeros_like(time)))
+    speed[:, 1] += 0.02 * np.random.default_rng(1).normal(size=len(time))
+    slow = RobotRun("run", 0.0, 0.01, *np.zeros((2, *speed.shape)), speed).slow((1e-3,) * 3)
+    assert np.max(np.abs(speed[slow[:, 0], 0])) == pytest.approx(0.02, abs=0.01)
+    assert np.max(np.abs(speed[slow[:, 1], 1])) == pytest.approx(0.06, rel=0.1)
+    assert slow[:, 2].all()

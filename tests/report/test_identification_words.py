@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from cdtool.identification.estimate import Estimate, Method, Missing, NotIdentifiable
+from cdtool.identification.estimate import Missing, NotIdentifiable
 from cdtool.identification.excitation import Excitation, PlannedMotion
 from cdtool.identification.friction_choice import FrictionForm
 from cdtool.identification.robot_excitation import JointDemand, JointMotion, PlannedRobotMotion
@@ -16,7 +16,6 @@ from cdtool.report.identification_words import (
     words_of_base_set,
     words_of_decision,
     words_of_joint_plan,
-    words_of_load_friction,
     words_of_plan,
     words_of_reason,
     words_of_robot_plan,
@@ -131,10 +130,7 @@ def test_a_decision_states_why_the_old_friction_stays(answer: FrictionAnswer, wo
     assert words_of_decision(decision) == words
 
 
-def test_friction_that_grows_with_the_load_and_a_robots_plan_have_their_numbers() -> None:
-    load = Estimate("machine", "load_friction", 0.0769, 0.0103, "1", Method.LEAST_SQUARES)
-    words = words_of_load_friction(load, 2.286, "N m")
-    assert words.startswith("friction grows with the load: 0.077 ± 0.01 N m per N m of gravity; with it 2.29 N m")
+def test_the_plan_of_a_robot_has_its_numbers() -> None:
     plan = PlannedRobotMotion((JointDemand(0, 2.0, 0.56, 0.32, 0.56), JointDemand(1, 3.0, 1.0, 3.0, 1.0)), 23.0, 4.9)
     assert words_of_robot_plan(plan, ["elbow", "lift"], ["rad", "m"]) == (
         "23 s of all joints at once, each at its own frequencies (logged: 4.9 s): "

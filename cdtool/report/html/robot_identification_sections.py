@@ -11,7 +11,6 @@ from cdtool.report.identification_words import (
     listed_numbers,
     short_number,
     words_of_decision,
-    words_of_load_friction,
     words_of_needs,
     words_of_robot,
 )
@@ -44,7 +43,9 @@ def robot_sections(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -
     if robot.inertias is not None:
         sections.append(_inertia_section(robot.inertias))
     travel = [item.robot.units[1] if item.robot else "rad" for item in evidence]
-    lines = words_of_robot(robot, robot_plan_of(done, evidence), [joint.joint for joint in done.joints], travel)
+    lines = words_of_robot(
+        robot, robot_plan_of(done, evidence), [joint.joint for joint in done.joints], travel, len(done.runs)
+    )
     if lines:
         table = Table("robot", "The whole robot", (Column("finding"),), [[Cell(visible(line))] for line in lines])
         sections.append(PageSection("Whole robot", (table,)))
@@ -63,14 +64,6 @@ def _panels(done: IdentifiedMachine, evidence: Sequence[JointEvidence]) -> list[
 
 def _friction_section(done: IdentifiedMachine, robot: RobotIdentification, panels: Sequence[JointPanel]) -> PageSection:
     tables = [_decision_table(panels), _forms_table(done, robot)]
-    loads = [
-        (joint.joint, words_of_load_friction(joint.robot.load_friction, joint.robot.load_error, panel.units[0]))
-        for joint, panel in zip(done.joints, panels, strict=False)
-        if joint.robot is not None and joint.robot.load_friction is not None
-    ]
-    if loads:
-        rows = [[name_cell(visible(name)), Cell(words)] for name, words in loads]
-        tables.append(Table("load", "Friction that grows with the load", (Column("joint"), Column("finding")), rows))
     figures = []
     if any(panel.unseen is not None for panel in panels):
         figures.append((partial(draw_unseen_torques, panels), _UNSEEN))

@@ -297,8 +297,8 @@ def identify(
         joints = tuple(_identify_joint(machine_file, joint, recordings, struck) for joint in range(count))
     estimates = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.estimates]
     together = [replace(item, joint=number) for number, joint in enumerate(joints) for item in joint.together]
-    if robot is not None:
-        estimates += robot.gain_estimates
+    if robot is not None and robot.gains is not None:
+        estimates += robot.gains.estimates
     for number, joint in enumerate(joints):
         estimates += scale_estimates(joint.torque_scale, given, number) if joint.torque_scale else []
     if not estimates and not together and not _was_compared(joints):

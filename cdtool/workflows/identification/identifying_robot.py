@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cdtool.bounded_loading import read_text
 from cdtool.errors import CdtoolError, ConfigurationError, RecordingError
 from cdtool.identification.base_parameters import BaseParameterSet
@@ -18,6 +20,7 @@ from cdtool.identification.friction_choice import FrictionForm, JointFriction, c
 from cdtool.identification.planar_links import planar_links
 from cdtool.identification.repeated_runs import RepeatedRuns, repeated_runs
 from cdtool.identification.robot_dynamics import (
+    HALF_WIDTH,
     RobotFit,
     RobotParameters,
     TorqueError,
@@ -33,7 +36,6 @@ from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recording import FloatArray, Recording
 from cdtool.remote.remote_path import joined
 
-_HALF_WIDTH = 0.1
 # A joint of whose torque the best model explains less than this share has a wrong channel, or the robot a wrong URDF.
 _EXPLAINED = 0.5
 # More unexplained moments than this share of the motion are no exceptions.
@@ -46,13 +48,14 @@ _MOST_RISE, _MOST_SHIFT = 0.1, 3.0
 class LoadedRuns:
     """Logs of motion with a known payload: `mass` [kg], fixed to a link, its `centre` of mass in the link's frame [m].
 
-    `link`: of the URDF, or "arm" or "forearm"; empty: the link that the last joint moves.
+    `centre` None: not known, then it is free. `link`: of the URDF, or "arm" or "forearm"; empty: the link that the last
+    joint moves.
     """
 
     logs: tuple[str | Path, ...]
     mass: float
     link: str = ""
-    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    centre: tuple[float, float, float] | None = None
 
     def payload(self, machine: CoupledMachine) -> Payload:
         """Return the payload on its link; raises ConfigurationError for a mass that is not above 0."""
@@ -85,7 +88,8 @@ class InertiaIdentification:
 class RobotIdentification:
     """What was identified of a robot; `joints` and `refused` (reason by method) in the order of the machine's joints.
 
-    `inertias` None: they could not be looked at. `gains`: torque constants, None without loaded runs.
+    `inertias` None: they could not be looked at. `gains`: torque constants, None without loaded runs; with them the
+    logged torques are multiplied by `torque_factors` (J,).
     `unexplained_share`: of the equations left out, because no friction explains their torque. `urdf`: the text of the
     updated URDF, empty if it stays as it is.
     """
@@ -94,14 +98,10 @@ class RobotIdentification:
     refused: tuple[Mapping[str, str], ...]
     inertias: InertiaIdentification | None
     gains: Identified | None
+    torque_factors: FloatArray
     repeated: RepeatedRuns
     unexplained_share: float
     urdf: str = ""
-
-    @property
-    def gain_estimates(self) -> tuple[Estimate, ...]:
-        """Return the torque constants of the joints."""
-        return self.gains.estimates if self.gains else ()
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -145,9 +145,6 @@ def joint_summary(friction: JointFriction) -> dict[str, Any]:
         "torque_error_on_unseen_parts": {form.name.lower(): error for form, error in friction.errors.items()},
         "torque": friction.torque,
         "refitted": [{**asdict(item), "method": item.method.value} for item in friction.refitted],
-        "load_friction": friction.load_friction
-        and {"value": friction.load_friction.value, "standard_error": friction.load_friction.standard_error},
-        "torque_error_with_load_friction": friction.load_error,
     }
 
 
@@ -186,27 +183,29 @@ def identify_joints(
     runs, first_fault = _runs_of(recordings)
     if not runs:
         raise IdentificationError(f"nothing can be identified: {first_fault}", "see docs/identification.md")
-    gains = None
+    gains, factors = None, np.ones(len(machine.joints))
     if loaded is not None:
         with_payload, fault = _runs_of(loaded[0])
         if not with_payload:
             raise IdentificationError(f"no usable run with the payload: {fault}", "see docs/identification.md")
         present = _present_scale(given, len(machine.joints))
         gains = drive_gains(runs, with_payload, loaded[1], machine, present)
-        runs = [_rescaled(run, gains, present) for run in runs]
-    explained = without_unexplained(runs, machine, _HALF_WIDTH)
+        for item in gains.estimates:
+            factors[item.joint] = item.value / present[item.joint]
+        runs = [replace(run, torque=run.torque * factors) for run in runs]
+    explained = without_unexplained(runs, machine, HALF_WIDTH)
     if explained.share > _MOST_UNEXPLAINED:
         raise IdentificationError(
             f"no friction explains the torque during {100.0 * explained.share:.0f} % of the motion",
             "leave out logs with contacts and stops; check the order, signs and units of the channels",
         )
-    joints = choose_friction(explained.runs, machine, _HALF_WIDTH)
+    joints = choose_friction(explained.runs, machine, HALF_WIDTH)
     inertias, joints, urdf = _with_inertias(explained.runs, machine, joints, given, folder)
     refused: tuple[Mapping[str, str], ...] = ({},) * len(joints)
     if not (inertias and inertias.is_new):
         joints, refused = _refuse_unexplained(joints, machine)
-    floor = repeated_runs(runs, _HALF_WIDTH)
-    return RobotIdentification(joints, refused, inertias, gains, floor, explained.share, urdf)
+    floor = repeated_runs(runs, HALF_WIDTH)
+    return RobotIdentification(joints, refused, inertias, gains, factors, floor, explained.share, urdf)
 
 
 def _runs_of(recordings: Sequence[Recording]) -> tuple[list[RobotRun], str]:
@@ -239,14 +238,6 @@ def _present_scale(given: Mapping[str, Any], count: int) -> list[float]:
         table = table[name]
     scale = table.get("scale", 1.0)
     return [float(item) for item in scale] if isinstance(scale, list) else [float(scale)] * count
-
-
-def _rescaled(run: RobotRun, gains: Identified, present: Sequence[float]) -> RobotRun:
-    """Return the run with torques by the identified constants."""
-    torque = run.torque.copy()
-    for item in gains.estimates:
-        torque[:, item.joint] *= item.value / present[item.joint]
-    return replace(run, torque=torque)
 
 
 def _refuse_unexplained(
@@ -286,7 +277,7 @@ def _with_inertias(
     folder: Path,
 ) -> tuple[InertiaIdentification | None, tuple[JointFriction, ...], str]:
     """Return the inertias, the joints, and the text of the URDF, new where the runs determine the inertias."""
-    fit = identify_robot(runs, machine, RobotParameters(inertial=True, half_width=_HALF_WIDTH))
+    fit = identify_robot(runs, machine, RobotParameters(inertial=True, half_width=HALF_WIDTH))
     missing = tuple(item for item in fit.identified.not_identifiable if item.key == "base_parameters")
     found = InertiaIdentification(fit.base, fit.condition_number, fit.torque_error, missing)
     if missing:

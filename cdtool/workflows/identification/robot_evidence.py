@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from cdtool.identification.estimate import Missing, NotIdentifiable
-from cdtool.identification.friction_choice import FrictionForm, JointFriction, with_slope
+from cdtool.identification.friction_choice import FrictionForm, JointFriction
 from cdtool.identification.friction_curve import FrictionCurve, friction_curve, speed_edges
 from cdtool.identification.robot_dynamics import (
+    HALF_WIDTH,
     RobotFit,
     RobotParameters,
     Window,
@@ -37,20 +38,15 @@ from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recording import FloatArray
 from cdtool.short_repr import short_repr
 from cdtool.workflows.identification.identifying import IdentifiedMachine
-from cdtool.workflows.identification.machine_update import MachineChange
 
-# As in the identification [s].
-_HALF_WIDTH = 0.1
 # A line is interrupted where windows are further apart than this many usual steps.
 _GAP = 1.5
-_CURVE_POINTS = 81
 _FORMS: Mapping[FrictionForm, RobotParameters] = {
-    FrictionForm.OFFSET: RobotParameters(friction=False, half_width=_HALF_WIDTH),
-    FrictionForm.FRICTION_ALONE: RobotParameters(offsets=False, half_width=_HALF_WIDTH),
-    FrictionForm.FRICTION: RobotParameters(half_width=_HALF_WIDTH),
-    FrictionForm.SLOPE: RobotParameters(half_width=_HALF_WIDTH),
-    FrictionForm.DRIVE_INERTIA: RobotParameters(drive_inertia=True, half_width=_HALF_WIDTH),
-    FrictionForm.WITH_INERTIAS: RobotParameters(inertial=True, half_width=_HALF_WIDTH),
+    FrictionForm.OFFSET: RobotParameters(friction=False),
+    FrictionForm.FRICTION_ALONE: RobotParameters(offsets=False),
+    FrictionForm.FRICTION: RobotParameters(),
+    FrictionForm.DRIVE_INERTIA: RobotParameters(drive_inertia=True),
+    FrictionForm.WITH_INERTIAS: RobotParameters(inertial=True),
 }
 # Those with which the old friction of a joint is compared.
 _REFITTED = (FrictionForm.FRICTION_ALONE, FrictionForm.FRICTION)
@@ -118,7 +114,7 @@ class JointFrictionCurve:
     """Friction of a joint over speed: measured torque less that of inertia and gravity, and the models.
 
     `points`: mean per interval of speed with the standard error between blocks of the log. `speed`, `new`, `previous`
-    (n,): the models [N m, N] over the speed [rad/s, m/s]. `load_friction` [-] is in none of them: it varies with pose.
+    (n,): the models [N m, N] over the speed [rad/s, m/s].
     """
 
     points: FrictionCurve
@@ -195,24 +191,6 @@ def inertia_plan(done: IdentifiedMachine, motions: Sequence[JointMotion]) -> Pla
     return plan_robot_motion(motions, int(refused.numbers.get("base_parameters", 0.0)))
 
 
-def rescaled_runs(runs: Sequence[RobotRun], done: IdentifiedMachine) -> list[RobotRun]:
-    """Return the runs with torques by the identified torque constants, where there are any."""
-    factors = np.ones(len(done.joints))
-    for estimate in done.robot.gain_estimates if done.robot else ():
-        old = _scale_before(done.changes, estimate.joint)
-        factors[estimate.joint] = estimate.value / old
-    return [replace(run, torque=run.torque * factors) for run in runs]
-
-
-def _scale_before(changes: Sequence[MachineChange], joint: int) -> float:
-    """Return the scale of the torque channel that the logs were read with, of a joint."""
-    for change in changes:
-        if change.key == "scale":
-            old = change.old[joint]
-            return 1.0 if old is None else old
-    return 1.0
-
-
 def robot_evidence(
     done: IdentifiedMachine, runs: Sequence[RobotRun], machine: CoupledMachine
 ) -> tuple[RobotJointEvidence, ...]:
@@ -238,8 +216,10 @@ def robot_evidence(
         No joint moves.
     """
     motions = measure_joint_motion(runs, machine)
-    explained = without_unexplained(rescaled_runs(runs, done), machine, _HALF_WIDTH).runs
-    fits = _Fits(explained, machine)
+    factors = done.robot.torque_factors if done.robot else 1.0
+    scaled = [replace(run, torque=run.torque * factors) for run in runs]
+    explained = without_unexplained(scaled, machine, HALF_WIDTH).runs
+    fits: dict[FrictionForm, RobotFit] = {}
     units = _units_of(machine)
     evidence = []
     for joint, item in enumerate(done.joints):
@@ -248,10 +228,9 @@ def robot_evidence(
         if item.robot is None or form is None:
             evidence.append(RobotJointEvidence(motions[joint], units[joint]))
             continue
-        previous = (
-            fits.of(FrictionForm.FRICTION, item.robot) if form is FrictionForm.SLOPE else fits.of(form, item.robot)
-        )
-        shown = _Joint(joint, form, fits.of(form, item.robot), previous.left_out.previous, explained)
+        if form not in fits:
+            fits[form] = identify_robot(explained, machine, _FORMS[form])
+        shown = _Joint(joint, form, fits[form], explained)
         evidence.append(RobotJointEvidence(motions[joint], units[joint], shown.unseen(), shown.friction(machine)))
     return tuple(evidence)
 
@@ -264,37 +243,13 @@ def _units_of(machine: CoupledMachine) -> list[tuple[str, str]]:
     return [("N", "m") if slides[name] else ("N m", "rad") for name in machine.tree.order]
 
 
-class _Fits:
-    """The fits of the chosen forms, each once."""
-
-    def __init__(self, runs: Sequence[RobotRun], machine: CoupledMachine) -> None:
-        self._runs, self._machine = runs, machine
-        self._known: dict[tuple[FrictionForm, float], RobotFit] = {}
-
-    def of(self, form: FrictionForm, friction: JointFriction) -> RobotFit:
-        """Return the fit of a form; the slope of dry friction is that which was identified of the joint."""
-        slope = 0.0
-        if form is FrictionForm.SLOPE:
-            own = [item.value for item in friction.identified.estimates if item.key == "coulomb_slope"]
-            own += [item.value for item in friction.together if item.key == "coulomb_slope"]
-            slope = own[0] if own else 0.0
-        if (form, slope) not in self._known:
-            machine = with_slope(self._machine, slope) if slope else self._machine
-            self._known[form, slope] = identify_robot(self._runs, machine, _FORMS[form])
-        return self._known[form, slope]
-
-
 @dataclass(frozen=True, eq=False)
 class _Joint:
-    """A joint, its form of friction, the fit of it, the residual (m,) of the machine as it was, and the runs.
-
-    A fit with another slope of dry friction has a changed machine: its own `previous` is not that of the machine file.
-    """
+    """A joint, its form of friction, the fit of it, and the runs."""
 
     joint: int
     form: FrictionForm
     fit: RobotFit
-    previous: FloatArray
     runs: Sequence[RobotRun]
 
     __repr__ = short_repr
@@ -311,10 +266,10 @@ class _Joint:
         worst = int(np.argmax(squares / counts))
         run = self.runs[worst]
         chosen = own & (equations.runs == worst)
-        window = Window.of(_HALF_WIDTH, run.period)
+        window = Window.of(HALF_WIDTH, run.period)
         place = self._places(run, window, equations.times[chosen])
         measured = window.average(run.torque)[place, self.joint]
-        lines = (measured, measured - left_out.residual[chosen], measured - self.previous[chosen])
+        lines = (measured, measured - left_out.residual[chosen], measured - left_out.previous[chosen])
         time = equations.times[chosen] - run.start
         gaps = np.flatnonzero(np.diff(place) > _GAP) + 1
         time = np.insert(time, gaps, time[gaps])
@@ -328,7 +283,7 @@ class _Joint:
         speeds, forces = [], []
         for index, run in enumerate(self.runs):
             chosen = own & (equations.runs == index)
-            window = Window.of(_HALF_WIDTH, run.period)
+            window = Window.of(HALF_WIDTH, run.period)
             place = self._places(run, window, equations.times[chosen])
             rest = window.average(run.torque)[:, self.joint] - self._rigid_torque(run, window)
             speeds.append(window.average(run.speed)[place, self.joint])
@@ -342,7 +297,7 @@ class _Joint:
         if not len(points):
             return None
         reach = float(np.max(np.abs(speed)))
-        at = np.linspace(-reach if speed.min() < 0.0 else 0.0, reach if speed.max() > 0.0 else 0.0, _CURVE_POINTS)
+        at = np.linspace(-reach if speed.min() < 0.0 else 0.0, reach if speed.max() > 0.0 else 0.0, 81)
         before = regressor_of(machine).values
         return JointFrictionCurve(
             points,
