@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _DIVISIONS = ("machine", "day")
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
-_MUCH_MORE = 5.0
+_MUCH_MORE = 3.0
 
 
 def identify(
@@ -246,6 +246,8 @@ def _show(
     *,
     quiet: bool,
 ) -> None:
+    for joint in done.joints:
+        _show_doubt(joint)
     runs = counted(len(done.runs), "impact-free run")
     typer.echo(f"{plain(done.machine)}: identified from {runs}")
     if done.changes and not quiet:
@@ -364,16 +366,24 @@ def _show_quality(joint: JointIdentification) -> None:
             f"force on unseen runs: {digits(float(f'{best.all:.3g}'))} {joint.units[1]} RMS, while moving "
             f"{digits(float(f'{best.moving:.3g}'))}{floor} ({validation.best.value})"
         )
-        if validation.repeats and best.moving > _MUCH_MORE * validation.floor > 0.0:
-            typer.echo(
-                f"the model leaves over {best.moving / validation.floor:.0f} times what equal strokes differ by: a "
-                "spring, a lag of the torque or friction along the travel is not in it, and its errors are too small"
-            )
-    if joint.two_mass is not None:
-        force, error = joint.two_mass.nominal_friction
+    for level in joint.rigid.levels if joint.rigid else ():
         typer.echo(
-            f"friction at nominal speed: {digits(float(f'{force:.4g}'))} +- {digits(float(f'{error:.2g}'))} "
-            f"{joint.units[1]}; condition number {joint.two_mass.condition_number:.3g}"
+            f"friction {'forward' if level.direction > 0 else 'backward'} at {digits(float(f'{level.speed:.3g}'))} "
+            f"{joint.units[2]}/s: {digits(float(f'{level.force:.4g}'))} +- "
+            f"{digits(float(f'{level.standard_error:.2g}'))} {joint.units[1]}"
+        )
+
+
+def _show_doubt(joint: JointIdentification) -> None:
+    validation = joint.rigid.cross_validation if joint.rigid else None
+    if validation is None or not validation.repeats:
+        return
+    best = validation.errors[validation.best].moving
+    if best > _MUCH_MORE * validation.floor > 0.0:
+        typer.echo(
+            f"{plain(joint.joint)}: the model leaves over {digits(round(best / validation.floor, 1))} times what equal "
+            "strokes differ by: a spring, a lag of the torque or friction along the travel is not in it, and its "
+            "errors may be too small"
         )
 
 
