@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 _DIVISIONS = ("machine", "day")
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
 _MUCH_MORE = 3.0
+_DOUBT = (
+    "times what equal strokes differ by: a spring, a lag of the torque or friction along the travel is not in it, and "
+    "its errors may be too small"
+)
 
 
 def identify(
@@ -247,7 +251,9 @@ def _show(
     quiet: bool,
 ) -> None:
     for joint in done.joints:
-        _show_doubt(joint)
+        left = joint.rigid.cross_validation.left_over if joint.rigid and joint.rigid.cross_validation else math.nan
+        if left > _MUCH_MORE:
+            typer.echo(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
     runs = counted(len(done.runs), "impact-free run")
     typer.echo(f"{plain(done.machine)}: identified from {runs}")
     if done.changes and not quiet:
@@ -361,30 +367,13 @@ def _show_quality(joint: JointIdentification) -> None:
     validation = joint.rigid.cross_validation if joint.rigid else None
     if validation is not None:
         best = validation.errors[validation.best]
-        floor = f", between equal strokes {digits(float(f'{validation.floor:.3g}'))}" if validation.repeats else ""
-        typer.echo(
-            f"force on unseen runs: {digits(float(f'{best.all:.3g}'))} {joint.units[1]} RMS, while moving "
-            f"{digits(float(f'{best.moving:.3g}'))}{floor} ({validation.best.value})"
-        )
+        floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
+        moving = f"while moving {number(best.moving)}{floor} ({validation.best.value})"
+        typer.echo(f"force on unseen runs: {number(best.all)} {joint.units[1]} RMS, {moving}")
     for level in joint.rigid.levels if joint.rigid else ():
-        typer.echo(
-            f"friction {'forward' if level.direction > 0 else 'backward'} at {digits(float(f'{level.speed:.3g}'))} "
-            f"{joint.units[2]}/s: {digits(float(f'{level.force:.4g}'))} +- "
-            f"{digits(float(f'{level.standard_error:.2g}'))} {joint.units[1]}"
-        )
-
-
-def _show_doubt(joint: JointIdentification) -> None:
-    validation = joint.rigid.cross_validation if joint.rigid else None
-    if validation is None or not validation.repeats:
-        return
-    best = validation.errors[validation.best].moving
-    if best > _MUCH_MORE * validation.floor > 0.0:
-        typer.echo(
-            f"{plain(joint.joint)}: the model leaves over {digits(round(best / validation.floor, 1))} times what equal "
-            "strokes differ by: a spring, a lag of the torque or friction along the travel is not in it, and its "
-            "errors may be too small"
-        )
+        way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
+        force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
+        typer.echo(f"friction {way} at {speed}: {force}")
 
 
 def _needed(item: NotIdentifiable) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import Estimate, IdentificationError, Identified, Method, Missing, NotIdentifiable
-from cdtool.identification.excitation import SPEEDS_NEEDED, Excitation, measure_excitation
+from cdtool.identification.excitation import SAME_SPEED, SPEEDS_NEEDED, Excitation, measure_excitation
 from cdtool.identification.filtered_regression import (
     NO_LAG,
     FilteredRun,
@@ -59,8 +59,6 @@ _MOST_FOLDS = 8
 _MOVING_SHARE = 0.05
 # A direction that was not learned may have this share of the weight of a prediction.
 _UNLEARNED_WEIGHT = 0.05
-# The motion is settled within this share of the fastest speed that is held [-].
-_SETTLED = 0.1
 # Strokes repeat each other within this relative difference of duration and travel [-]; they are shifted by at least
 # this many samples to align them.
 _SAME_STROKE, _ALIGNED_WITHIN = 0.02, 10
@@ -138,6 +136,11 @@ class CrossValidation:
     def best(self) -> FrictionForm:
         """Return the form with the smallest error while moving."""
         return min(self.errors, key=lambda form: (math.isnan(self.errors[form].moving), self.errors[form].moving))
+
+    @property
+    def left_over(self) -> float:
+        """Return the smallest error while moving over the floor; NaN without a floor."""
+        return self.errors[self.best].moving / self.floor if self.floor > 0.0 else math.nan
 
 
 @dataclass(frozen=True)
@@ -565,7 +568,7 @@ def _levels(
     nominal = excitation.speeds[-1] if excitation.speeds else excitation.highest_speed
     levels = []
     for direction in (1, -1):
-        inside = (equations.direction == direction) & (np.abs(speed - nominal) <= _SETTLED * nominal)
+        inside = (equations.direction == direction) & (np.abs(speed - nominal) <= SAME_SPEED * nominal)
         if not np.any(inside):
             continue
         fit = fit_linear(np.full((np.count_nonzero(inside), 1), float(direction)), friction[inside])

@@ -39,7 +39,7 @@ from cdtool.recording import FloatArray
 # In the order of the vector of logarithms.
 PARAMETERS = ("load_mass", "stiffness", "coulomb", "static", "viscous", "take_up", "end_stiffness")
 # Of a drive with one stiffness the first five are fitted; its take-up is beyond every wind-up.
-_ONE_STIFFNESS, _NEVER = 5, math.log(1e9)
+_ONE_STIFFNESS, _NEVER = PARAMETERS.index("take_up"), math.log(1e9)
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.5
 # The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
@@ -53,17 +53,15 @@ _STRIBECK_SHARE = 0.1
 _MOST_CHANGE, _AT_BOUND = 50.0, 1.02
 # The search for a second stiffness begins at each of these: the first one as a share of that of a drive with one
 # stiffness, the share of the largest wind-up at which the second begins, and its multiple of the first. The take-up may
-# change by a factor: far below, it would stand for the friction near rest. A second stiffness exists if the cost falls
-# below a share: noise and unknown friction lower it by a few percent.
+# change by a factor of 2: far below, it would stand for the friction near rest. A second stiffness exists if the cost
+# falls below a share: noise and unknown friction lower it by a few percent.
 _SECOND_STARTS = ((0.95, 0.8, 1.2), (0.8, 0.7, 3.0), (0.6, 0.8, 9.0))
-_TAKE_UP_RANGE, _SECOND_STIFFNESS = 2.0, 0.9
-# A drive that leaves over so many times what its starts differ by (as a sum of squares) is none of these: nothing of
-# the fit can be trusted.
-_MOST_LEFT = 1.5
+_SECOND_STIFFNESS = 0.9
 # A drive is as good as rigid if its oscillation lasts so many periods of the log, and its stiffness does not show above
 # this share of that.
 _PERIODS_OF_RIGID, _MOST_OF_RIGID = 10.0, 0.3
-# The cost of the rigid drive over that of the elastic one below which the elasticity does not show.
+# The cost of the rigid drive over that of the elastic one below which the elasticity does not show. That of the elastic
+# one over what its starts differ by, above which it does not describe them: nothing of the fit can be trusted.
 _CLEARLY_WORSE = 1.5
 # The total that a start shows roughly, in masses of the motor: less is an error of the machine file.
 _LEAST_TOTAL = 0.7
@@ -268,7 +266,7 @@ class _Problem:
         if lower < cost:
             self.load_change = float(np.exp(other[0]) - np.exp(vector[0]))
         independent = sum(_INDEPENDENT * item.count * len(self.measured(n)) for n, item in enumerate(self.ensembles))
-        self.is_described = min(cost, lower) < _MOST_LEFT * independent
+        self.is_described = min(cost, lower) < _CLEARLY_WORSE * independent
         return other if lower < _SECOND_STIFFNESS * cost else vector
 
     def _fitted(self, first: FloatArray, free: IntArray, tolerance: float, calls: int) -> tuple[FloatArray, float]:
@@ -277,7 +275,7 @@ class _Problem:
 
         count, knots = len(PARAMETERS), len(first) - len(PARAMETERS)
         reach = np.concatenate((np.full(count, math.log(_MOST_CHANGE)), np.full(knots, np.inf)))
-        reach[5] = math.log(_TAKE_UP_RANGE)
+        reach[5] = math.log(2.0)
         reach = reach[free]
         scale = np.concatenate((np.full(count, 0.3), np.full(knots, 0.03 * self.start["coulomb"])))[free]
 

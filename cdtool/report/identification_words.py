@@ -198,10 +198,6 @@ def _other_controller(item: NotIdentifiable, _: Excitation | None, __: str) -> s
     )
 
 
-def _wound_up(_: NotIdentifiable, __: Excitation | None, ___: str) -> str:
-    return "the starts wind the drive up beyond its take-up, or the model does not describe them"
-
-
 def _no_position(_: NotIdentifiable, __: Excitation | None, ___: str) -> str:
     return "no position channel: a delay of the speed channel looks like damping"
 
@@ -216,5 +212,4 @@ _REASONS: Mapping[Missing, _Reason] = {
     Missing.TORQUE_FILTER: _unknown_filter,
     Missing.OTHER_CONTROLLER: _other_controller,
     Missing.POSITION: _no_position,
-    Missing.GENTLER_START: _wound_up,
 }

@@ -38,7 +38,7 @@ from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.short_repr import short_repr
 from cdtool.workflows.execution.workers import Workers
-from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification, logs_up_to_contacts
+from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification, read_until
 from cdtool.workflows.identification.identifying_contacts import scaled
 from cdtool.workflows.identification.robot_evidence import (
     FrictionDecision,
@@ -199,7 +199,7 @@ def evidence_of(
 def _used_recordings(
     done: IdentifiedMachine, logs: Sequence[str | Path], machine_file: MachineFile, workers: Workers | None
 ) -> list[Recording]:
-    paths, reading = logs_up_to_contacts(logs, "LOGS", workers)
+    paths, reading = read_until(logs, "LOGS", workers)
     operations = load_runs(paths, machine_file, reading).operations
     return [operation.recording for operation in operations if operation.recording.name in done.runs]
 

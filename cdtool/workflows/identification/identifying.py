@@ -105,9 +105,10 @@ class JointIdentification:
             for estimate in fit.identified.estimates if fit else ():
                 if fit is not self.rigid or not (self.two_mass and estimate.key == "load_mass"):
                     found[estimate.section, estimate.key] = estimate
-        if ("machine", "viscous_friction") in found:
+        if ("model.controller", "speed_gain") not in found:  # a table without it cannot be read
+            found = {key: item for key, item in found.items() if key[0] != "model.controller"}
+        if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
             # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
-            viscous = found["machine", "viscous_friction"]
             found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
         for item in self.contacts.together if self.contacts else ():
             found.pop((item.section, item.key), None)
@@ -137,14 +138,13 @@ class JointIdentification:
         """Return what the starts show together with the identified values: how far they go."""
         if not self.two_mass:
             return []
-        found, identified = [], self.two_mass.identified
-        drive = self.contacts.drive if self.contacts else None
+        found, identified, drive = [], self.two_mass.identified, self.contacts.drive if self.contacts else None
         if drive or "stiffness" in identified:
             wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
             found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
         if "static" in identified:
-            stribeck = self.two_mass.model.friction.stribeck_speed
-            found.append(_exact("model.friction", "stribeck_speed", stribeck, f"{self.units[2]}/s"))
+            speed, unit = self.two_mass.model.friction.stribeck_speed, f"{self.units[2]}/s"
+            found.append(_exact("model.friction", "stribeck_speed", speed, unit))
         return found
 
     def _of_controller(self) -> list[Estimate]:
@@ -287,7 +287,7 @@ def identify(
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
     payload, contacts = _for_this_machine(other_logs, machine_file)
-    paths, reading = logs_up_to_contacts(logs, "LOGS", workers)
+    paths, reading = read_until(logs, "LOGS", workers)
     runs, recordings = _impact_free(paths, machine_file, replace(reading, progress=progress))
     given = read_toml(path, "a machine file")
     robot = _identify_robot(machine_file, recordings, given, payload, reading)
@@ -346,9 +346,7 @@ def _for_this_machine(
     return None, logs
 
 
-def logs_up_to_contacts(
-    logs: Sequence[str | Path], key: str, workers: Workers | None = None
-) -> tuple[list[Path], RunReading]:
+def read_until(logs: Sequence[str | Path], key: str, workers: Workers | None = None) -> tuple[list[Path], RunReading]:
     """Return the paths of the logs and how they are read: each up to its first contact, if its load cell shows one.
 
     In place of logs one benchmark file may be given: its [learn] logs are read as `cdtool benchmark` reads them, with
@@ -391,7 +389,7 @@ def _identify_robot(
     loaded = None
     if payload is not None:
         body = payload.payload(machine)
-        paths, _ = logs_up_to_contacts(payload.logs, "payload")
+        paths, _ = read_until(payload.logs, "payload")
         loaded = _impact_free(paths, machine_file, reading)[1], body
     return identify_joints(recordings, machine, given, machine_file.path.parent, loaded)
 
@@ -403,12 +401,10 @@ def _was_compared(joints: Sequence[JointIdentification]) -> bool:
 
 
 def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
-    """Return why nothing was identified, each reason once: first the motion that is too weak."""
-    reasons = []
-    for joint in joints:
-        for item in joint.not_identifiable:
-            reasons.append(f"{item.key} needs {', '.join(missing.value for missing in item.missing)}")
-        reasons += joint.refused.values()
+    """Return why nothing was identified, each reason once: the motion that is too weak, not what a controller needs."""
+    reasons = [text for joint in joints for name, text in joint.refused.items() if name != "controller"]
+    missing = [item for joint in joints for item in joint.not_identifiable if item.section != "model.controller"]
+    reasons += [f"{item.key} needs {', '.join(kind.value for kind in item.missing)}" for item in missing]
     return list(dict.fromkeys(reasons))[:_MOST_REASONS]
 
 
