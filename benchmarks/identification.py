@@ -5,7 +5,7 @@ move at three speeds in both directions, half at one speed in one direction; two
 spring. Per parameter: on how many axes it was printed, in how many of these 1.96 standard errors contain the truth, the
 largest error in standard errors, and the share that was refused.
 
-python benchmarks/identification.py [AXES] [--jobs N]      # 40 axes: 10 min with one job
+python benchmarks/identification.py [AXES] [--jobs N]      # 40 axes: 20 s each
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ def test_the_standard_errors_are_of_the_size_of_the_errors(fit: TwoMassFit) -> N
         assert 0.002 < estimate.relative_error < 0.2
 
 
-def test_viscous_friction_of_one_speed_is_uncertain_or_refused_with_the_coulomb_friction(fit: TwoMassFit) -> None:
+def test_viscous_friction_of_one_speed_is_uncertain_or_refused_with_coulomb(fit: TwoMassFit) -> None:
     missing = {item.key: item.missing for item in fit.identified.not_identifiable}
     assert ("viscous" in missing) == ("coulomb_forward" in missing)
     if "viscous" in missing:

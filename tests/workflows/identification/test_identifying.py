@@ -115,8 +115,8 @@ def test_crash_logs_are_used_up_to_their_contacts(tmp_path: Path, is_labelled: b
     logs = sorted((GATE / "stiff").glob("*.csv"))
     given: list[Path] = logs
     if is_labelled:
-        rows = "\n".join(f"{path},3.0" for path in logs)
-        (tmp_path / "labels.csv").write_text(f"recording,time_s\n{rows}\n", encoding="utf-8")
+        rows = "\n".join(f"{path},3.0,3.1" for path in logs)
+        (tmp_path / "labels.csv").write_text(f"recording,start_s,end_s\n{rows}\n", encoding="utf-8")
         given = [tmp_path / "benchmark.toml"]
         given[0].write_text(CRASHES.format(gate=GATE), encoding="utf-8")
     done = cdtool.identify(given, GATE / "machine.toml")
