@@ -284,10 +284,16 @@ class _Problem:
             vector[free] = values
             return vector
 
+        def errors(values: FloatArray) -> FloatArray:
+            return self.errors(whole(values))
+
+        def jacobian(values: FloatArray) -> FloatArray:
+            return self.jacobian(whole(values), free)
+
         found = least_squares(
-            lambda values: self.errors(whole(values)),
+            errors,
             first[free],
-            jac=lambda values: self.jacobian(whole(values), free),
+            jac=jacobian,
             loss="soft_l1",
             ftol=tolerance,
             xtol=1e-4,
