@@ -97,6 +97,7 @@ def test_what_is_found_is_not_said_to_be_unidentifiable(identified: tuple[Identi
 
 CRASHES = """machine = "{gate}/machine.toml"
 detectors = ["momentum"]
+threshold = "limit"
 
 [onset]
 labels = "labels.csv"
