@@ -167,7 +167,7 @@ def test_a_log_at_rest_and_a_log_without_positions_give_one_line(tmp_path: Path)
 
 def test_crash_logs_of_an_arm_are_used_and_the_motion_that_is_missing_is_named() -> None:
     arm = ROOT / "sample_logs" / "arm" / "trial_1"
-    with pytest.raises(IdentificationError, match="from 3 logs: .*coulomb_friction needs runs in both directions"):
+    with pytest.raises(IdentificationError, match=r"from 3 logs: .*coulomb_friction needs runs in both directions"):
         cdtool.identify([str(arm / "stiff" / "*")], arm / "machine.toml")
 
 
