@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -125,7 +126,6 @@ def _references(axis: ForeignAxis) -> list[FloatArray]:
     return profiles
 
 
-@njit
 def _integrated(
     reference: FloatArray, masses: FloatArray, drive: FloatArray, friction: FloatArray, control: FloatArray
 ) -> FloatArray:
@@ -160,6 +160,9 @@ def _integrated(
     return logged
 
 
+_compiled: Any = njit(_integrated)
+
+
 def _run(axis: ForeignAxis, reference: FloatArray, factor: float, waves: FloatArray) -> FloatArray:
     """Motor torque and motor position (2, n) of a run whose friction is `factor` times the usual one."""
     total = axis.motor_mass + axis.leaf_mass
@@ -167,7 +170,7 @@ def _run(axis: ForeignAxis, reference: FloatArray, factor: float, waves: FloatAr
     end = axis.end_stiffness if axis.drive == "take-up" else axis.stiffness
     cubic = 1.0 / axis.take_up**2 if axis.drive == "stiffening" else 0.0
     friction = (axis.coulomb, axis.motor_coulomb, axis.rise, axis.stribeck_speed, axis.viscous, factor, axis.waviness)
-    logged: FloatArray = _integrated(
+    logged: FloatArray = _compiled(
         reference,
         np.array([axis.motor_mass, axis.leaf_mass]),
         np.array([axis.stiffness, end, axis.take_up, cubic, axis.damping]),
