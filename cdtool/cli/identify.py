@@ -28,7 +28,11 @@ if TYPE_CHECKING:
 
 _DIVISIONS = ("machine", "day")
 # Error on unseen runs over the difference of equal strokes above which something is not in the model.
-_MUCH_MORE = 5.0
+_MUCH_MORE = 3.0
+_DOUBT = (
+    "times what equal strokes differ by: a spring, a lag of the torque or friction along the travel is not in it, and "
+    "its errors may be too small"
+)
 
 
 def identify(
@@ -246,6 +250,10 @@ def _show(
     *,
     quiet: bool,
 ) -> None:
+    for joint in done.joints:
+        left = joint.rigid.cross_validation.left_over if joint.rigid and joint.rigid.cross_validation else math.nan
+        if left > _MUCH_MORE:
+            typer.echo(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
     runs = counted(len(done.runs), "impact-free run")
     typer.echo(f"{plain(done.machine)}: identified from {runs}")
     if done.changes and not quiet:
@@ -357,22 +365,13 @@ def _show_quality(joint: JointIdentification) -> None:
     validation = joint.rigid.cross_validation if joint.rigid else None
     if validation is not None:
         best = validation.errors[validation.best]
-        floor = f", between equal strokes {digits(float(f'{validation.floor:.3g}'))}" if validation.repeats else ""
-        typer.echo(
-            f"force on unseen runs: {digits(float(f'{best.all:.3g}'))} {joint.units[1]} RMS, while moving "
-            f"{digits(float(f'{best.moving:.3g}'))}{floor} ({validation.best.value})"
-        )
-        if validation.repeats and best.moving > _MUCH_MORE * validation.floor > 0.0:
-            typer.echo(
-                f"the model leaves over {best.moving / validation.floor:.0f} times what equal strokes differ by: a "
-                "spring, a lag of the torque or friction along the travel is not in it, and its errors are too small"
-            )
-    if joint.two_mass is not None:
-        force, error = joint.two_mass.nominal_friction
-        typer.echo(
-            f"friction at nominal speed: {digits(float(f'{force:.4g}'))} +- {digits(float(f'{error:.2g}'))} "
-            f"{joint.units[1]}; condition number {joint.two_mass.condition_number:.3g}"
-        )
+        floor = f", between equal strokes {number(validation.floor)}" if validation.repeats else ""
+        moving = f"while moving {number(best.moving)}{floor} ({validation.best.value})"
+        typer.echo(f"force on unseen runs: {number(best.all)} {joint.units[1]} RMS, {moving}")
+    for level in joint.rigid.levels if joint.rigid else ():
+        way, speed = "forward" if level.direction > 0 else "backward", f"{number(level.speed)} {joint.units[2]}/s"
+        force = f"{number(level.force, 4)} +- {number(level.standard_error, 2)} {joint.units[1]}"
+        typer.echo(f"friction {way} at {speed}: {force}")
 
 
 def _needed(item: NotIdentifiable) -> str:

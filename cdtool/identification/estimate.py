@@ -44,6 +44,7 @@ class Missing(Enum):
     CONTACTS = "contacts with a load cell"
     SLOWER_MOTION = "slow motion, below the speed at which the friction falls"
     HIGHER_RATE = "a higher sampling rate"
+    GENTLER_START = "starts with less acceleration, which wind the drive up less, or contacts with a load cell"
     POSITION = "the position channel"
     FINER_MOTION = "a speed or position channel with less noise or finer steps"
     OTHER_CONTROLLER = "references of a P or PI speed controller, alone or under a P position controller"

@@ -14,7 +14,7 @@ from cdtool.identification.start_ensemble import AFTER, BEFORE
 from cdtool.recording import FloatArray
 
 # A speed is held if this share of the moving time is spent within this relative distance of it.
-_HELD_SHARE, _SAME_SPEED = 0.05, 0.1
+_HELD_SHARE, SAME_SPEED = 0.05, 0.1
 # Two held speeds are distinct if they differ by this factor.
 _DISTINCT = 1.25
 # With one or two speeds, the viscous friction of a real axis came out 20-60 % wrong.
@@ -154,8 +154,8 @@ def distinct_speeds(speed: FloatArray, share: FloatArray) -> tuple[float, ...]:
     held: list[float] = []
     while len(speed):
         cumulated = np.concatenate(([0.0], np.cumsum(share)))
-        first = np.searchsorted(speed, speed * (1.0 - _SAME_SPEED), side="left")
-        last = np.searchsorted(speed, speed * (1.0 + _SAME_SPEED), side="right")
+        first = np.searchsorted(speed, speed * (1.0 - SAME_SPEED), side="left")
+        last = np.searchsorted(speed, speed * (1.0 + SAME_SPEED), side="right")
         weight = cumulated[last] - cumulated[first]
         best = int(np.argmax(weight))
         if weight[best] < _HELD_SHARE:

@@ -6,14 +6,14 @@ The model is F = M a + d v + Fc sign(v) + F0: total mass, viscous and Coulomb fr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cdtool.identification.axis_run import AxisRun
 from cdtool.identification.estimate import Estimate, IdentificationError, Identified, Method, Missing, NotIdentifiable
-from cdtool.identification.excitation import SPEEDS_NEEDED, Excitation, measure_excitation
+from cdtool.identification.excitation import SAME_SPEED, SPEEDS_NEEDED, Excitation, measure_excitation
 from cdtool.identification.filtered_regression import (
     NO_LAG,
     FilteredRun,
@@ -41,15 +41,13 @@ from cdtool.short_repr import short_repr
 # Fewer equations than this identify nothing.
 _FEWEST_EQUATIONS = 50
 # With this relative standard error or more a parameter is not identifiable [-].
-_MASS_ERROR, _VISCOUS_ERROR, _COULOMB_ERROR, _STRIBECK_ERROR = 0.5, 0.3, 0.5, 0.5
+_MASS_ERROR, _VISCOUS_ERROR, _COULOMB_ERROR = 0.5, 0.3, 0.5
 # Strokes are the blocks of the standard errors; with fewer per direction they are cut into this many pieces.
 _ENOUGH_STROKES, _PIECES = 3, 6
 # Acceleration with this share of noise [-] is not fitted by least squares, which would lower the mass by its square.
 _NOISY = 0.2
 # Stribeck speeds that are tried, as shares of the highest speed.
 _STRIBECK_SHARES = (0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
-# A Stribeck speed this close to the lowest that is tried is not resolved: it stands for the smoothed sign [-].
-_RESOLVED = 1.1
 # The weight of the difference of two neighbouring knots per equation: it only matters where no equation is.
 _KNOT_WEIGHT = 1e-4
 # The form of an identified lag of the torque is a guess: this share of what it changes in the mass [-] is an error, and
@@ -72,18 +70,17 @@ class RigidAxisSettings:
 
     `low_pass_hz`: corner of the low-pass of every term. `unknown_speed` [m/s, rad/s]: see `filter_run`. `method`:
     LEAST_SQUARES or INSTRUMENTAL_VARIABLES; None is the latter if every run has a reference, or if the acceleration is
-    noisy. Without references the instruments are the measured signals, delayed. `stribeck`: fit static friction and
-    Stribeck speed too; the other parameters then belong to them. `prediction`: the friction of `predict_force`; None is
-    the one with the smallest error in cross-validation, or COULOMB_VISCOUS without it. `rotary`: the units of the
-    estimates. `seed`: of the random friction profiles of the standard errors. `torque_filter_time` [s]: of the low-pass
-    through which the torque was logged, 0 for none; None if it is not known: a lag that the runs show is then undone.
+    noisy. Without references the instruments are the measured signals, delayed. `prediction`: the friction of
+    `predict_force`; None is the one with the smallest error in cross-validation, or COULOMB_VISCOUS without it.
+    `rotary`: the units of the estimates. `seed`: of the random friction profiles of the standard errors.
+    `torque_filter_time` [s]: of the low-pass through which the torque was logged, 0 for none; None if it is not known:
+    a lag that the runs show is then undone.
     """
 
     low_pass_hz: float = 20.0
     unknown_speed: float | None = None
     method: Method | None = None
     loss: Loss = Loss.SQUARES
-    stribeck: bool = False
     prediction: FrictionForm | None = None
     cross_validate: bool = True
     rotary: bool = False
@@ -140,12 +137,18 @@ class CrossValidation:
         """Return the form with the smallest error while moving."""
         return min(self.errors, key=lambda form: (math.isnan(self.errors[form].moving), self.errors[form].moving))
 
+    @property
+    def left_over(self) -> float:
+        """Return the smallest error while moving over the floor; NaN without a floor."""
+        return self.errors[self.best].moving / self.floor if self.floor > 0.0 else math.nan
+
 
 @dataclass(frozen=True)
 class FrictionLevel:
-    """The force against the travel in one direction at the mean speed, the constant force included.
+    """The mean force against the travel at the fastest speed that is held, per direction, the constant force included.
 
-    It is identifiable even if its parts are not. `speed` [m/s, rad/s]; `force`, `standard_error` [N, N m].
+    It is that of the torque without the inertia's, and identifiable even if its parts are not. `speed` [m/s, rad/s];
+    `force`, `standard_error` [N, N m].
     """
 
     direction: int
@@ -218,9 +221,8 @@ def identify_rigid_axis(
     RigidAxisFit
         `identified` has in section "machine" `load_mass` (total minus motor), `viscous_friction`, `coulomb_friction`
         (mean of the directions) and `constant_force`, which includes half the difference of the directions; in section
-        "model.friction" `coulomb_forward` and `coulomb_backward` with the whole difference, for an offset of 0, and
-        with `stribeck` set also `static` and `stribeck_speed`; in section "model.sensors" `torque_filter_time`, if it
-        is not stated and the torque lags the motion.
+        "model.friction" `coulomb_forward` and `coulomb_backward` with the whole difference, for an offset of 0; in
+        section "model.sensors" `torque_filter_time`, if it is not stated and the torque lags the motion.
 
     Raises
     ------
@@ -267,7 +269,8 @@ def identify_rigid_axis(
         filtered = _filtered(runs, settings, lag.lag)
         equations = _equations(filtered, excitation, settings)
     solution = _with_noise_error(_solve(equations, excitation, settings), excitation)
-    solution = replace(solution, mass_error=math.hypot(solution.mass_error, lag.mass_error))
+    levels = _levels(equations, solution.mass, excitation, settings)
+    solution = replace(solution, mass_error=math.hypot(solution.mass_error, lag.mass_error), levels=levels)
     validation, prediction = _predict(filtered, excitation, settings)
     residuals = _residuals(equations, solution)
     return RigidAxisFit(
@@ -336,8 +339,7 @@ def _root_mean_square(values: FloatArray) -> float:
 class _Equations:
     """The equations of all runs, one per average of the low-pass; arrays (m,), columns (m, 4).
 
-    Columns: acceleration, speed, low-passed sign, 1. `instruments` has the same of the reference, or is None. With
-    `extra_columns` (m, 1) a function of the inner speed is added to both.
+    Columns: acceleration, speed, low-passed sign, 1. `instruments` has the same of the reference, or is None.
     """
 
     regressors: FloatArray
@@ -367,23 +369,6 @@ class _Equations:
                 block[inside] = total + np.arange(len(inside)) * pieces // len(inside)
                 total += pieces
         return block
-
-    def extended(self, shape: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray | None]:
-        """Return regressors and instruments (m, 5) with the low-passed sign(v) shape(|v|) as a further column."""
-        measured, reference = [], []
-        for run, rows in zip(self.filtered, self.rows, strict=True):
-            column = run.low_pass.value(run.sign * shape(np.abs(run.inner_speed)))
-            measured.append(column[rows])
-            if self.is_delayed:
-                reference.append(column[rows - _delay(run)])
-            elif self.instruments is not None and run.reference_sign is not None:
-                inner = run.inner_reference_speed
-                assert inner is not None
-                reference.append(run.low_pass.value(run.reference_sign * shape(np.abs(inner)))[rows])
-        regressors = np.column_stack((self.regressors, np.concatenate(measured)))
-        if self.instruments is None:
-            return regressors, None
-        return regressors, np.column_stack((self.instruments, np.concatenate(reference)))
 
 
 def _delay(run: FilteredRun) -> int:
@@ -496,8 +481,7 @@ class _Solution:
     mass_error: float
     names: tuple[str, ...]
     method: Method
-    levels: tuple[FrictionLevel, ...]
-    stribeck: tuple[float, float] | None = None  # Stribeck speed and its standard error
+    levels: tuple[FrictionLevel, ...] = ()
 
     __repr__ = short_repr
 
@@ -521,8 +505,7 @@ def _chosen_columns(excitation: Excitation) -> list[int]:
 def _solve(equations: _Equations, excitation: Excitation, settings: RigidAxisSettings) -> _Solution:
     base = (0, 1, 2) if excitation.is_one_way else (0, 1, 2, 3)
     if len(excitation.speeds) >= SPEEDS_NEEDED:
-        with_stribeck = _with_stribeck(equations, base, excitation, settings) if settings.stribeck else None
-        return with_stribeck or _solution(equations, base, settings)
+        return _solution(equations, base, settings)
     without = _solution(equations, _chosen_columns(excitation), settings)
     try:
         whole = _solution(equations, base, settings)
@@ -532,7 +515,8 @@ def _solve(equations: _Equations, excitation: Excitation, settings: RigidAxisSet
     if viscous <= 0.0:
         return without
     # The viscous share of the friction lies between nothing and all of it.
-    most = min(level.force / level.speed for level in without.levels) if without.levels else 0.0
+    levels = _levels(equations, without.mass, excitation, settings)
+    most = min((level.force / level.speed for level in levels), default=0.0)
     half = 0.5 * (whole.mass - without.mass) * float(np.clip(most / viscous, 0.0, 1.0))
     return replace(without, mass=without.mass + half, mass_error=math.hypot(without.mass_error, half))
 
@@ -571,70 +555,29 @@ def _solution(equations: _Equations, chosen: Sequence[int], settings: RigidAxisS
     columns = list(chosen)
     instruments = None if equations.instruments is None else equations.instruments[:, columns]
     fit, method = _regress(equations, equations.regressors[:, columns], instruments, settings)
-    names = tuple(_NAMES[item] for item in columns)
-    return _finished(equations, fit, _covariance(equations, fit, settings), names, method)
+    covariance = _covariance(equations, fit, settings)
+    plain = _Solution(fit, covariance, math.nan, math.nan, tuple(_NAMES[item] for item in columns), method)
+    mass, mass_error = plain.value(mass=1.0)
+    return replace(plain, mass=mass, mass_error=mass_error)
 
 
-def _finished(
-    equations: _Equations, fit: LinearFit, covariance: FloatArray, names: tuple[str, ...], method: Method
-) -> _Solution:
-    plain = _Solution(fit, covariance, math.nan, math.nan, names, method, ())
+def _levels(
+    equations: _Equations, mass: float, excitation: Excitation, settings: RigidAxisSettings
+) -> tuple[FrictionLevel, ...]:
+    speed, friction = np.abs(equations.regressors[:, 1]), equations.force - mass * equations.regressors[:, 0]
+    nominal = excitation.speeds[-1] if excitation.speeds else excitation.highest_speed
     levels = []
     for direction in (1, -1):
-        inside = equations.direction == direction
-        if np.any(inside):
-            speed = float(np.mean(np.abs(equations.regressors[inside, 1])))
-            force, error = plain.value(viscous=speed, coulomb=1.0, constant=float(direction))
-            levels.append(FrictionLevel(direction, speed, force, error))
-    mass, mass_error = plain.value(mass=1.0)
-    return replace(plain, mass=mass, mass_error=mass_error, levels=tuple(levels))
-
-
-def _with_stribeck(
-    equations: _Equations, base: tuple[int, ...], excitation: Excitation, settings: RigidAxisSettings
-) -> _Solution | None:
-    """Return the solution with a rise of the friction at low speed; None if these runs do not show one."""
-    from scipy.optimize import minimize_scalar
-
-    columns = [*base, len(_NAMES)]
-
-    def fitted(speed: float) -> tuple[LinearFit, Method, FloatArray, FloatArray | None]:
-        regressors, instruments = equations.extended(lambda v: np.exp(-((v / speed) ** 2)))
-        regressors = regressors[:, columns]
-        instruments = None if instruments is None else instruments[:, columns]
-        return *_regress(equations, regressors, instruments, settings), regressors, instruments
-
-    def cost(share: float) -> float:
-        try:
-            fit = fitted(share * excitation.highest_speed)[0]
-        except IdentificationError:
-            return math.inf
-        return float(np.sum(fit.weights * fit.residuals**2))
-
-    best = min(range(len(_STRIBECK_SHARES)), key=lambda item: cost(_STRIBECK_SHARES[item]))
-    around = _STRIBECK_SHARES[max(best - 1, 0)], _STRIBECK_SHARES[min(best + 1, len(_STRIBECK_SHARES) - 1)]
-    found = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": 1e-3})
-    if not math.isfinite(found.fun) or found.x < _RESOLVED * _STRIBECK_SHARES[0]:
-        return None
-    speed = float(found.x) * excitation.highest_speed
-    fit, method, regressors, instruments = fitted(speed)
-    rise = fit.coefficients[-1]
-    # The Stribeck speed's own column makes all standard errors include that it is not known.
-    slope, slope_reference = equations.extended(lambda v: rise * np.exp(-((v / speed) ** 2)) * 2.0 * v**2 / speed**3)
-    regressors = np.column_stack((regressors, slope[:, -1]))
-    if instruments is not None and slope_reference is not None:
-        instruments = np.column_stack((instruments, slope_reference[:, -1]))
-    try:
-        tangent, _ = _regress(equations, regressors, instruments, settings)
-    except IdentificationError:
-        return None
-    covariance = _covariance(equations, tangent, settings)
-    error = math.sqrt(covariance[-1, -1]) if covariance[-1, -1] >= 0.0 else math.inf
-    names = (*(_NAMES[item] for item in base), "rise")
-    solution = _finished(equations, fit, covariance[:-1, :-1], names, method)
-    if not _is_certain(*solution.value(rise=1.0), _STRIBECK_ERROR) or not _is_certain(speed, error, _STRIBECK_ERROR):
-        return None
-    return replace(solution, stribeck=(speed, error))
+        inside = (equations.direction == direction) & (np.abs(speed - nominal) <= SAME_SPEED * nominal)
+        if not np.any(inside):
+            continue
+        fit = fit_linear(np.full((np.count_nonzero(inside), 1), float(direction)), friction[inside])
+        along = equations.position[inside], equations.direction[inside]
+        variance = block_covariance(fit, equations.block[inside])
+        variance += profile_covariance(fit.influence, fit.residuals, *along, seed=settings.seed)
+        error = math.sqrt(variance[0, 0]) if variance[0, 0] >= 0.0 else math.nan
+        levels.append(FrictionLevel(direction, float(np.mean(speed[inside])), float(fit.coefficients[0]), error))
+    return tuple(levels)
 
 
 def _is_certain(value: float, error: float, most: float) -> bool:
@@ -666,7 +609,6 @@ def _answers(
         _load_mass(solution, excitation, motor_mass, units),
         _viscous(solution, excitation, units),
         *_coulomb(solution, excitation, units),
-        *(_stribeck(solution, excitation, units) if settings.stribeck else ()),
         *((_torque_filter(lag, solution.method),) if lag.is_found else ()),
     ]
     estimates = tuple(replace(item, joint=settings.joint) for item in answers if isinstance(item, Estimate))
@@ -753,18 +695,6 @@ def _coulomb(solution: _Solution, excitation: Excitation, units: _Units) -> list
     else:
         answers.append(Estimate("machine", "constant_force", value, error, units.force, solution.method))
     return answers
-
-
-def _stribeck(solution: _Solution, excitation: Excitation, units: _Units) -> list[Estimate | NotIdentifiable]:
-    keys = ("static", "stribeck_speed")
-    if solution.stribeck is None or excitation.is_one_way:
-        missing = [item for item in (Missing.SECOND_SPEED, Missing.REVERSALS) if item in excitation.missing]
-        numbers = {**_speed_numbers(solution, excitation), "slow_share": excitation.slow_share}
-        needed = (Missing.SLOWER_MOTION, *missing)
-        return [NotIdentifiable("model.friction", key, needed, numbers) for key in keys]
-    static = solution.value(coulomb=1.0, rise=1.0)
-    values = zip(keys, (static, solution.stribeck), (units.force, units.speed), strict=True)
-    return [Estimate("model.friction", key, *pair, unit, solution.method) for key, pair, unit in values]
 
 
 def _residuals(equations: _Equations, solution: _Solution) -> Residuals:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -29,15 +30,18 @@ from cdtool.identification.estimate import (
     Missing,
     NotIdentifiable,
 )
+from cdtool.identification.filtered_regression import IntArray
 from cdtool.identification.friction_profile import friction_profile, random_phases
 from cdtool.identification.start_ensemble import StartEnsemble, start_ensembles
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 
 # In the order of the vector of logarithms.
-PARAMETERS = ("load_mass", "stiffness", "coulomb", "static", "viscous")
+PARAMETERS = ("load_mass", "stiffness", "coulomb", "static", "viscous", "take_up", "end_stiffness")
+# Of a drive with one stiffness the first five are fitted; its take-up is beyond every wind-up.
+_ONE_STIFFNESS, _NEVER = PARAMETERS.index("take_up"), math.log(1e9)
 # A parameter with a larger relative standard error is not identifiable.
-LARGEST_RELATIVE_ERROR = 0.3
+LARGEST_RELATIVE_ERROR = 0.5
 # The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
 _STIFFNESS_STARTS = 12
 # A correction of the measured-force drive towards the measured speed: total mass times this [1/s].
@@ -46,11 +50,18 @@ _CORRECTION_RATE = 10.0
 _LEAST_SHARE = 0.01
 # The friction's rise is below a speed that a start passes in a few samples: it is given, not fitted [m/s, rad/s].
 _STRIBECK_SHARE = 0.1
-_AT_BOUND = 1.02
+_MOST_CHANGE, _AT_BOUND = 50.0, 1.02
+# The search for a second stiffness begins at each of these: the first one as a share of that of a drive with one
+# stiffness, the share of the largest wind-up at which the second begins, and its multiple of the first. The take-up may
+# change by a factor of 2: far below, it would stand for the friction near rest. A second stiffness exists if the cost
+# falls below a share: noise and unknown friction lower it by a few percent.
+_SECOND_STARTS = ((0.95, 0.8, 1.2), (0.8, 0.7, 3.0), (0.6, 0.8, 9.0))
+_SECOND_STIFFNESS = 0.9
 # A drive is as good as rigid if its oscillation lasts so many periods of the log, and its stiffness does not show above
 # this share of that.
 _PERIODS_OF_RIGID, _MOST_OF_RIGID = 10.0, 0.3
-# The cost of the rigid drive over that of the elastic one below which the elasticity does not show.
+# The cost of the rigid drive over that of the elastic one below which the elasticity does not show. That of the elastic
+# one over what its starts differ by, above which it does not describe them: nothing of the fit can be trusted.
 _CLEARLY_WORSE = 1.5
 # The total that a start shows roughly, in masses of the motor: less is an error of the machine file.
 _LEAST_TOTAL = 0.7
@@ -78,9 +89,8 @@ class TwoMassSettings:
 class TwoMassFit:
     """The identified model and how well it follows the log.
 
-    `relative_error`: RMS error by channel over its RMS. `condition_number` of the scaled Jacobian. `nominal_friction`
-    [N, N m] with its standard error: the friction at the nominal speed, known better than its parts.
-    `largest_wind_up` [m, rad] of the drive in the starts: beyond it nothing is known of its stiffness.
+    `relative_error`: RMS error by channel over its RMS. `condition_number` of the scaled Jacobian. `largest_wind_up`
+    [m, rad] of the drive in the starts, or its take-up travel: beyond it nothing is known of its stiffness.
     """
 
     identified: Identified
@@ -88,16 +98,19 @@ class TwoMassFit:
     ensembles: tuple[StartEnsemble, ...]
     relative_error: Mapping[str, float]
     condition_number: float
-    nominal_friction: tuple[float, float]
     largest_wind_up: float
 
 
 def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> TwoMassFit:
     """Return load, drive stiffness and friction from the starts of impact-free runs.
 
+    A drive that a second stiffness describes clearly better has one: the load is then that of this model, and the
+    stiffness is not identifiable. What a second stiffness would change is in the load's error. Nothing is identifiable
+    from starts that neither drive describes. A value with a standard error above 50 % is not identifiable, and neither
+    are Coulomb and viscous friction where one of them is not; the model still has the fitted values.
+
     Raises IdentificationError where no run starts from rest, the motor's inertia is not given or above the total, the
-    fit ends at a bound, or a rigid drive describes the starts as well. Viscous friction from one speed, and everything
-    else with a standard error above 30 %, is not identifiable; the model still has the fitted value.
+    fit ends at a bound, or a rigid drive describes the starts as well.
     """
     if settings.motor_mass <= 0.0:
         raise IdentificationError(
@@ -110,9 +123,7 @@ def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> Two
             "the drive's stiffness shows only in a start: log it from rest",
         )
     problem = _Problem(runs, ensembles, settings)
-    vector = problem.solve()
-    problem.refuse_rigid(vector)
-    return problem.result(vector)
+    return problem.result(problem.solve())
 
 
 class _Problem:
@@ -135,15 +146,21 @@ class _Problem:
         self.compared = ["torque", "speed", "position"]
         if settings.sensors.accelerometer_hz > 0.0:
             self.compared.append("acceleration")
-        logarithms = [math.log(self.start[name]) for name in PARAMETERS]
-        self.first = np.array([*logarithms, *np.zeros(sum(len(rows) for rows in self.prior))])
-        self.size = len(self._scaled_errors(self.first, self.frictions(self.first)))
+        logarithms = [math.log(self.start[name]) for name in PARAMETERS[:_ONE_STIFFNESS]]
+        ends = np.cumsum([len(PARAMETERS), *map(len, self.prior)])
+        self.of_knots = [slice(*pair) for pair in pairwise(ends)]
+        self.first = np.array([*logarithms, _NEVER, 0.0, *np.zeros(ends[-1] - ends[0])])
+        self.load_change, self.is_described = 0.0, True  # by a second stiffness; by either drive
+        # The force at a knot acts on one ensemble: the others are as they were.
+        self._part = lru_cache(maxsize=64)(self._errors_of)
 
     def model(self, vector: FloatArray) -> AxisModel:
-        """Return the model with the parameters exp(vector[:5]); the rest is the unknown friction at the knots."""
-        load, stiffness, coulomb, rise, viscous = np.exp(vector[: len(PARAMETERS)])
+        """Return the model with the parameters exp(vector[:7]); the rest is the unknown friction at the knots."""
+        load, stiffness, coulomb, rise, viscous, take_up, end = np.exp(vector[: len(PARAMETERS)])
         settings = self.settings
         drive = Drive(motor_mass=settings.motor_mass, load_mass=float(load), stiffness=float(stiffness))
+        if vector[5] < _NEVER:
+            drive = replace(drive, take_up_travel=float(take_up), end_stiffness=float(end))
         friction = Friction(
             coulomb_forward=float(coulomb),
             coulomb_backward=float(coulomb),
@@ -159,15 +176,14 @@ class _Problem:
 
     def frictions(self, vector: FloatArray) -> list[FloatArray]:
         """Return the deviation of the friction from the model's along each ensemble (n,): known, or at the knots."""
-        found, used = [], len(PARAMETERS)
-        for (positions, _), known, travelled in zip(self.knots, self.known, self.travelled, strict=True):
-            forces = vector[used : used + len(positions)]
-            used += len(positions)
-            if len(positions):
-                moving = np.clip(travelled / max(positions[1], 1e-300), 0.0, 0.1) * 10.0
-                known = known + moving * np.interp(travelled, positions, forces, right=0.0)
-            found.append(known)
-        return found
+        return [self._friction(number, vector[part]) for number, part in enumerate(self.of_knots)]
+
+    def _friction(self, number: int, forces: FloatArray) -> FloatArray:
+        known, travelled, (positions, _) = self.known[number], self.travelled[number], self.knots[number]
+        if not len(positions):
+            return known
+        moving = np.clip(travelled / max(positions[1], 1e-300), 0.0, 0.1) * 10.0
+        return np.asarray(known + moving * np.interp(travelled, positions, forces, right=0.0))
 
     def simulated(self, model: AxisModel, number: int, friction: FloatArray) -> AxisMotion:
         """Return the model's motion along an ensemble's references, with `friction` (n,) against its travel."""
@@ -192,210 +208,216 @@ class _Problem:
             )
         return {name: values for name, values in channels.items() if name in ensemble.mean}
 
+    def measured(self, number: int) -> dict[str, FloatArray]:
+        """Return the means of the channels of an ensemble that are compared."""
+        mean = self.ensembles[number].mean
+        return {name: mean[name] for name in self.compared if name in mean}
+
     def errors(self, vector: FloatArray) -> FloatArray:
-        """Return the scaled errors of all channels; large where the model cannot be simulated."""
+        """Return the scaled errors of all channels and of the knots' forces; large where the model cannot be run."""
+        parameters = vector[: len(PARAMETERS)].tobytes()
+        parts = [self._part(number, parameters, vector[part].tobytes()) for number, part in enumerate(self.of_knots)]
+        return np.concatenate(
+            (*parts, *(rows @ vector[part] for rows, part in zip(self.prior, self.of_knots, strict=True)))
+        )
+
+    def _errors_of(self, number: int, parameters: bytes, forces: bytes) -> FloatArray:
+        vector = np.frombuffer(parameters)
+        friction = self._friction(number, np.frombuffer(forces))
         try:
-            found = self._scaled_errors(vector, self.frictions(vector))
+            found = self.scaled_errors(number, self.model(vector), friction)
         except ConfigurationError:
-            found = np.full(self.size, 1e3)
+            found = np.full(sum(map(len, self.measured(number).values())), 1e3)
         return np.nan_to_num(found, nan=1e3, posinf=1e3, neginf=-1e3)
 
-    def _scaled_errors(self, vector: FloatArray, frictions: Sequence[FloatArray]) -> FloatArray:
-        model, parts, used = self.model(vector), [], len(PARAMETERS)
-        for number, (ensemble, scales) in enumerate(zip(self.ensembles, self.scales, strict=True)):
-            motion = self.simulated(model, number, frictions[number])
-            for name, values in self.channels(motion, ensemble).items():
-                weight = math.sqrt(_INDEPENDENT * ensemble.count / len(values))
-                parts.append((values - ensemble.mean[name]) / scales[name] * weight)
-        for rows in self.prior:
-            parts.append(rows @ vector[used : used + len(rows)])
-            used += len(rows)
-        return np.concatenate(parts)
+    def scaled_errors(self, number: int, model: AxisModel, friction: FloatArray) -> FloatArray:
+        """Return the errors of the channels of an ensemble, each in its scale and as if its samples were few."""
+        ensemble, scales = self.ensembles[number], self.scales[number]
+        weight = math.sqrt(_INDEPENDENT * ensemble.count / len(ensemble))
+        channels = self.channels(self.simulated(model, number, friction), ensemble)
+        measured = self.measured(number)
+        return np.concatenate([(channels[name] - measured[name]) / scales[name] * weight for name in measured])
 
     def solve(self) -> FloatArray:
-        """Return the logarithms of the parameters, from the best of a grid of stiffnesses."""
-        from scipy.optimize import least_squares
-
-        first = self.first
+        """Return the logarithms of the parameters, from the best of a grid of stiffnesses; refuse a rigid drive."""
         lowest = math.log(self.start["stiffness"])
-        grid = lowest + np.linspace(0.0, math.log(1e3), _STIFFNESS_STARTS)
         candidates = []
-        for stiffness in grid:
-            vector = first.copy()
+        for stiffness in lowest + np.linspace(0.0, math.log(1e3), _STIFFNESS_STARTS):
+            vector = self.first.copy()
             vector[1] = stiffness
             candidates.append((float(np.sum(np.abs(self.errors(vector)))), vector))
         candidates.sort(key=lambda item: item[0])
-        count = len(PARAMETERS)
-        low, high = np.full(len(first), -np.inf), np.full(len(first), np.inf)
-        low[:count], high[:count] = first[:count] - math.log(50.0), first[:count] + math.log(50.0)
-        low[1], high[1] = grid[0] - math.log(20.0), grid[-1] + math.log(10.0)
-        scale = 0.1 * self.start["coulomb"]
-        solutions = [
-            least_squares(
-                self.errors,
-                vector,
-                jac=self.jacobian,
-                loss="soft_l1",
-                ftol=1e-5,
-                xtol=1e-4,
-                max_nfev=30,
-                bounds=(low, high),
-                x_scale=np.concatenate((np.full(count, 0.3), np.full(len(first) - count, 0.3 * scale))),
-            )
-            for _, vector in candidates[:2]
-        ]
-        best = min(solutions, key=lambda item: item.cost)
-        vector = np.asarray(best.x, dtype=np.float64)
-        if vector[0] - low[0] < math.log(_AT_BOUND) or high[0] - vector[0] < math.log(_AT_BOUND):
+        free = np.delete(np.arange(len(self.first)), [5, 6])
+        rough, _ = min((self._fitted(item, free, 1e-2, 6) for _, item in candidates[:2]), key=lambda item: item[1])
+        vector, cost = self._fitted(rough, free, 1e-5, 30)
+        if abs(vector[0] - self.first[0]) > math.log(_MOST_CHANGE / _AT_BOUND):
             raise IdentificationError(
                 f"the load ends at {math.exp(vector[0]):.3g} {self.settings.units[0]}, the bound of the search",
                 "check machine.motor_inertia, the torque's scale, and that the logs are of this machine",
             )
-        return vector
+        self._refuse_rigid(vector, cost)
+        largest, others = self.largest_wind_up(vector), []
+        for softer, take_up, ratio in _SECOND_STARTS:
+            first = vector.copy()
+            first[1] += math.log(softer)
+            first[5:7] = math.log(take_up * largest), first[1] + math.log(ratio)
+            others.append(self._fitted(first, np.arange(len(vector)), 1e-4, 20))
+        other, lower = min(others, key=lambda item: item[1])
+        if lower < cost:
+            self.load_change = float(np.exp(other[0]) - np.exp(vector[0]))
+        independent = sum(_INDEPENDENT * item.count * len(self.measured(n)) for n, item in enumerate(self.ensembles))
+        self.is_described = min(cost, lower) < _CLEARLY_WORSE * independent
+        return other if lower < _SECOND_STIFFNESS * cost else vector
 
-    def refuse_rigid(self, vector: FloatArray) -> None:
+    def _fitted(self, first: FloatArray, free: IntArray, tolerance: float, calls: int) -> tuple[FloatArray, float]:
+        """Return the vector whose `free` values fit best, and its cost."""
+        from scipy.optimize import least_squares
+
+        count, knots = len(PARAMETERS), len(first) - len(PARAMETERS)
+        reach = np.concatenate((np.full(count, math.log(_MOST_CHANGE)), np.full(knots, np.inf)))
+        reach[5] = math.log(2.0)
+        reach = reach[free]
+        scale = np.concatenate((np.full(count, 0.3), np.full(knots, 0.03 * self.start["coulomb"])))[free]
+
+        def whole(values: FloatArray) -> FloatArray:
+            vector = first.copy()
+            vector[free] = values
+            return vector
+
+        def errors(values: FloatArray) -> FloatArray:
+            return self.errors(whole(values))
+
+        def jacobian(values: FloatArray) -> FloatArray:
+            return self.jacobian(whole(values), free)
+
+        found = least_squares(
+            errors,
+            first[free],
+            jac=jacobian,
+            loss="soft_l1",
+            ftol=tolerance,
+            xtol=1e-4,
+            max_nfev=calls,
+            bounds=(first[free] - reach, first[free] + reach),
+            x_scale=scale,
+        )
+        return whole(np.asarray(found.x, dtype=np.float64)), 2.0 * float(found.cost)
+
+    def _refuse_rigid(self, vector: FloatArray, cost: float) -> None:
         """Raise IdentificationError unless the starts show the drive's elasticity.
 
         All other parameters are fitted again with a drive that is as good as rigid at this sampling rate: the elastic
         one must describe the starts clearly better.
         """
-        from scipy.optimize import least_squares
-
         load, stiffness = np.exp(vector[:2])
         motor, period = self.settings.motor_mass, self.ensembles[0].period
-        reduced = motor * load / (motor + load)
-        stiff = reduced * (2.0 * math.pi / (_PERIODS_OF_RIGID * period)) ** 2
+        stiff = motor * load / (motor + load) * (2.0 * math.pi / (_PERIODS_OF_RIGID * period)) ** 2
         first = vector.copy()
         first[0], first[1] = self.first[0], math.log(max(stiff, 3.0 * stiffness))
-        free = np.arange(len(vector)) != 1
-
-        def errors(values: FloatArray) -> FloatArray:
-            whole = first.copy()
-            whole[free] = values
-            return self.errors(whole)
-
-        def jacobian(values: FloatArray) -> FloatArray:
-            whole = first.copy()
-            whole[free] = values
-            return self.jacobian(whole)[:, free]
-
-        found = least_squares(errors, first[free], jac=jacobian, loss="soft_l1", ftol=1e-3, xtol=1e-3, max_nfev=8)
-        elastic = 2.0 * float(np.sum(np.sqrt(1.0 + self.errors(vector) ** 2) - 1.0))
-        if stiffness > _MOST_OF_RIGID * stiff or 2.0 * found.cost < _CLEARLY_WORSE * elastic:
+        _, rigid = self._fitted(first, np.delete(np.arange(len(vector)), [1, 5, 6]), 1e-3, 8)
+        if stiffness > _MOST_OF_RIGID * stiff or rigid < _CLEARLY_WORSE * cost:
             raise IdentificationError(
                 "a rigid drive describes the starts as well as an elastic one: its stiffness does not show",
                 "if the drive is rigid, state [model.drive] rigid = true; else log stronger starts at a higher rate",
             )
 
-    def jacobian(self, vector: FloatArray) -> FloatArray:
-        """Return the derivatives of the scaled errors by the parameters' logarithms and the forces at the knots."""
-        columns = []
-        for index in range(len(vector)):
-            step = np.zeros(len(vector))
-            step[index] = size = 1e-3 if index < len(PARAMETERS) else 1e-2 * self.start["coulomb"]
-            columns.append((self.errors(vector + step) - self.errors(vector - step)) / (2.0 * size))
+    def jacobian(self, vector: FloatArray, free: IntArray) -> FloatArray:
+        """Return the derivatives of the errors by the free logarithms of parameters and forces at knots."""
+        base, columns = self.errors(vector), []
+        for index in free:
+            size = 1e-3 if index < len(PARAMETERS) else 1e-2 * self.start["coulomb"]
+            moved = vector.copy()
+            moved[index] += size
+            columns.append((self.errors(moved) - base) / size)
         return np.stack(columns, axis=1)
+
+    def largest_wind_up(self, vector: FloatArray) -> float:
+        """Return the largest wind-up of the drive in all starts [m, rad]."""
+        model, frictions = self.model(vector), self.frictions(vector)
+        return max(float(np.max(np.abs(self.simulated(model, *item)["wind_up"]))) for item in enumerate(frictions))
 
     def result(self, vector: FloatArray) -> TwoMassFit:
         """Return the fit with standard errors from surrogates of the friction over position."""
-        model = self.model(vector)
-        jacobian = self.jacobian(vector)
-        own = jacobian[:, : len(PARAMETERS)]
+        model, frictions = self.model(vector), self.frictions(vector)
+        count = len(PARAMETERS) if vector[5] < _NEVER else _ONE_STIFFNESS
+        free = np.concatenate((np.arange(count), np.arange(len(PARAMETERS), len(vector))))
+        jacobian = self.jacobian(vector, free)
+        own = jacobian[:, :count]
         norms = np.linalg.norm(own, axis=0)
         condition = float(np.linalg.cond(own / np.where(norms > 0.0, norms, 1.0)))
         deviations = self._deviations(jacobian, vector)
-        frictions = self.frictions(vector)
-        relative = np.sqrt(np.mean(deviations**2, axis=0))
-        friction, error = self._nominal_friction(vector, deviations)
-        largest = max(
-            float(np.max(np.abs(self.simulated(model, number, friction)["wind_up"])))
-            for number, friction in enumerate(frictions)
-        )
+        relative = np.sqrt(np.mean(deviations**2, axis=0)) if self.is_described else np.full(count, np.inf)
         return TwoMassFit(
             identified=self._identified(vector, relative, condition),
             model=replace(model, controller=None),
             ensembles=self.ensembles,
             relative_error=self._relative_error(model, frictions),
             condition_number=condition,
-            nominal_friction=(friction, error),
-            largest_wind_up=largest,
+            largest_wind_up=min(self.largest_wind_up(vector), model.drive.take_up_travel),
         )
 
     def _deviations(self, jacobian: FloatArray, vector: FloatArray) -> FloatArray:
-        """Return how far other errors of the same colour would move the parameters' logarithms (surrogates, 5).
+        """Return how far other errors of the same colour would move the free values (surrogates, p).
 
         Each is a random friction profile where the friction is not known, plus what the model leaves over in every
         channel, with random phases.
         """
         rng = np.random.default_rng(self.settings.seed)
         inverse = np.linalg.pinv(jacobian, rcond=1e-6)
-        base = self.errors(vector)
-        blocks = [len(item) for item in self.ensembles for name in self.compared if name in item.mean]
-        edges = np.cumsum([0, *blocks])
+        model, frictions = self.model(vector), self.frictions(vector)
         drawn = [
             profile.surrogates(travelled, self.settings.surrogates, rng)
             for profile, travelled in zip(self.profiles, self.travelled, strict=True)
         ]
-        frictions = self.frictions(vector)
+        base = [self.scaled_errors(number, model, friction) for number, friction in enumerate(frictions)]
         rows = []
-        for number in range(self.settings.surrogates):
-            disturbed = [known + item[number] for known, item in zip(frictions, drawn, strict=True)]
-            change = self._scaled_errors(vector, disturbed) - base
-            for begin, end in pairwise(edges):
-                change[begin:end] += random_phases(base[begin:end], rng)
+        for surrogate in range(self.settings.surrogates):
+            change = np.zeros(len(jacobian))
+            used = 0
+            for number, (friction, left) in enumerate(zip(frictions, base, strict=True)):
+                moved = self.scaled_errors(number, model, friction + drawn[number][surrogate]) - left
+                channels = np.split(left, len(self.measured(number)))
+                change[used : used + len(left)] = moved + np.concatenate(
+                    [random_phases(item, rng) for item in channels]
+                )
+                used += len(left)
             rows.append(-inverse @ change)
-        return np.array(rows)[:, : len(PARAMETERS)]
-
-    def _nominal_friction(self, vector: FloatArray, deviations: FloatArray) -> tuple[float, float]:
-        speed = self.ensembles[0].nominal_speed
-
-        def friction(logarithms: FloatArray) -> float:
-            return float(np.exp(logarithms[2]) + np.exp(logarithms[4]) * speed)
-
-        value = friction(vector)
-        logarithms = vector[: len(PARAMETERS)]
-        spread = [friction(logarithms + item) - value for item in np.clip(deviations, -2.0, 2.0)]
-        return value, float(np.sqrt(np.mean(np.square(spread))))
+        return np.array(rows)
 
     def _identified(self, vector: FloatArray, relative: FloatArray, condition: float) -> Identified:
         mass, force, length = self.settings.units
-        load, stiffness, coulomb, rise, viscous = np.exp(vector[: len(PARAMETERS)])
+        load, stiffness, coulomb, rise, viscous = np.exp(vector[:_ONE_STIFFNESS])
         static = coulomb + rise
-        static_error = math.hypot(coulomb * relative[2], rise * relative[3])
-        rows: list[tuple[str, str, float, float, str, tuple[Missing, ...]]] = [
-            ("machine", "load_mass", load, load * relative[0], mass, (Missing.ACCELERATION,)),
+        static_error = math.hypot(coulomb * relative[2], rise * relative[3]) / static
+        load_error = math.hypot(relative[0], self.load_change / load)
+        dry = max(relative[2], relative[4])  # what is taken from one of the two is in the other
+        has_second = vector[5] < _NEVER or not self.is_described
+        gentler = (Missing.GENTLER_START,) if has_second else ()
+        rows: list[tuple[str, str, float, float, float, str, tuple[Missing, ...]]] = [
+            ("machine", "load_mass", load, load_error, load_error, mass, gentler or (Missing.ACCELERATION,)),
             (
                 "model.drive",
                 "stiffness",
                 stiffness,
-                stiffness * relative[1],
+                relative[1],
+                math.inf if has_second else relative[1],
                 f"{force}/{length}",
-                (Missing.HIGHER_RATE, Missing.START_UP),
+                gentler or (Missing.HIGHER_RATE, Missing.START_UP),
             ),
             *(
-                ("model.friction", key, coulomb, coulomb * relative[2], force, (Missing.SECOND_SPEED,))
+                ("model.friction", key, coulomb, relative[2], dry, force, (Missing.SECOND_SPEED,))
                 for key in self._directions()
             ),
-            ("model.friction", "static", static, static_error, force, (Missing.MORE_RECORDINGS,)),
-            (
-                "model.friction",
-                "viscous",
-                viscous,
-                viscous * relative[4],
-                f"{force} s/{length}",
-                (Missing.SECOND_SPEED,),
-            ),
+            ("model.friction", "static", static, static_error, static_error, force, (Missing.MORE_RECORDINGS,)),
+            ("model.friction", "viscous", viscous, relative[4], dry, f"{force} s/{length}", (Missing.SECOND_SPEED,)),
         ]
-        speeds = _distinct_speeds(self.ensembles)
         estimates, missing = [], []
-        for section, key, value, error, unit, needs in rows:
-            known = error <= LARGEST_RELATIVE_ERROR * value and not (key == "viscous" and speeds < 2)
-            if known:
-                estimates.append(Estimate(section, key, float(value), float(error), unit, Method.OUTPUT_ERROR))
+        for section, key, value, error, judged, unit, needed in rows:
+            if judged <= LARGEST_RELATIVE_ERROR:
+                estimates.append(Estimate(section, key, float(value), float(error * value), unit, Method.OUTPUT_ERROR))
             else:
-                numbers = {"value": float(value), "relative_standard_error": float(error / value)}
-                numbers |= {"speeds": float(speeds), "condition_number": condition}
-                missing.append(NotIdentifiable(section, key, needs, numbers))
+                numbers = {"relative_standard_error": float(error), "condition_number": condition}
+                missing.append(NotIdentifiable(section, key, needed, numbers))
         return Identified(tuple(estimates), tuple(missing))
 
     def _directions(self) -> list[str]:
@@ -461,15 +483,6 @@ def _scales(ensemble: StartEnsemble) -> dict[str, float]:
         spread = float(np.sqrt(np.mean(ensemble.deviation[name] ** 2)))
         scales[name] = max(spread, _LEAST_SHARE * float(np.max(np.abs(mean))), 1e-300)
     return scales
-
-
-def _distinct_speeds(ensembles: Sequence[StartEnsemble]) -> int:
-    """Return the number of nominal speeds that differ by more than 20 %."""
-    found: list[float] = []
-    for speed in sorted(item.nominal_speed for item in ensembles):
-        if not found or speed > 1.2 * found[-1]:
-            found.append(speed)
-    return len(found)
 
 
 def _smooth(values: FloatArray, period: float, seconds: float) -> FloatArray:

@@ -423,15 +423,20 @@ def oscillating(rise: float) -> AxisRun:
     return AxisRun("log", 0.0, 1e-3, torque, position=position)
 
 
-def test_static_friction_and_stribeck_speed_are_found_where_they_are():
-    settings = RigidAxisSettings(stribeck=True)
-    fit = identify_rigid_axis([oscillating(15.0)], 0.0, settings)
-    assert fit.identified["static"].value == pytest.approx(55.0, rel=0.03)
-    assert fit.identified["stribeck_speed"].value == pytest.approx(0.03, rel=0.1)
-    assert fit.identified["viscous_friction"].value == pytest.approx(150.0, rel=0.02)
-    without = identify_rigid_axis([oscillating(0.0)], 0.0, settings)
-    assert reason(without, "static").missing == (Missing.SLOWER_MOTION,)
-    assert "stribeck_speed" not in without.identified
+@pytest.mark.parametrize("rise", [0.0, 60.0])
+def test_the_friction_at_speed_is_the_mean_of_the_settled_torque_in_each_direction(rise: float) -> None:
+    """A rise of the friction at low speed, which no form of the regression has, does not reach it."""
+    rng = np.random.default_rng(5)
+    time = np.arange(9_000) * 1e-3
+    speed = 0.2 * np.interp(time % 6.0, (0.5, 0.9, 2.5, 2.9, 3.4, 3.8, 5.4, 5.8), (0, 1, 1, 0, 0, -1, -1, 0))
+    friction = (40.0 + rise * np.exp(-((speed / 0.03) ** 2))) * np.tanh(speed / 1e-4) + 150.0 * speed - 5.0
+    runs = []
+    for number in range(3):
+        torque = 80.0 * np.gradient(speed, 1e-3) + friction + rng.normal(0.0, 0.5, len(time))
+        runs.append(AxisRun(f"{number}", 0.0, 1e-3, torque, position=np.cumsum(speed) * 1e-3))
+    forward, backward = identify_rigid_axis(runs, 0.0).levels
+    assert (forward.speed, backward.speed) == pytest.approx((0.2, 0.2), rel=0.01)
+    assert (forward.force, backward.force) == pytest.approx((65.0, 75.0), abs=0.5)
 
 
 def test_the_friction_curve_is_the_friction():

@@ -18,7 +18,6 @@ SENSORS = Sensors(accelerometer_hz=GATE.accelerometer_frequency, accelerometer_d
 SETTINGS = TwoMassSettings(motor_mass=GATE.motor_mass, sensors=SENSORS)
 # What the model can see: the motor's friction adds to that of the leaf.
 COULOMB = GATE.coulomb_friction + GATE.motor_friction
-NOMINAL = COULOMB + GATE.viscous_friction * GATE.nominal_speed
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["with references", "without references"])
@@ -29,7 +28,6 @@ def fit(request: pytest.FixtureRequest) -> TwoMassFit:
 def test_the_gate_is_identified(fit: TwoMassFit) -> None:
     assert fit.identified["load_mass"].value == pytest.approx(GATE.leaf_mass, rel=0.15)
     assert fit.identified["stiffness"].value == pytest.approx(GATE.take_up_stiffness, rel=0.05)
-    assert fit.nominal_friction[0] == pytest.approx(NOMINAL, rel=0.10)
     assert fit.identified["coulomb_forward"].value == pytest.approx(COULOMB, rel=0.15)
     assert fit.model.drive.load_mass == fit.identified["load_mass"].value
 
@@ -42,11 +40,15 @@ def test_the_standard_errors_are_of_the_size_of_the_errors(fit: TwoMassFit) -> N
         assert 0.002 < estimate.relative_error < 0.2
 
 
-def test_viscous_friction_of_one_speed_is_not_identifiable(fit: TwoMassFit) -> None:
-    (viscous,) = fit.identified.not_identifiable
-    assert (viscous.key, viscous.missing) == ("viscous", (Missing.SECOND_SPEED,))
-    assert viscous.numbers["speeds"] == 1.0
-    assert fit.model.friction.viscous > 0.0
+def test_viscous_friction_of_one_speed_is_uncertain_or_refused_with_coulomb(fit: TwoMassFit) -> None:
+    missing = {item.key: item.missing for item in fit.identified.not_identifiable}
+    assert ("viscous" in missing) == ("coulomb_forward" in missing)
+    if "viscous" in missing:
+        assert missing["viscous"] == (Missing.SECOND_SPEED,)
+    else:
+        viscous = fit.identified["viscous"]
+        assert 0.2 < viscous.relative_error <= 0.5
+        assert abs(viscous.value - GATE.viscous_friction) < 2.0 * viscous.standard_error
 
 
 def test_the_model_follows_the_runs(fit: TwoMassFit) -> None:
@@ -74,14 +76,11 @@ def test_a_second_speed_makes_viscous_friction_better_known() -> None:
     one = identify_two_mass(free_runs(GATE, 3, 3), SETTINGS)
     two = identify_two_mass([*free_runs(GATE, 3, 3), *free_runs(slow, 4, 3)], SETTINGS)
     assert len(two.ensembles) == 2
-    value = next((item.value for item in two.identified.estimates if item.key == "viscous"), None)
-    if value is None:
-        numbers = {item.key: item.numbers for item in two.identified.not_identifiable}["viscous"]
-        before = {item.key: item.numbers for item in one.identified.not_identifiable}["viscous"]
-        assert numbers["relative_standard_error"] < before["relative_standard_error"]
-        assert numbers["speeds"] == 2.0
-    else:
-        assert value == pytest.approx(GATE.viscous_friction, rel=0.5)
+    errors = []
+    for found in (one.identified, two.identified):
+        refused = {item.key: item.numbers["relative_standard_error"] for item in found.not_identifiable}
+        errors.append(refused["viscous"] if "viscous" in refused else found["viscous"].relative_error)
+    assert errors[1] < errors[0]
 
 
 def cut(run: AxisRun, seconds: float) -> AxisRun:

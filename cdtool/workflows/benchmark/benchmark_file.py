@@ -47,7 +47,7 @@ HOLDOUT = "holdout"
 # Where a log that is learned from ends.
 _UNTIL = ("end", "onset")
 # How long before its first contact a log is no longer learned from [s].
-_GUARD = 0.2
+GUARD = 0.2
 
 
 @dataclass(frozen=True)
@@ -438,7 +438,7 @@ def _guard(learn: Table) -> float | None:
         if "guard_s" in learn:
             raise learn.fault("guard_s", "is given without until", 'set until = "onset", or remove it')
         return None
-    return learn.number("guard_s", _GUARD, minimum=0.0)
+    return learn.number("guard_s", GUARD, minimum=0.0)
 
 
 def _groups(

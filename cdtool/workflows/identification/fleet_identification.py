@@ -284,10 +284,6 @@ def _frictions(joint: JointIdentification, prefix: str) -> Iterable[ParameterVal
             yield ParameterValue(
                 name, level.force, level.standard_error, joint.units[1], "mean over the travel", level.speed
             )
-    if joint.two_mass is not None:
-        value, error = joint.two_mass.nominal_friction
-        speed = joint.two_mass.ensembles[0].nominal_speed
-        yield ParameterValue(f"{prefix}friction in starts", value, error, joint.units[1], "output error", speed)
 
 
 def _series(periods: Sequence[_Outcome]) -> tuple[ParameterSeries, ...]:

@@ -17,7 +17,6 @@ from cdtool.axis_model.parameters import AxisModel, Controller
 from cdtool.axis_model.sensor_filters import second_order_low_pass
 from cdtool.axis_model.simulation import AxisInputs, simulate_axis
 from cdtool.errors import CdtoolError, RecordingError
-from cdtool.evaluation.truth.onset_rule import OnsetRule
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import Missing, NotIdentifiable
 from cdtool.identification.excitation import PlannedMotion, plan_motions
@@ -39,7 +38,7 @@ from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import BoolArray, FloatArray, Recording
 from cdtool.short_repr import short_repr
 from cdtool.workflows.execution.workers import Workers
-from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification
+from cdtool.workflows.identification.identifying import IdentifiedMachine, JointIdentification, read_until
 from cdtool.workflows.identification.identifying_contacts import scaled
 from cdtool.workflows.identification.robot_evidence import (
     FrictionDecision,
@@ -49,7 +48,7 @@ from cdtool.workflows.identification.robot_evidence import (
     inertia_plan,
     robot_evidence,
 )
-from cdtool.workflows.runs import RunReading, find_logs, load_runs
+from cdtool.workflows.runs import load_runs
 
 # Of a single run this share of its moving time, the last one, is left out of the fit and predicted [-].
 _LEFT_OUT = 0.3
@@ -200,8 +199,8 @@ def evidence_of(
 def _used_recordings(
     done: IdentifiedMachine, logs: Sequence[str | Path], machine_file: MachineFile, workers: Workers | None
 ) -> list[Recording]:
-    reading = RunReading("whole", onset=OnsetRule(), base=None, workers=workers or Workers())
-    operations = load_runs(find_logs(map(str, logs), Path(), "LOGS"), machine_file, reading).operations
+    paths, reading = read_until(logs, "LOGS", workers)
+    operations = load_runs(paths, machine_file, reading).operations
     return [operation.recording for operation in operations if operation.recording.name in done.runs]
 
 

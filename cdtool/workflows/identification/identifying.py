@@ -29,11 +29,15 @@ from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify
 from cdtool.machine_file import MachineFile, read_machine_file
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.plain_text import counted
-from cdtool.recording import Recording
+from cdtool.recording import Contact, Recording
 from cdtool.remote.remote_path import location
 from cdtool.same_values import equal_by_values
 from cdtool.short_repr import short_repr
 from cdtool.tables import read_toml
+from cdtool.workflows.benchmark.benchmark_file import GUARD, read_benchmark_file
+from cdtool.workflows.contacts.part_to_learn_from import PartToLearnFrom
+from cdtool.workflows.contacts.scoring_rules import ScoringRules
+from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.execution.workers import Progress, Workers
 from cdtool.workflows.identification.identifying_contacts import (
     ContactLogs,
@@ -92,13 +96,20 @@ class JointIdentification:
     def estimates(self) -> tuple[Estimate, ...]:
         """Return the estimates that the machine file gets.
 
-        The load's mass is that of the contacts, else that of the elastic drive, else that of the rigid axis. Friction
-        of the load that the contacts show to act on the motor is among the values known only together.
+        The load's mass is that of the contacts, else that of the elastic drive if there is one, else that of the rigid
+        axis. Friction is rather that of several speeds than that of the starts. Friction of the load that the contacts
+        show to act on the motor is among the values known only together.
         """
         found: dict[tuple[str, str], Estimate] = {}
-        for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
+        for fit in (self.two_mass, self.rigid, self.controller, self.robot, self.contacts):
             for estimate in fit.identified.estimates if fit else ():
-                found[estimate.section, estimate.key] = estimate
+                if fit is not self.rigid or not (self.two_mass and estimate.key == "load_mass"):
+                    found[estimate.section, estimate.key] = estimate
+        if ("model.controller", "speed_gain") not in found:  # a table without it cannot be read
+            found = {key: item for key, item in found.items() if key[0] != "model.controller"}
+        if self.rigid and (viscous := found.get(("machine", "viscous_friction"))):
+            # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
+            found["model.friction", "viscous"] = replace(viscous, section="model.friction", key="viscous")
         for item in self.contacts.together if self.contacts else ():
             found.pop((item.section, item.key), None)
         return tuple(map(self._with_scale_error, found.values()))
@@ -120,29 +131,20 @@ class JointIdentification:
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
-        of_rigid = {item.key: item for item in self.rigid.identified.estimates} if self.rigid else {}
-        if self.two_mass is None and "viscous_friction" in of_rigid:
-            # A table [model.friction] comes before [machine]: an old value of it must not apply with new ones.
-            viscous = of_rigid["viscous_friction"]
-            found.append(replace(viscous, section="model.friction", key="viscous"))
+        known |= {(item.section, item.key) for item in self.not_identifiable if not self.robot}
         return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
 
     def _of_starts(self) -> list[Estimate]:
-        """Return what the starts show of friction and drive together with the identified values."""
+        """Return what the starts show together with the identified values: how far they go."""
         if not self.two_mass:
             return []
-        found = []
-        numbers = {item.key: item.numbers for item in self.two_mass.identified.not_identifiable}
-        for key, unit in (("viscous", self.units[3]), ("static", self.units[1])):
-            if key in numbers:
-                value = numbers[key]["value"]
-                error = value * numbers[key]["relative_standard_error"]
-                found.append(Estimate("model.friction", key, value, error, unit, Method.OUTPUT_ERROR))
-        drive = self.contacts.drive if self.contacts else None
-        wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
-        if wind_up > 0.0:
+        found, identified, drive = [], self.two_mass.identified, self.contacts.drive if self.contacts else None
+        if drive or "stiffness" in identified:
+            wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
             found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
-        found.append(_exact("model.friction", "stribeck_speed", self.two_mass.model.friction.stribeck_speed, "m/s"))
+        if "static" in identified:
+            speed, unit = self.two_mass.model.friction.stribeck_speed, f"{self.units[2]}/s"
+            found.append(_exact("model.friction", "stribeck_speed", speed, unit))
         return found
 
     def _of_controller(self) -> list[Estimate]:
@@ -236,7 +238,8 @@ def identify(
     Parameters
     ----------
     logs : sequence of str or Path
-        Impact-free logs; a log with a contact is left out.
+        Impact-free logs, and logs with a contact that the load cell shows: they are used up to 0.2 s before it. Or one
+        benchmark file: what it learns from is used.
     machine : str or Path
         The machine file: the motor's inertia and what is known of the sensors are used.
     output : str or Path, optional
@@ -284,8 +287,8 @@ def identify(
         raise UsageError(f"{target}: already exists", "choose another name, or overwrite it with --force")
     machine_file = read_machine_file(path)
     payload, contacts = _for_this_machine(other_logs, machine_file)
-    reading = RunReading("whole", onset=OnsetRule(), base=None, workers=workers or Workers(), progress=progress)
-    runs, recordings = _impact_free(logs, "LOGS", machine_file, reading)
+    paths, reading = read_until(logs, "LOGS", workers)
+    runs, recordings = _impact_free(paths, machine_file, replace(reading, progress=progress))
     given = read_toml(path, "a machine file")
     robot = _identify_robot(machine_file, recordings, given, payload, reading)
     if robot is not None:
@@ -343,11 +346,28 @@ def _for_this_machine(
     return None, logs
 
 
-def _impact_free(
-    logs: Sequence[str | Path], key: str, machine_file: MachineFile, reading: RunReading
-) -> tuple[Runs, list[Recording]]:
+def read_until(logs: Sequence[str | Path], key: str, workers: Workers | None = None) -> tuple[list[Path], RunReading]:
+    """Return the paths of the logs and how they are read: each up to its first contact, if its load cell shows one.
+
+    In place of logs one benchmark file may be given: its [learn] logs are read as `cdtool benchmark` reads them, with
+    its labels, sections and `until`.
+    """
+    given = [location(item) for item in several_logs(logs)]
+    if len(given) == 1 and given[0].suffix.lower() == ".toml":
+        benchmark = read_benchmark_file(given[0])
+        return list(benchmark.learn), replace(benchmark.run_reading(workers), operations="whole")
+    reading = RunReading("whole", onset=OnsetRule(), part=_up_to_contact, workers=workers or Workers())
+    return find_logs(map(str, logs), Path(), key), reading
+
+
+def _up_to_contact(listed: Path, recording: Recording) -> tuple[Recording, Sequence[Contact]]:
+    part = PartToLearnFrom(ScoringRules(), guard=GUARD)
+    return part(listed, recording) if any_contacts(recording, part.rules) else (recording, ())
+
+
+def _impact_free(paths: Sequence[Path], machine_file: MachineFile, reading: RunReading) -> tuple[Runs, list[Recording]]:
     """Return the runs of some logs, and their recordings; raises IdentificationError if none can be used."""
-    runs = load_runs(find_logs(map(str, several_logs(logs)), Path(), key), machine_file, reading)
+    runs = load_runs(paths, machine_file, reading)
     recordings = [operation.recording for operation in runs.operations]
     if not recordings:
         reason = runs.skipped[0].reason if runs.skipped else "no log is given"
@@ -372,7 +392,8 @@ def _identify_robot(
     loaded = None
     if payload is not None:
         body = payload.payload(machine)
-        loaded = _impact_free(payload.logs, "payload", machine_file, reading)[1], body
+        paths, _ = read_until(payload.logs, "payload")
+        loaded = _impact_free(paths, machine_file, reading)[1], body
     return identify_joints(recordings, machine, given, machine_file.path.parent, loaded)
 
 
@@ -383,11 +404,10 @@ def _was_compared(joints: Sequence[JointIdentification]) -> bool:
 
 
 def _reasons(joints: Sequence[JointIdentification]) -> list[str]:
-    """Return why nothing was identified, each reason once."""
-    reasons = [reason for joint in joints for reason in joint.refused.values()]
-    for joint in joints:
-        for item in joint.not_identifiable if joint.robot else ():
-            reasons.append(f"{item.key} needs {', '.join(missing.value for missing in item.missing)}")
+    """Return why nothing was identified, each reason once: the motion that is too weak, not what a controller needs."""
+    reasons = [text for joint in joints for name, text in joint.refused.items() if name != "controller"]
+    missing = [item for joint in joints for item in joint.not_identifiable if item.section != "model.controller"]
+    reasons += [f"{item.key} needs {', '.join(kind.value for kind in item.missing)}" for item in missing]
     return list(dict.fromkeys(reasons))[:_MOST_REASONS]
 
 
@@ -407,10 +427,10 @@ def _joint_summary(joint: JointIdentification) -> dict[str, Any]:
             "repeats": validation.repeats,
             "forms": {form.value: asdict(error) for form, error in validation.errors.items()},
         },
+        "friction_at_speed": [asdict(level) for level in joint.rigid.levels] if joint.rigid else [],
         "two_mass": joint.two_mass
         and {
             "condition_number": joint.two_mass.condition_number,
-            "nominal_friction": joint.two_mass.nominal_friction,
             "relative_error": dict(joint.two_mass.relative_error),
             "largest_wind_up": joint.two_mass.largest_wind_up,
         },
