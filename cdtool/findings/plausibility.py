@@ -17,7 +17,7 @@ _CONTRADICTIONS = {
     ),
     "start": ("has the opposite sign of the force that the starts need", "reverse the sign of its scale"),
     "place": (
-        "is a function of position and speed alone ({share:.2%} of it), as no force of a drive is",
+        "is a function of position and speed alone ({share:.4%} of it), as no force of a drive is",
         "map the drive's torque, force or current",
     ),
     "other joint": ("follows the motion of {other} and not its own", "put the columns in the order of the joints"),

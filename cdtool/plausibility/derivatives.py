@@ -46,7 +46,8 @@ def derivative_checks(recordings: Sequence[Recording], channel: str, other: str)
     path, of_path = windows.changes(channel, integrated=True)
     change, of_change = windows.changes(other)
     if channel == "acceleration":  # its offset, as from the weight
-        path = path - np.nanmedian(path, axis=0)
+        known = np.isfinite(path).any(axis=0)
+        path[:, known] -= np.nanmedian(path[:, known], axis=0)
     for j, joint in enumerate(joints):
         check = ChannelCheck(
             "derivative", "not checked", "rest", joint if len(joints) > 1 else "", channel, other=other

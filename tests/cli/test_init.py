@@ -119,7 +119,8 @@ def test_german_names_are_understood(tmp_path):
 
     time = np.arange(2000) / 500.0
     angle = np.sin(time)
-    rows = np.column_stack((time * 1e3, angle, np.cos(time), -np.sin(time) + 0.2 * np.cos(time), angle + 1e-6 * time))
+    moment = -np.sin(time) + 0.2 * np.sign(np.cos(time))  # a pure sine alone is a function of place and speed
+    rows = np.column_stack((time * 1e3, angle, np.cos(time), moment, angle + 1e-6 * time))
     log = tmp_path / "log.csv"
     header = "Zeit [ms],Istposition [rad],Geschwindigkeit [rad/s],Drehmoment [Nm],Sollposition [rad]"
     np.savetxt(log, rows, delimiter=",", header=header, comments="")

@@ -585,10 +585,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (
-        ChannelCheck("friction", "contradicts", "place", "", "torque", share=0.99973),
+        ChannelCheck("friction", "contradicts", "place", "", "torque", share=0.999997),
         (
-            "is a function of position and speed alone (99.97% of it), as no force of a drive is, not assessable: map "
-            "the drive's torque, force or current, or write confirmed = true under torque if it is right"
+            "is a function of position and speed alone (99.9997% of it), as no force of a drive is, not assessable: "
+            "map the drive's torque, force or current, or write confirmed = true under torque if it is right"
         ),
     ),
     (

@@ -11,7 +11,7 @@ from typing import Any
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.evaluation.results import Skipped
 from cdtool.files import write_text
-from cdtool.findings import Finding
+from cdtool.findings import Finding, worst_first
 from cdtool.findings.clocks import ClockUnitAssumed
 from cdtool.findings.plausibility import ChannelCheck
 from cdtool.findings.tables import UnreadCells
@@ -224,9 +224,12 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             agreed = {(item.channel, item.check) for item in checks if item.answer == "agrees"}
             turned = {item.channel for item in reverse}
             signs = [item for item in wrong if item.found in _REVERSED and item.channel not in turned]
-            others = {item.channel: item.seen for item in wrong if item.found in _ANOTHER or item.channel in turned}
+            others = {item.channel: item.seen for item in wrong if item.found in _ANOTHER}
+            others |= {item.channel: item.seen for item in wrong if item.found in _REVERSED and item.channel in turned}
             if not signs and not others:
-                return Drafted("", text, mapped, tuple(left_out), findings, draft.unmapped)
+                # What is left contradicts a placeholder, as a transmission ratio, or a unit that is marked.
+                found = [replace(item, severity="warning") if item.fact in wrong else item for item in findings]
+                return Drafted("", text, mapped, tuple(left_out), worst_first(found), draft.unmapped)
             # The sign of a channel is usually that of all its joints, also of those whose motion does not show it.
             reverse += [item if (item.channel, item.check) in agreed else replace(item, joint="") for item in signs]
             left_out |= others

@@ -113,7 +113,7 @@ def test_presses_correct_the_scale_of_the_torque_and_everything_that_depends_on_
 def test_a_torque_of_the_opposite_sign_is_named_and_nothing_is_written(axis: Path) -> None:
     machine = axis / "wrong.toml"
     machine.write_text(AXIS.replace('unit = "N" } # from', 'unit = "N", scale = -1 } # from'), encoding="utf-8")
-    with pytest.raises(IdentificationError, match="check the signs"):
+    with pytest.raises(IdentificationError, match="gives power to the machine"):
         cdtool.identify([axis / "free*.csv"], machine, axis / "never.toml")
     assert not (axis / "never.toml").exists()
 

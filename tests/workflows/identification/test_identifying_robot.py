@@ -141,13 +141,15 @@ def test_contacts_that_no_channel_shows_are_left_out(tmp_path: Path) -> None:
     assert changes["coulomb_friction"].values == pytest.approx((2.4, 1.8), abs=0.1)
 
 
-@pytest.mark.parametrize("wrong", ["sign", "order"])
-def test_channels_of_the_wrong_sign_or_order_give_one_line_and_nothing_is_written(tmp_path: Path, wrong: str) -> None:
+@pytest.mark.parametrize(
+    ("wrong", "seen"), [("sign", "of arm: gives power"), ("order", "of arm: follows the motion of forearm")]
+)
+def test_channels_of_the_wrong_sign_or_order_give_one_line(tmp_path: Path, wrong: str, seen: str) -> None:
     path = files(tmp_path, TRUE, ARM, [fourier(1, 2, 12.0, 0.01)])
     run = fourier(1, 2, 12.0, 0.01).run(TRUE)
     torque = -run.torque if wrong == "sign" else run.torque[:, ::-1]
     write_log(tmp_path / "run0.csv", replace(run, torque=torque))
-    with pytest.raises(IdentificationError, match="explain") as fault:
+    with pytest.raises(IdentificationError, match=seen) as fault:
         cdtool.identify([tmp_path / "run0.csv"], path, tmp_path / "identified.toml")
     assert "\n" not in str(fault.value)
     assert not (tmp_path / "identified.toml").exists()
