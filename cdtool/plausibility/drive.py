@@ -2,8 +2,8 @@
 
 tau = g(q) + sum_k m_k a_k + f sign(v) + d (|v| - mean |v|) sign(v) + sum_k f_k sign(v_k) over windows in motion: g is a
 polynomial of the positions (weight, springs), f the friction at the mean speed. All positions and accelerations stand
-for the coupling of a robot. Without motion in both directions g and f cannot be told apart:
-then f is the mean, and counts only together with the inertia that starts show.
+for the coupling of a robot. Without motion in both directions g and f cannot be told apart: then f is the mean, and
+counts only together with the inertia that starts show.
 """
 
 from __future__ import annotations
