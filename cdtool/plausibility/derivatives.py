@@ -54,7 +54,8 @@ def derivative_checks(recordings: Sequence[Recording], channel: str, other: str)
         )
         ratios = [_ratios(path[:, j], of_path[j], change[:, k], of_change[k]) for k in range(len(joints))]
         if len(ratios[j]) >= _FEWEST:
-            others = [name for name, found in zip(joints, ratios, strict=True) if _is_size(found) and name != joint]
+            fits = [_is_size(found) and _LEAST < float(np.median(found)) < _MOST for found in ratios]
+            others = [joints[k] for k in np.flatnonzero(fits).tolist() if k != j]
             check = _checked(check, ratios[j], others)
         yield Finding(check, channel, "loss" if check.answer == "contradicts" else "note")
 

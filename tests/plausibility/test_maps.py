@@ -175,3 +175,10 @@ def test_a_mass_or_scale_that_is_wrong_by_ten_is_found_by_the_starts(machine, na
     (wrong,) = [item for item in found if item.answer == "contradicts"]
     assert (wrong.channel, wrong.found) == ("torque", "inertia")
     assert wrong.value / wrong.expected == pytest.approx(factor, rel=0.3)
+
+
+@pytest.mark.parametrize("log", ["link4", "no_torque", "ur-static"])
+def test_a_real_robot_that_is_pushed_hardly_moves_or_holds_a_pose_contradicts_nothing(log):
+    machine_file = read_machine_file(ROOT / "sample_logs" / "ur10e" / "machine.toml")
+    found = checks([cdtool.read(ROOT / "sample_logs" / "ur10e" / f"{log}.csv.gz", machine_file)], machine_file)
+    assert not [item for item in found if item.answer == "contradicts"]
