@@ -15,7 +15,6 @@ _CONTRADICTIONS = {
         "gives power to the machine where friction takes it: at steady speed {value:.3g} {unit} against the motion",
         "reverse the sign of its scale",
     ),
-    "start": ("has the opposite sign of the force that the starts need", "reverse the sign of its scale"),
     "place": (
         "is a function of position and speed alone ({share:.4%} of it), as no force of a drive is",
         "map the drive's torque, force or current",
@@ -96,4 +95,5 @@ class ChannelCheck(Fact):
         if self.answer != "contradicts":
             return text
         cure = _CONTRADICTIONS[self.found][1].format(**vars(self))
-        return f"{text}, not assessable: {cure}, or write confirmed = true under {self.channel} if it is right"
+        confirm = f"or write confirmed = true under {self.channel} if it is right"
+        return f"{text}, not assessable: {cure}, {confirm}, and learn again"

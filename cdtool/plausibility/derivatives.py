@@ -87,7 +87,7 @@ def _checked(check: ChannelCheck, ratios: FloatArray, others: Sequence[str]) -> 
         between = units_apart(size, check.channel)
         text = f" (a factor as between {between})" if between else ""
         return replace(check, answer="contradicts", found="size", value=size, between=text)
-    if _is_size(-ratios) or (backward > 1.0 - _ODD and not others):
+    if _is_size(-ratios) or (check.channel == "acceleration" and backward > 1.0 - _ODD):
         return replace(check, answer="contradicts", found="sign", value=size)
     if others:
         return replace(check, answer="contradicts", found="joints", between=others[0])

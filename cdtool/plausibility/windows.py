@@ -78,8 +78,11 @@ def _windows(series: list[Series]) -> tuple[float, list[FloatArray]] | None:
 def _mean(series: Series, edges: FloatArray) -> FloatArray:
     """Return the mean of the known samples between each two edges, (w, J)."""
     known = np.isfinite(series.values)
+    values = series.values.copy()
+    for j in range(series.joint_count if series.unit == "rad" else 0):  # an angle may be logged within one turn
+        values[known[:, j], j] = np.unwrap(values[known[:, j], j])
     first = np.zeros((1, series.joint_count))
-    sums = np.concatenate((first, np.cumsum(np.where(known, series.values, 0.0), axis=0)))
+    sums = np.concatenate((first, np.cumsum(np.where(known, values, 0.0), axis=0)))
     counts = np.concatenate((first, np.cumsum(known, axis=0)))
     at = np.searchsorted(series.time, edges)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -574,35 +574,32 @@ SENTENCES: list[tuple[Fact, str]] = [
         ChannelCheck("friction", "contradicts", "friction", "", "torque", 152.0, "N"),
         (
             "gives power to the machine where friction takes it: at steady speed 152 N against the motion, not "
-            "assessable: reverse the sign of its scale, or write confirmed = true under torque if it is right"
-        ),
-    ),
-    (
-        ChannelCheck("friction", "contradicts", "start", "", "torque"),
-        (
-            "has the opposite sign of the force that the starts need, not assessable: reverse the sign of its scale, "
-            "or write confirmed = true under torque if it is right"
+            "assessable: reverse the sign of its scale, or write confirmed = true under torque if it is right, "
+            "and learn again"
         ),
     ),
     (
         ChannelCheck("friction", "contradicts", "place", "", "torque", share=0.999997),
         (
             "is a function of position and speed alone (99.9997% of it), as no force of a drive is, not assessable: "
-            "map the drive's torque, force or current, or write confirmed = true under torque if it is right"
+            "map the drive's torque, force or current, or write confirmed = true under torque if it is right, "
+            "and learn again"
         ),
     ),
     (
         ChannelCheck("friction", "contradicts", "other joint", "elbow", "torque", other="wrist"),
         (
             "of elbow: follows the motion of wrist and not its own, not assessable: put the columns in the order of "
-            "the joints, or write confirmed = true under torque if it is right"
+            "the joints, or write confirmed = true under torque if it is right, "
+            "and learn again"
         ),
     ),
     (
         ChannelCheck("inertia", "contradicts", "inertia", "", "torque", 62.0, "kg", 620.0),
         (
             "the starts show an inertia of 62 kg, the machine file has 620 kg, not assessable: correct mass, inertia, "
-            "transmission ratio or the scale of the torque, or write confirmed = true under torque if it is right"
+            "transmission ratio or the scale of the torque, or write confirmed = true under torque if it is right, "
+            "and learn again"
         ),
     ),
     (
@@ -627,28 +624,31 @@ SENTENCES: list[tuple[Fact, str]] = [
         (
             "is 57.3 times the derivative of the position (a factor as between deg and rad), not assessable: correct "
             "the unit of the speed, of the position or of the time, or write confirmed = true under speed if it is "
-            "right"
+            "right, and learn again"
         ),
     ),
     (
         ChannelCheck("derivative", "contradicts", "sign", "elbow", "acceleration", -1.0, other="speed"),
         (
             "of elbow: has the opposite sign of the derivative of the speed, not assessable: reverse the sign of its "
-            "scale, or write confirmed = true under acceleration if it is right"
+            "scale, or write confirmed = true under acceleration if it is right, "
+            "and learn again"
         ),
     ),
     (
         ChannelCheck("derivative", "contradicts", "course", "", "speed", share=0.43, other="position"),
         (
             "does not follow the derivative of the position: in 43% of the motion it has the opposite sign, not "
-            "assessable: map another column, or write confirmed = true under speed if it is right"
+            "assessable: map another column, or write confirmed = true under speed if it is right, "
+            "and learn again"
         ),
     ),
     (
         ChannelCheck("derivative", "contradicts", "joints", "elbow", "speed", other="position", between="wrist"),
         (
             "of elbow: follows the derivative of the position of another joint, wrist, not assessable: put the columns "
-            "in the order of the joints, or write confirmed = true under speed if it is right"
+            "in the order of the joints, or write confirmed = true under speed if it is right, "
+            "and learn again"
         ),
     ),
     (

@@ -128,9 +128,9 @@ WRONG = {
 }
 # Those that are certain to be found, where the machine's motion shows what is wrong.
 FOUND = {
-    "gate": {*WRONG} - {"load cell for drive", "current of another joint", "swapped joints"},
+    "gate": {*WRONG} - {"load cell for drive", "current of another joint", "swapped joints", "tool for position"},
     "arm": {"speed with the wrong sign", "acceleration with the wrong sign", "deg for rad", "mm for m",
-            "position for torque", "tool for torque", "speed for torque", "tool for position", "row number for time"},
+            "position for torque", "tool for torque", "speed for torque", "row number for time"},
     "emps": {"torque with the wrong sign", "position for torque", "tool for torque", "speed for torque"},
     "ur3": {"torque with the wrong sign", "speed with the wrong sign", "deg for rad", "mm for m", "position for torque",
             "speed for torque", "tool for position", "current of another joint", "swapped joints",
