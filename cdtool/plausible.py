@@ -137,8 +137,8 @@ class PlausibleRanges:
 
     def contradicted_by(self, checks: Iterable[Finding]) -> PlausibleRanges:
         """Return the ranges with the checks that are contradictions."""
-        facts = (item.fact for item in checks if isinstance(item.fact, ChannelCheck))
-        return replace(self, contradicted=tuple(fact for fact in facts if fact.answer == "contradicts"))
+        lost = (item.fact for item in checks if item.severity == "loss")
+        return replace(self, contradicted=tuple(fact for fact in lost if isinstance(fact, ChannelCheck)))
 
     def without_contradicted(self, recording: Recording) -> Recording:
         """Return the recording without values of the channels that a check contradicts, and a loss for each."""

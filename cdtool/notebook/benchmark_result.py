@@ -63,7 +63,7 @@ class BenchmarkResult(NearAttributes):
     >>> import cdtool
     >>> result = cdtool.benchmark("sample_logs/gate/benchmark.toml", detectors=["momentum"])
     >>> result.headline
-    'all 9 limits are met; 4 of 8 limits not checked (pure_inertia, friction_ekf not run)'
+    '4 of 8 limits not checked (pure_inertia, friction_ekf not run); all 9 limits are met'
     >>> result.contacts.groupby("group", observed=True).latency_ms.median().round().astype(int).to_dict()
     {'stiff': 63, 'soft': 119}
     >>> result.summary().loc[("stiff", "momentum"), ["detected", "missed"]].tolist()

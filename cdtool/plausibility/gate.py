@@ -7,6 +7,7 @@ detector may use the channel until the machine file is corrected, or confirms it
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from cdtool.dynamics import Machine
 from cdtool.findings import Finding
@@ -42,6 +43,9 @@ def check_channels(recordings: Sequence[Recording], machine: Machine) -> tuple[F
     ('speed', 'agrees')
     """
     found = derivatives(recordings)
+    if getattr(machine, "ratio_unit", "") == "m/rad" and 1.0 in getattr(machine, "transmission_ratio", ()):
+        # The placeholder of a draft is a factor between motor and accelerometer: that is said of the ratio.
+        found = [replace(item, severity="note") if item.channel == "acceleration" else item for item in found]
     if any(item.severity == "loss" and item.channel == "speed" for item in found):
         return tuple(found)  # by such a speed nothing can be said of a torque
     return (*found, *drive_checks(_with("torque", recordings), machine))

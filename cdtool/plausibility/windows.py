@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdtool.recording import FloatArray, Recording, Series
+from cdtool.short_repr import short_repr
 
 # A window has the first number of samples of the slowest channel and lasts 0.05 s, or the next share of a log that is
 # short, or whose clock has the wrong unit; a log has at most the last number of windows.
@@ -26,6 +27,8 @@ class Windows:
     length: FloatArray
     log: FloatArray
     means: dict[str, FloatArray]
+
+    __repr__ = short_repr
 
     def changes(self, channel: str, *, integrated: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return the change of a channel, or of its integral, over four windows (k, J), and its noise (J,)."""

@@ -89,7 +89,7 @@ def coverage(
     >>> import cdtool
     >>> done = cdtool.coverage("sample_logs/gate/inject.toml", detectors=["gm"])
     >>> done.map.positions, sorted(done.map.cells)
-    ((0.9, 1.0), ['momentum'])
+    ((0.99, 1.04), ['momentum'])
     """
     workers = workers or Workers()
     setup = read_benchmark_file(file)

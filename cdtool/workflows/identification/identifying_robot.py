@@ -35,6 +35,7 @@ from cdtool.machines.kinematic_tree import KinematicTree
 from cdtool.machines.urdf_robot import UrdfRobot
 from cdtool.recording import FloatArray, Recording
 from cdtool.remote.remote_path import joined
+from cdtool.short_repr import short_repr
 
 # A joint of whose torque the best model explains less than this share has a wrong channel, or the robot a wrong URDF.
 _EXPLAINED = 0.5
@@ -102,6 +103,8 @@ class RobotIdentification:
     repeated: RepeatedRuns
     unexplained_share: float
     urdf: str = ""
+
+    __repr__ = short_repr
 
     @property
     def summary(self) -> dict[str, Any]:
