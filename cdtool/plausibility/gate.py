@@ -44,7 +44,7 @@ def check_channels(recordings: Sequence[Recording], machine: Machine) -> tuple[F
     """
     found = derivatives(recordings)
     if getattr(machine, "ratio_unit", "") == "m/rad" and 1.0 in getattr(machine, "transmission_ratio", ()):
-        # The placeholder of a draft is a factor between motor and accelerometer: that is said of the ratio.
+        # The placeholder of a draft is a factor between motor and accelerometer: a warning names the ratio.
         found = [replace(item, severity="note") if item.channel == "acceleration" else item for item in found]
     if any(item.severity == "loss" and item.channel == "speed" for item in found):
         return tuple(found)  # by such a speed nothing can be said of a torque
