@@ -185,7 +185,7 @@ def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Terms:
         kept = rest <= np.quantile(rest, _KEPT)
     scores = scaled[kept] * (torque - scaled @ value)[kept, np.newaxis]
     blocks = np.add.reduceat(scores, np.arange(0, len(scores), _BLOCK), axis=0)
-    error = np.sqrt(np.diag(inverse @ (blocks.T @ blocks) @ inverse))
+    error = np.sqrt(np.maximum(np.diag(inverse @ (blocks.T @ blocks) @ inverse), 0.0))  # rounding may be below 0
     # What the other columns leave of a column is 1 / (X'X)^-1_kk of its own sum of squares.
     alone = 1.0 / np.maximum(np.diag(inverse) * np.sum(scaled[kept] ** 2, axis=0), 1.0)
     sure = np.where(alone > _OWN, value / np.maximum(error, np.finfo(float).tiny), 0.0)
