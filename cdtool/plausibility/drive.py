@@ -176,7 +176,8 @@ def _place(position: FloatArray, known: BoolArray, j: int, powers: Sequence[int]
 
 def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Terms:
     """Return the coefficients by least squares without the worst windows, with errors by blocks of windows."""
-    scale = np.maximum(np.sqrt(np.mean(table**2, axis=0)), np.finfo(float).tiny)
+    scale = np.sqrt(np.mean(table**2, axis=0))
+    scale[scale == 0.0] = 1.0
     scaled, kept = table / scale, np.ones(len(torque), dtype=bool)
     for _ in range(3):
         inverse = np.linalg.pinv(scaled[kept].T @ scaled[kept])
@@ -188,7 +189,7 @@ def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Terms:
     error = np.sqrt(np.maximum(np.diag(inverse @ (blocks.T @ blocks) @ inverse), 0.0))  # rounding may be below 0
     # What the other columns leave of a column is 1 / (X'X)^-1_kk of its own sum of squares.
     alone = 1.0 / np.maximum(np.diag(inverse) * np.sum(scaled[kept] ** 2, axis=0), 1.0)
-    sure = np.where(alone > _OWN, value / np.maximum(error, np.finfo(float).tiny), 0.0)
+    sure = np.where(alone > _OWN, value / np.maximum(error, 1e-12 * np.abs(value) + np.finfo(float).tiny), 0.0)
     spread = np.std(torque[kept]) or np.inf
     shares = value * np.std(scaled[kept], axis=0) / spread
     shares[0] = value[0] / spread  # its own column may be constant
