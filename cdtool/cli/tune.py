@@ -120,7 +120,7 @@ def tune(
         _show(done, quiet=quiet)
         for path in () if quiet else written:
             typer.echo(f"written: {plain(path)}")
-    leave(left_out)
+    leave(left_out, done.findings)
 
 
 def _watch(detector: str, count: int, best: str) -> None:

@@ -176,8 +176,7 @@ def _place(position: FloatArray, known: BoolArray, j: int, powers: Sequence[int]
 
 def _fit(table: FloatArray, torque: FloatArray, names: list[str]) -> _Terms:
     """Return the coefficients by least squares without the worst windows, with errors by blocks of windows."""
-    scale = np.sqrt(np.mean(table**2, axis=0))
-    scale[scale == 0.0] = 1.0
+    scale = np.sqrt(np.where(table.any(axis=0), np.mean(table**2, axis=0), 1.0))
     scaled, kept = table / scale, np.ones(len(torque), dtype=bool)
     for _ in range(3):
         inverse = np.linalg.pinv(scaled[kept].T @ scaled[kept])

@@ -34,7 +34,15 @@ from cdtool.workflows.contacts.matched_log import DetectedLog, match_log
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.detection_options import DetectionOptions
-from cdtool.workflows.runs import absent_truth, check_joints, named_on_load_side, read_named, reported, shown_path
+from cdtool.workflows.runs import (
+    absent_truth,
+    check_joints,
+    named_on_load_side,
+    read_named,
+    reported,
+    shown_path,
+    without_contradicted,
+)
 
 if TYPE_CHECKING:
     from cdtool.workflows.benchmark.prepared_detector import PreparedBenchmark
@@ -267,6 +275,8 @@ class _OneDetector:
     def detect(self, whole: Recording) -> Detected:
         """Return the result for a recording, or for the section of it; raises RecordingError."""
         rules, machine = self.rules, self.machine_file.machine
+        if self.ranges and not self.ranges.contradicted:  # the machine file may have changed since it was learned
+            whole = without_contradicted(whole, machine, rules.onset)
         recording = self.section.of(whole)
         parts = operations_of(recording, self.operations)
         hold = max(HOLD, rules.window)

@@ -103,7 +103,8 @@ def read_named(
     contradict the mechanics of the machine have no values: in what `ranges` were learned from, else in this log.
     """
     recording = replace(read_log(path, machine_file, ranges), name=shown_path(path, base))
-    return _checked(with_scalar_force(recording, onset or OnsetRule()), machine_file.machine, ranges, onset)
+    recording = with_scalar_force(recording, onset or OnsetRule())
+    return recording if ranges else without_contradicted(recording, machine_file.machine, onset)
 
 
 def named_on_load_side(
@@ -116,14 +117,12 @@ def named_on_load_side(
 ) -> Recording:
     """Return what `read_named` returns, of a log or run that has been read."""
     recording = replace(logged.on_load_side(machine_file.machine, ranges), name=shown_path(path, base))
-    return _checked(with_scalar_force(recording, onset), machine_file.machine, ranges, onset)
+    recording = with_scalar_force(recording, onset)
+    return recording if ranges else without_contradicted(recording, machine_file.machine, onset)
 
 
-def _checked(
-    recording: Recording, machine: Machine, ranges: PlausibleRanges | None, onset: OnsetRule | None
-) -> Recording:
-    if ranges is not None:
-        return recording
+def without_contradicted(recording: Recording, machine: Machine, onset: OnsetRule | None) -> Recording:
+    """Return the recording without values of channels that the part before its first contact contradicts."""
     free = before_contact(recording, contacts_shown(recording, onset or OnsetRule()))
     return PlausibleRanges({}).contradicted_by(check_channels([free], machine)).without_contradicted(recording)
 

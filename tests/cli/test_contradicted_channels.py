@@ -27,7 +27,10 @@ def test_every_command_says_it_and_none_judges_by_it(gate_folder, reversed_torqu
     assert info.status == 3 and f"loss: {SAID}" in info.out and "confirmed = true under torque" in info.out
     learned = cdtool("learn-signature", *free, *machine, "-d", "gm", "-o", tmp_path / "gm.json")
     assert learned.status == 3 and f"loss: reversed.toml: {SAID}" in learned.err
-    for options in (("--signature", tmp_path / "gm.json"), ("-d", "pt", "--limit", "900")):
+    right = ("-m", gate_folder / "machine.toml", "-d", "gm", "-o", tmp_path / "right.json")
+    assert cdtool("learn-signature", *free, *right).status == 0
+    signatures = [("--signature", tmp_path / name) for name in ("gm.json", "right.json")]
+    for options in (*signatures, ("-d", "pt", "--limit", "900")):
         done = cdtool("detect", hit, *machine, *options, "--json")
         (values,) = json.loads(done.out)
         assert done.status == 3 and SAID in done.err
