@@ -33,6 +33,7 @@ _CONTRADICTIONS = {
         "does not follow the derivative of the {other}: in {share:.0%} of the motion it has the opposite sign",
         "map another column",
     ),
+    "still": ("is not zero where the {other} rests: {share:.0%} of its motion", "map another column"),
     "joints": (
         "follows the derivative of the {other} of another joint, {between}",
         "put the columns in the order of the joints",

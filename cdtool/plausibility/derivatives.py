@@ -18,6 +18,8 @@ _LARGE, _ABOVE_NOISE = 0.2, 3.0
 # At least so many changes. All but this share of them have the same sign if the channels are related; of unrelated ones
 # more than the second share have either. The size is sure if half of them lie within this share of it.
 _FEWEST, _ODD, _EITHER, _SPREAD = 12, 0.1, 0.25, 0.3
+# A change below this share of what the speed says is none.
+_STILL = 0.1
 # A size that is right: filters, jitter and an elastic drive change it by less; and the next unit is further away.
 _LEAST, _MOST = 0.7, 1.4
 # A factor between two units is named if it is within this share: noise and filters change that of an accelerometer.
@@ -57,6 +59,12 @@ def derivative_checks(recordings: Sequence[Recording], channel: str, other: str)
             fits = [_is_size(found) and _LEAST < float(np.median(found)) < _MOST for found in ratios]
             others = [joints[k] for k in np.flatnonzero(fits).tolist() if k != j]
             check = _checked(check, ratios[j], others)
+            if check.answer == "agrees" and channel == "speed":
+                expected = np.abs(path[:, j]) / check.value
+                seen = expected > max(_LARGE * float(np.nanquantile(expected, 0.95)), _ABOVE_NOISE * of_change[j])
+                still = float(np.mean(np.abs(change[seen, j]) < _STILL * expected[seen]))
+                if still > _ODD:  # no ratio shows it: where the position rests there is none
+                    check = replace(check, answer="contradicts", found="still", share=still)
         yield Finding(check, channel, "loss" if check.answer == "contradicts" else "note")
 
 

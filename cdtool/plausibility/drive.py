@@ -105,12 +105,12 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
     fit = _fit(table[used], torque[used], list(columns))
     friction, inertia = _sure(fit, "friction"), _sure(fit, f"inertia {j}", _INERTIA)
     check = replace(check, found="unclear", value=abs(fit.value["friction"]), unit=machine.force_unit)
-    share = _explained(np.column_stack([place, speed[:, j]])[known], torque[known])
+    share = explained(np.column_stack([place, speed[:, j]])[known], torque[known])
     # In a sine the inertia's force is a function of the place, too.
     rate = windows.rate("speed")[:, j]
     swings = known & np.isfinite(rate)
-    is_sine = _explained(place[swings], rate[swings]) > _SINE
-    if not is_sine and (share > _EXACT or _explained(place[known], torque[known]) > _PLACE):
+    is_sine = explained(place[swings], rate[swings]) > _SINE
+    if not is_sine and (share > _EXACT or explained(place[known], torque[known]) > _PLACE):
         yield replace(check, answer="contradicts", found="place", share=share)
     elif not both and (machine.coupled or friction != inertia):
         yield replace(check, found="one direction")
@@ -140,7 +140,7 @@ def _follows(fit: _Terms, k: int) -> bool:
     return _sure(fit, f"friction {k}", _OF_OTHER) > 0 and abs(fit.share["friction"]) < 0.2 * other
 
 
-def _explained(motion: FloatArray, torque: FloatArray) -> float:
+def explained(motion: FloatArray, torque: FloatArray) -> float:
     """Return the share of a torque (w,) that positions and a speed (w, p) explain; 0 with few windows."""
     used = np.isfinite(motion).all(axis=1)
     if np.count_nonzero(used) < _TO_EXPLAIN * motion.shape[1]:

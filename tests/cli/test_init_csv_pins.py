@@ -15,9 +15,9 @@ LOGS = Path(__file__).parents[2] / "sample_logs"
 @pytest.fixture
 def glued(tmp_path):
     """A table whose last name contains separators: more names than cells."""
-    rows = "".join(f"{10 * i},{0.1 * i:.1f},{i % 7}.5\n" for i in range(60))
+    rows = "".join(f"{10 * i},{0.01 * i * i:.2f},{2 * i}.0\n" for i in range(60))
     path = tmp_path / "glued.txt"
-    path.write_text("Time (ms),Position (mm),Current (A):Kp=0.1,Kd=0\n" + rows, encoding="utf-8")
+    path.write_text("Time (ms),Position (mm),Speed (mm/s):Kp=0.1,Kd=0\n" + rows, encoding="utf-8")
     return path
 
 

@@ -74,6 +74,14 @@ def test_a_wrong_sign_unit_or_clock_is_found_with_its_factor(factors, channel, f
     assert check.value == pytest.approx(size, rel=0.1)
 
 
+def test_a_coordinate_of_a_tool_is_no_speed_although_it_follows_one():
+    """On a circle at constant speed x is proportional to dy/dt, but at rest it is not zero."""
+    angle = np.clip(0.4 * (TIME - 1.0), 0.0, 1.2)[:, np.newaxis]
+    channels = {"position": Series(TIME, np.sin(angle), "m"), "speed": Series(TIME, 0.4 * np.cos(angle), "m/s")}
+    tool = Recording("arm", "arm.csv", ("axis",), channels)
+    assert contradictions(tool)["speed", ""].found == "still"
+
+
 def test_a_channel_that_the_machine_file_confirms_is_not_checked():
     wrong = stroke(speed=-1.0)
     confirmed = replace(wrong, findings=(Finding(Confirmed(), "speed", "note"),))

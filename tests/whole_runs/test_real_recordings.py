@@ -99,33 +99,22 @@ def test_a_missing_inertia_is_reported_by_the_detector_that_needs_it():
 
 @needs_data("ur_collisions/onsets.csv")
 @pytest.mark.parametrize("stated", [True, False], ids=["uncertainty stated", "uncertainty not stated"])
-def test_all_collisions_of_a_jittering_arm_are_found(tmp_path, stated):
-    """Labels between two samples: an alarm of the sample just before one is that of its contact."""
+def test_all_collisions_of_a_jittering_arm_are_found_with_three_edits_of_a_draft(tmp_path, stated):
+    """Labels between two samples: an alarm of the sample just before one is that of its contact.
+
+    The labels are there before the draft, which keeps them; the other edits are those that it names.
+    """
     folder = DATA / "ur_collisions"
     rows = (folder / "onsets.csv").read_text(encoding="utf-8").splitlines()
     kept = rows if stated else [row.rpartition(",")[0] for row in rows]
     (tmp_path / "labels.csv").write_text("\n".join(kept) + "\n", encoding="utf-8")
-    (tmp_path / "machine.toml").write_text(
-        """
-[machine]
-type = "rotary_axis"
-name = "base of a UR arm"
-joints = ["base"]
-coordinates = "load"
-load_inertia = 0.0
-[channels]
-time = { column = 0, unit = "ms" }
-position = { column = 1, unit = "deg" }
-torque = { column = 13, unit = "A", scale = 1.0 }
-""",
-        encoding="utf-8",
+    cdtool.init_study(sorted(folder.glob("Drift*.csv")), tmp_path)
+    file = tmp_path / "benchmark.toml"
+    edited = file.read_text(encoding="utf-8").replace('# operations = "motion"', 'operations = "motion"')
+    edited = edited.replace('# from = "0.5s"', 'from = "0.5s"').replace(
+        "[impacts.Drift]", '[impacts.Drift]\nfrom = "0.5s"'
     )
-    logs = f'from = "0.5s"\nlogs = ["{folder.as_posix()}/Drift*.csv"]'
-    (tmp_path / "benchmark.toml").write_text(
-        'machine = "machine.toml"\ndetectors = ["pt"]\nthreshold = "limit"\noperations = "motion"\n'
-        f'[learn]\nuntil = "onset"\n{logs}\n[impacts.drift]\n{logs}\n[onset]\nlabels = "labels.csv"\n',
-        encoding="utf-8",
-    )
-    result = cdtool.benchmark(tmp_path / "benchmark.toml")
+    file.write_text(edited, encoding="utf-8")
+    result = cdtool.benchmark(file)
     assert list(result.contacts.outcome) == ["detected"] * 16 and len(result.false_alarms) == 0
     assert result.contacts.clipped.sum() == 3

@@ -196,9 +196,11 @@ def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_po
             "# and each log is scored with what was learned from the others.",
             'threshold = "limit"',
             '# Or, without learning: threshold = "baseline"',
+            '# operations = "motion"  # alarms while the machine rests do not count',
             "",
             "[learn]",
             'until = "onset"',
+            '# from = "0.5s"  # without the beginning of each log, here and under [impacts.NAME]',
             f"logs = {_paths(both, folder)}",
         ]
     return [f"{why} Limits are those of each run's own first seconds in motion.", 'threshold = "baseline"']

@@ -10,7 +10,7 @@ from cdtool.recording import CONTACT_PRESSURE, MEASURED
 from cdtool.units import find_unit
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.certainty import add_doubts
-from cdtool.workflows.init.column_blocks import find_blocks
+from cdtool.workflows.init.column_blocks import Blocks, find_angle, find_blocks, find_efforts
 from cdtool.workflows.init.quantity_words import (
     contact_pressure_word,
     is_actual,
@@ -35,6 +35,8 @@ _FITS, _FITS_UNNAMED = 0.9, 0.98
 # Minimum share of a drive column's variance that inertia and friction explain; and of one whose name is a letter.
 _DRIVES, _DRIVES_BY_LETTER = 0.6, 0.3
 _MOST_UNNAMED = 48
+# From this number of joints on related blocks are better evidence than the circle of a tool.
+_ROBOT = 3
 _MOST_PAIRS = 32
 # Above these correlations one stream is treated as another's set value; the second if its name agrees.
 _FOLLOWS, _FOLLOWS_BY_NAME = 0.97, 0.4
@@ -139,9 +141,17 @@ def _unnamed(streams: list[Stream]) -> bool:
 
 def _by_place(channels: Channels) -> None:
     """Guess from columns without names: blocks of J columns that are related as positions, speeds and efforts."""
-    found = find_blocks(channels.free[:_MOST_UNNAMED])
-    if found is None:
-        return
+    streams = channels.free[:_MOST_UNNAMED]
+    found, angle = find_blocks(streams), find_angle(streams)
+    if angle is not None and (found is None or found.joints < _ROBOT):
+        _by_circle(channels, *angle)
+    elif found is not None:
+        _by_blocks(channels, found)
+    if angle is not None or (found is not None and found.joints > 1):
+        channels.free = []  # other columns without names are not guessed
+
+
+def _by_blocks(channels: Channels, found: Blocks) -> None:
     channels.joints = found.joints
     fit = f"r = {found.correlation:.3f}"
     reasons = {
@@ -152,8 +162,15 @@ def _by_place(channels: Channels) -> None:
     for channel, stream in found.streams.items():
         why = reasons.get(channel, f"the same course as the {channel.removeprefix('reference_')}, and not behind it")
         channels.take(channel, stream, why, _BY_COURSE)
-    if found.joints > 1:
-        channels.free = []  # other columns without names are not guessed
+
+
+def _by_circle(channels: Channels, position: Stream, places: tuple[Stream, ...]) -> None:
+    """Guess an angle by the coordinates that move on its circle, and the first column that moves like its drive."""
+    circle = " and ".join(place.name for place in places[:2])
+    channels.take("position", position, f"columns {circle} move on a circle of this angle", _BY_COURSE)
+    if efforts := find_efforts(channels.free[:_MOST_UNNAMED], position, _derived(position)):
+        others = "".join(f"; or column {other.name}?" for other in efforts[1:3])
+        channels.take("torque", efforts[0], "moves like the force of a drive", _BY_COURSE + others)
 
 
 def _motion_by_name(channels: Channels) -> None:
@@ -377,13 +394,14 @@ def _ground_truth(channels: Channels) -> None:
         )
         channels.take("force", chosen[2], _TOLD_UNIT if chosen[1] == _TOLD_UNIT else f"name ({chosen[1]})")
     elif "force" not in channels.found:
-        for stream in singles:
-            if _is_other("force", stream) or side_of_gear(stream.name) or channels.is_of_family(stream):
-                continue
-            if not motion.rests_and_peaks(stream):
-                continue
-            channels.take("force", stream, "constant level with short, high peaks", _BY_COURSE)
-            break
+        peaking = [
+            stream
+            for stream in singles
+            if not (_is_other("force", stream) or side_of_gear(stream.name) or channels.is_of_family(stream))
+            and motion.rests_and_peaks(stream)
+        ]
+        if len(peaking) == 1:  # of several, none can be told to be the load cell
+            channels.take("force", peaking[0], "constant level with short, high peaks", _BY_COURSE)
     questions = {
         "label": "is it that of the test, not the alarm of the controller?",
         "trigger": "is it high during each operation?",

@@ -1,16 +1,26 @@
-"""Guess the channels of a table without names: blocks of J columns, one per joint, related by derivatives."""
+"""Guess the channels of a table without names: blocks of J columns, one per joint, related by derivatives.
+
+Without speeds, an angle is known by the circle on which it moves a tool.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdtool.plausibility.drive import explained
 from cdtool.recording import FloatArray
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.streams import Stream, joined
 
 _FITS, _ALIKE = 0.9, 0.97
+# A single pair must fit better: of a tool on a circle one coordinate is nearly the derivative of the other.
+_FITS_ALONE = 0.98
+# A circle leaves at most this share of what a parabola leaves of a coordinate.
+_CIRCLE = 0.01
+# A column is a function of the place above this share. Friction and inertia change an effort by more than this share.
+_PLACE, _CHANGES = 0.9, 0.05
 # Share of an effort that inertia, friction and weight must explain.
 _DRIVES = 0.6
 # A block directly behind the speeds is preferred unless another one is explained better by this much.
@@ -75,6 +85,40 @@ def find_blocks(streams: list[Stream]) -> Blocks | None:
     return Blocks(joints, found, correlation, explained)
 
 
+def find_angle(streams: list[Stream]) -> tuple[Stream, tuple[Stream, ...]] | None:
+    """Return the column that is an angle in degrees, and the columns that are coordinates on its circle; None without.
+
+    x = c + r cos(q + phi): the first column q of which two others are such functions.
+    """
+    moving = [stream for stream in streams if stream.moves]
+    for angle in moving:
+        q = angle.values
+        circle, parabola = np.hstack([np.cos(np.radians(q)), np.sin(np.radians(q))]), np.hstack([q, q**2])
+        left = {
+            other.name: [1.0 - explained(columns, other.values[:, 0]) for columns in (circle, parabola)]
+            for other in moving
+            if other is not angle
+        }
+        places = tuple(
+            other for other in moving if other is not angle and left[other.name][0] < _CIRCLE * left[other.name][1]
+        )
+        if len(places) > 1:
+            return replace(angle, unit="deg"), places
+    return None
+
+
+def find_efforts(streams: list[Stream], position: Stream, speed: Stream) -> list[Stream]:
+    """Return the columns that inertia and friction explain, but the place alone does not."""
+    place = np.hstack([position.values**power for power in (1, 2, 3)])
+    return [
+        other
+        for other in streams
+        if np.nanmax(np.abs(other.values)) * _CHANGES < np.ptp(other.values)
+        and explained(place, other.values[:, 0]) < _PLACE
+        and motion.drive_fit(other, speed) > _DRIVES
+    ]
+
+
 def _fits(streams: list[Stream]) -> FloatArray:
     """Return the correlation of each column with the integral of each other; NaN where one does not move."""
     fits = np.full((len(streams), len(streams)), np.nan)
@@ -107,7 +151,8 @@ def _pairs(fits: FloatArray, joints: int) -> list[tuple[int, int, float]]:
                 continue
             known = np.array([fits[first + j, speed + j] for j in range(joints)])
             known = known[np.isfinite(known)]
-            if len(known) >= max(1, (joints + 1) // 2) and known.min() > _FITS:
+            least = _FITS if joints > 1 else _FITS_ALONE
+            if len(known) >= max(1, (joints + 1) // 2) and known.min() > least:
                 found.append((first, speed, float(np.median(known))))
     return found
 

@@ -41,7 +41,7 @@ from cdtool.workflows.runs import several_logs
 # Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
 _SLOWEST = 2.0
 # Contradictions that a change of sign cures, and those of a channel that is another quantity.
-_REVERSED, _ANOTHER = ("friction", "sign"), ("place", "course", "joints", "other joint")
+_REVERSED, _ANOTHER = ("friction", "sign"), ("place", "course", "still", "joints", "other joint")
 # So many words in columns of numbers may stand for missing values.
 _MOST_WORDS = 4
 

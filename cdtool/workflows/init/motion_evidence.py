@@ -23,6 +23,8 @@ _CONTRADICTS = 0.2
 # Inertia and friction explain at least this share of what weight and springs leave of an effort; of the coordinates of
 # a tool less than 0.35, by chance.
 _OF_MOTION = 0.4
+# A speed varies by more than this share of its largest value: it starts, ends or turns round.
+_VARIES = 0.5
 # Share of the windows that may contain impacts.
 _IMPACTS = 0.25
 
@@ -205,9 +207,9 @@ def rests_and_peaks(stream: Stream) -> bool:
 
 
 def stirs(position: Stream, speed: Stream) -> bool:
-    """Whether a joint moves; values of a joint at rest are noise."""
-    way = float(np.ptp(np.nan_to_num(position.values)))
-    return way > 0.01 and bool(np.ptp(np.nan_to_num(speed.values)))
+    """Whether a joint moves and its speed varies; values of a joint at rest are noise, and all constants fit."""
+    way, rate = (np.nan_to_num(stream.values) for stream in (position, speed))
+    return bool(np.ptp(way) > 0.01 and np.ptp(rate) > _VARIES * np.max(np.abs(rate)))
 
 
 def _fit(ways: FloatArray, places: FloatArray, *, centred: bool = False) -> Fit:

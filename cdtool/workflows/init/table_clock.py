@@ -76,7 +76,10 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     jitter = float(np.median(np.abs(steps - step))) / abs(step) if step else 0.0
     assumed, taken_off = _assumed(column, found)
     unit = min(_UNITS, key=lambda name: abs(np.log(assumed / seconds(name))))
-    clock = TableClock(found.column, step, assumed, unit, "", is_counter(found.column), jitter=jitter)
+    # Numbers that rise by one without a name are those of the rows; the rate follows from position and speed.
+    is_row = not re.search(r"[^\W\d_]", found.column) and bool((steps == 1.0).all())
+    counts = is_counter(found.column) or is_row
+    clock = TableClock(found.column, step, assumed, unit, "", counts, jitter=jitter)
     stated = find_unit(column.unit) if column.unit else None
     against = ""
     if stated is not None and stated.si == "s" and contradicted_by_epoch(float(values[0]), stated.factor):

@@ -81,6 +81,8 @@ class Evidence:
         return quantity == "torque" and is_current(names[0]) != is_current(names[1])
 
     def _told(self, channel: str, unit: str, si: str, accepted: tuple[str, ...]) -> Logged:
+        if self.channels.found[channel].stream.name.isdigit():  # a table without names states no unit
+            return Logged(unit, "by the circle")
         if si in accepted:
             weight = "a mass: is it its weight, 1 kg = 9.81 N?" if _MASS.search(unit) else ""
             return Logged(unit, "stated in the log", check=weight or self._contradicted(channel))
