@@ -70,7 +70,8 @@ class ChannelSource:
     """Source of one channel, and its conversion to SI: value * factor [unit]; `stated`: the log's unit.
 
     In the log's unit: the sensor saturates at the ends of `valid_range` and cannot measure below `least` or above
-    `most`. `unit_confirmed`: the unit is `stated`, whatever the header says. `confirmed`: the channel is right,
+    `most`. `unit_confirmed`: the unit is `stated`, whatever the header says; False: it is a guess; None: the header
+    decides. `confirmed`: the channel is right,
     whatever the mechanics of the machine say. `keys` are the columns by their names in the file, once these are known
     (resolve_columns). `words`: the column may contain texts, which are read as categories.
 
@@ -98,7 +99,7 @@ class ChannelSource:
     own_file: OwnFile | None = None
     kinds: tuple[tuple[float, str], ...] = ()
     words: bool = False
-    unit_confirmed: bool = False
+    unit_confirmed: bool | None = None
     confirmed: bool = False
 
     __repr__ = short_repr
@@ -303,7 +304,9 @@ def _source(
         direction=_direction(table, count) if channel == "force" and "direction" in table else (),
         own_file=own_file,
         kinds=_kinds(table) if channel == "label" and "kinds" in table else (),
-        unit_confirmed=channel not in UNITLESS and table.flag("unit_confirmed", False),
+        unit_confirmed=table.flag("unit_confirmed", False)
+        if channel not in UNITLESS and "unit_confirmed" in table
+        else None,
         confirmed=channel in CHECKED and table.flag("confirmed", False),
     )
     table.finish()

@@ -450,15 +450,7 @@ def missing_after_first(missing: BoolArray) -> BoolArray:
     >>> missing_after_first(np.array([[True], [False], [True]]))[:, 0].tolist()
     [False, False, True]
     """
-    if not missing.any():
-        return missing
-    result = np.empty(missing.shape, dtype=np.bool_)
-    for j in range(missing.shape[1]):
-        # The first sample: argmin returns the first of the smallest, False.
-        first = int(np.argmin(missing[:, j]))
-        result[:, j] = missing[:, j]
-        result[: len(missing) if missing[first, j] else first, j] = False
-    return result
+    return missing & np.logical_or.accumulate(~missing, axis=0)
 
 
 def for_every_joint(missing: BoolArray) -> BoolArray:

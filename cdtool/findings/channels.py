@@ -171,11 +171,13 @@ class UnitContradicted(Fact):
     more: int
     stated: str
     ratio: float
-    advice: Literal["unit", "unit and scale", "unit without scale", "other column", "no unit"]
+    advice: Literal["unit", "unit and scale", "unit without scale", "other column", "no unit", "confirm"]
     scale: str = ""
 
     def sentence(self) -> str:
         """Return both units, and what to write if the header is right."""
+        if self.advice == "confirm":
+            return f"the log does not say that it is in {self.stated}: write unit_confirmed = true if it is"
         more = f" and {self.more} more so" if self.more else ""
         ratio = f" (a factor of {self.ratio:.4g})" if self.ratio else ""
         text = f"the header says '{self.header}'{more}, the machine file {self.stated}{ratio}"

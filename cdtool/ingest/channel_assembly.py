@@ -34,7 +34,7 @@ from cdtool.findings.channels import (
 from cdtool.findings.clocks import ClocksApart, LowerRate
 from cdtool.findings.plausibility import Confirmed
 from cdtool.formats.source import Source
-from cdtool.ingest.header_units import check_clock_unit, time_unit_findings, unit_findings
+from cdtool.ingest.header_units import check_clock_unit, guessed_units, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
 from cdtool.log_names import log_stem
 from cdtool.plausible import IMPOSSIBLE
@@ -134,7 +134,7 @@ class _Assembly:
         self.channels = channels
         self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
         self.origin = source.origin
-        self.findings: list[Finding] = []
+        self.findings = guessed_units(channels)
         self.table: CleanTime | None = None
         self.clock: Series | None = None  # the table's times, which its channels share
         self._topic_clocks: dict[tuple[int, bool], _TopicClock] = {}  # by the identity of the stamps

@@ -48,6 +48,19 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
     return findings
 
 
+def guessed_units(channels: ChannelMap) -> list[Finding]:
+    """Return a note for a force whose unit the machine file itself does not confirm; of a pressure a loss."""
+    return [
+        Finding(
+            UnitContradicted("", "", 0, item.stated or "", 0.0, "confirm"),
+            item.channel,
+            "loss" if item.channel == CONTACT_PRESSURE else "note",
+        )
+        for item in channels.sources
+        if item.unit_confirmed is False and item.channel in RIG_UNITS
+    ]
+
+
 def channel_unit_findings(item: ChannelSource, columns: Sequence[Column]) -> list[Finding]:
     """Return the findings of one channel, one per contradicting unit; `columns` are those of its joints."""
     stated = find_unit(item.stated) if item.stated else None

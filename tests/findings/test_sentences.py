@@ -544,6 +544,10 @@ SENTENCES: list[tuple[Fact, str]] = [
         ),
     ),
     (
+        channels.UnitContradicted("", "", 0, "N", 0.0, "confirm"),
+        "the log does not say that it is in N: write unit_confirmed = true if it is",
+    ),
+    (
         channels.DerivedSpeed(50.0),
         "not in the log: derived causally from position (two first-order low-passes at 50 Hz)",
     ),

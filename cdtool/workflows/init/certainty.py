@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
-
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.quantity_words import is_reference
 from cdtool.workflows.init.streams import Channels, Found, Stream
@@ -67,8 +65,7 @@ def _motion_doubt(name: str, channels: Channels) -> str:
 def _drive_doubt(stream: Stream, channels: Channels) -> str:
     speed, position = _stream(channels, "speed"), _stream(channels, "position")
     if speed is None and position is not None:
-        rate = np.gradient(np.nan_to_num(position.values), position.time, axis=0)
-        speed = Stream(position.name, position.columns, None, position.time, rate)
+        speed = motion.derived(position)
     if speed is None:
         return "no motion confirms it"
     share = motion.drive_fit(stream, speed, position)

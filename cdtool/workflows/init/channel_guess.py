@@ -168,7 +168,7 @@ def _by_circle(channels: Channels, position: Stream, places: tuple[Stream, ...])
     """Guess an angle by the coordinates that move on its circle, and the first column that moves like its drive."""
     circle = " and ".join(place.name for place in places[:2])
     channels.take("position", position, f"columns {circle} move on a circle of this angle", _BY_COURSE)
-    if efforts := find_efforts(channels.free[:_MOST_UNNAMED], position, _derived(position)):
+    if efforts := find_efforts(channels.free[:_MOST_UNNAMED], position, motion.derived(position)):
         others = "".join(f"; or column {other.name}?" for other in efforts[1:3])
         channels.take("torque", efforts[0], "moves like the force of a drive", _BY_COURSE + others)
 
@@ -330,7 +330,7 @@ def _rate_and_position(channels: Channels) -> tuple[Stream | None, Stream | None
     position = channels.found["position"].stream if "position" in channels.found else None
     if "speed" in channels.found:
         return channels.found["speed"].stream, position
-    return (_derived(position), position) if position is not None else (None, None)
+    return (motion.derived(position), position) if position is not None else (None, None)
 
 
 def _acceleration(channels: Channels) -> None:
@@ -354,11 +354,6 @@ def _acceleration(channels: Channels) -> None:
     told = f"; its integral fits the speed, r = {correlation:.3f}" if abs(correlation) > _FITS else ""
     rivals = [item for item in top if abs(fits[id(item[2])]) > _FITS] if told else top
     _take_named(channels, "acceleration", chosen, rivals, told)
-
-
-def _derived(position: Stream) -> Stream:
-    rate = np.gradient(np.nan_to_num(position.values), position.time, axis=0)
-    return Stream(position.name, position.columns, None, position.time, rate)
 
 
 def _references(channels: Channels) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.findings.plausibility import ChannelCheck
-from cdtool.recording import CONTACT_PRESSURE, UNITLESS
+from cdtool.recording import CONTACT_PRESSURE, RIG_UNITS, UNITLESS
 from cdtool.workflows.init.derived_speed import LowPass
 from cdtool.workflows.init.machine_side import Side
 from cdtool.workflows.init.streams import Channels, Stream
@@ -143,7 +143,9 @@ def _mapped(draft: Draft, name: str, logged: Logged | None, reverse: Sequence[Ch
         checks.append("ground truth only: is it the pressure of the contact, not of oil or air?")
     turned = {joint for item in reverse for joint in ([item.joint] if item.joint else draft.joints)}
     signs = [-1.0 if joint in turned else 1.0 for joint in draft.joints]
-    line = f"{name} = {_channel(draft, name, logged, signs)}"
+    # A force in a guessed unit is not compared with limits.
+    guess = ", unit_confirmed = false }" if name in RIG_UNITS and logged is not None and logged.check else " }"
+    line = f"{name} = {_channel(draft, name, logged, signs).removesuffix(' }')}{guess}"
     return _commented(line, _marked(why, "; ".join(check for check in checks if check)))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from cdtool.recording import FloatArray
 from cdtool.workflows.init.streams import Stream
@@ -109,12 +110,14 @@ def integral_lead(position: Stream, speed: Stream) -> float:
 
 def integrated(speed: Stream) -> FloatArray:
     """Return the integral of a speed over its times, by the trapezoidal rule, from 0."""
-    steps = np.diff(speed.time)[:, np.newaxis]
-    filled = np.nan_to_num(speed.values)
-    path: FloatArray = np.vstack(
-        (np.zeros((1, speed.width)), np.cumsum(0.5 * steps * (filled[1:] + filled[:-1]), axis=0))
-    )
+    path: FloatArray = cumulative_trapezoid(np.nan_to_num(speed.values), speed.time, axis=0, initial=0)
     return path
+
+
+def derived(position: Stream) -> Stream:
+    """Return the derivative of a position, not filtered."""
+    rate = np.gradient(np.nan_to_num(position.values), position.time, axis=0)
+    return Stream(position.name, position.columns, None, position.time, rate)
 
 
 def drive_fit(drive: Stream, speed: Stream, position: Stream | None = None) -> float:

@@ -195,3 +195,12 @@ def test_a_stated_unit_that_makes_a_log_slower_than_any_is_marked_without_a_moti
     draft = drafted_columns(tmp_path, {"time [s]": clock, "pos [mm]": 1e3 * run.travel})
     assert draft.checked("time") is doubted
     assert ("Hz" in draft.said("time")) is doubted
+
+
+@pytest.mark.parametrize(
+    ("name", "confirmed"), [("load cell [N]", None), ("load cell", False), ("load cell [kg]", False)]
+)
+def test_a_force_in_a_guessed_unit_is_not_confirmed(tmp_path, name, confirmed):
+    run = stroke()
+    draft = drafted_columns(tmp_path, {"t [s]": run.time, "pos [m]": run.travel, name: 100.0 * np.abs(run.speed)})
+    assert draft.channels["force"].get("unit_confirmed") is confirmed

@@ -194,6 +194,7 @@ profile = "en_12453_reducing_gap"
         ("load_cell [kN]", "", "not_assessable", 4),
         ("load_cell [filtered]", "", "not_assessable", 4),
         ("load_cell [A]", "", "not_assessable", 4),
+        ("load_cell", ", unit_confirmed = false", "not_assessable", 4),
         ("load_cell [kN]", ", unit_confirmed = true", "met", 0),
         ("load_cell [filtered]", ", unit_confirmed = true", "met", 0),
     ],
