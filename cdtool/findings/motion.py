@@ -40,29 +40,3 @@ class Motion(Fact):
             f"{counted(self.strokes, 'stroke')} by motion; nominal speed{of} {self.nominal_speed:.4g} {self.unit}, "
             f"mainly {self.direction}"
         )
-
-
-@frozen
-class BelowMinimumSpeed(Fact):
-    """The nominal speed is below the detector's `minimum` one; `joint` is empty where there is but one."""
-
-    minimum: float
-    unit: str
-    joint: str = ""
-
-    def sentence(self) -> str:
-        """Return the joint and the minimum."""
-        of = f" of {self.joint}" if self.joint else ""
-        return f"nominal speed{of} below minimum_speed ({self.minimum:g} {self.unit}): not applicable"
-
-
-@frozen
-class Poles(TemplateFact):
-    """The friction EKF's poles [rad/s] at the nominal speed."""
-
-    speed: float
-    unit: str
-    slow: float
-    fast: float
-
-    words = "poles at {speed:.3g} {unit}: {slow:.3g} and {fast:.3g} rad/s"

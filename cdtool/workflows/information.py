@@ -42,7 +42,6 @@ from cdtool.short_repr import short_repr
 from cdtool.workflows.contacts.scoring_rules import ScoringRules
 from cdtool.workflows.contacts.true_contacts import any_contacts
 from cdtool.workflows.log_checks.log_findings import before_contact, log_findings
-from cdtool.workflows.log_checks.motion_check import bandwidth_findings
 from cdtool.workflows.log_checks.placeholders import placeholder_findings
 
 if TYPE_CHECKING:
@@ -178,7 +177,7 @@ def _mapped(log: Path, machine_file: MachineFile) -> Info:
     rules = ScoringRules()
     recording = with_scalar_force(recording, rules.onset)
     contacts = any_contacts(recording, rules)
-    findings = [*log_findings(recording, contacts, rules.onset), *bandwidth_findings(recording, machine_file)]
+    findings = list(log_findings(recording, contacts, rules.onset))
     findings += [Finding(InProgress(item.end), "force") for item in contacts if item.in_progress]
     findings += check_channels([before_contact(recording, contacts)], machine_file.machine)
     findings += placeholder_findings(recording, machine_file)

@@ -48,7 +48,6 @@ def test_info_shows_columns_without_and_channels_with_a_machine_file(gate_folder
         "1000",
         "fits the derivative of the speed",
         "friction takes power",
-        "poles at 0.2",
     ):
         assert word in mapped.out
     (values,) = json.loads(cdtool("info", log, "--machine", gate_folder / "machine.toml", "--json").out)

@@ -562,12 +562,6 @@ SENTENCES: list[tuple[Fact, str]] = [
         motion.Motion(3, 0.13, "rad/s", "backward", "elbow"),
         "3 strokes by motion; nominal speed of elbow 0.13 rad/s, mainly backward",
     ),
-    (motion.BelowMinimumSpeed(0.05, "m/s"), "nominal speed below minimum_speed (0.05 m/s): not applicable"),
-    (
-        motion.BelowMinimumSpeed(0.05, "rad/s", "elbow"),
-        "nominal speed of elbow below minimum_speed (0.05 rad/s): not applicable",
-    ),
-    (motion.Poles(0.2, "m/s", 3.5, 120.0), "poles at 0.2 m/s: 3.5 and 120 rad/s"),
     # plausibility
     (plausibility.Confirmed(), "confirmed in the machine file: not checked against the other channels"),
     (
