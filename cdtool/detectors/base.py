@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -18,8 +18,14 @@ from cdtool.kernels import kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
 # A filter bridges a gap up to this long [s] even if its memory is shorter, without a start-up after it.
 BRIDGED = 0.15
+
+AnyDetector = TypeVar("AnyDetector", bound="DataclassInstance")
 
 
 class Detector(Protocol):
@@ -172,6 +178,42 @@ def per_joint(value: Gain, joints: int) -> FloatArray:
         many = "the whole machine" if joints == 1 else f"{joints} joints"
         raise ConfigurationError(f"a gain has {len(value)} values for {many}", "give one number, or one per joint")
     return np.full(joints, value, dtype=np.float64)
+
+
+def of_joint(detector: AnyDetector, joint: int, joints: int) -> AnyDetector:
+    """Return the detector with the gains of a single joint.
+
+    Parameters
+    ----------
+    detector : Detector
+        A detector whose gains are numbers or one number per joint.
+    joint : int
+        Index of the joint, from 0.
+    joints : int
+        Number of joints J.
+
+    Returns
+    -------
+    Detector
+        A copy in which every gain is one number.
+
+    Raises
+    ------
+    ConfigurationError
+        A gain has another number of values than there are joints.
+
+    Examples
+    --------
+    >>> from cdtool.detectors.momentum import Momentum
+    >>> of_joint(Momentum(bandwidth=(80.0, 60.0)), joint=1, joints=2)
+    Momentum(bandwidth=60.0)
+    """
+    gains = {item.name: getattr(detector, item.name) for item in fields(detector)}
+    numbers = {
+        name: value if isinstance(value, float) else float(per_joint(value, joints)[joint])
+        for name, value in gains.items()
+    }
+    return replace(detector, **numbers)
 
 
 def single(value: Gain) -> float:
