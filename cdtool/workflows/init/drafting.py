@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,6 +11,8 @@ from typing import Any
 
 from cdtool.errors import CdtoolError, RecordingError, UsageError
 from cdtool.evaluation.results import Skipped
+from cdtool.evaluation.truth.force_vector import with_scalar_force
+from cdtool.evaluation.truth.onset import OnsetRule
 from cdtool.files import write_text
 from cdtool.findings import Finding, worst_first
 from cdtool.findings.clocks import ClockUnitAssumed
@@ -20,10 +23,13 @@ from cdtool.formats.csv.pins import read_pins
 from cdtool.formats.source import Format, Source
 from cdtool.ingest.reading import choose_format, element_names, has_topics, log_parts, with_nanoseconds
 from cdtool.log_names import log_stem
-from cdtool.machine_file import read_machine_file
+from cdtool.machine_file import MachineFile, read_machine_file
+from cdtool.plausibility import check_channels
 from cdtool.remote.remote_path import location
 from cdtool.short_repr import short_repr
 from cdtool.tables import Table
+from cdtool.thresholds.signature import ENOUGH_RUNS
+from cdtool.workflows.contacts.impact_free import contacts_shown
 from cdtool.workflows.information import info
 from cdtool.workflows.init.benchmark_draft import draft_benchmark
 from cdtool.workflows.init.channel_guess import guess_channels
@@ -36,7 +42,8 @@ from cdtool.workflows.init.table_clock import TableClock, seconds, split_stamp, 
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
 from cdtool.workflows.init.units_in_names import unit_in_name
 from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
-from cdtool.workflows.runs import several_logs
+from cdtool.workflows.log_checks.log_findings import before_contact
+from cdtool.workflows.runs import read_log, several_logs
 
 # Below this rate [Hz] the unit that a header states for its clock is doubtful: no log of contacts is so slow.
 _SLOWEST = 2.0
@@ -105,7 +112,11 @@ def init(
     """
     target = location(output)
     _refuse_existing(force, target)
-    drafted = replace(_settled(location(log), _drafted(location(log), csv or {})), path=str(target))
+    return _written([location(log)], target, csv or {})
+
+
+def _written(logs: Sequence[Path], target: Path, csv: Mapping[str, Any]) -> Drafted:
+    drafted = replace(_settled(logs, _drafted(logs[0], csv)), path=str(target))
     write_text(target, drafted.text)
     return drafted
 
@@ -143,7 +154,7 @@ def init_study(
     Parameters
     ----------
     logs : sequence of str or Path
-        The logs of one machine; the machine file is drafted from the first.
+        The logs of one machine; the machine file is drafted from the first, and its signs are checked in all.
     folder : str or Path
         The folder to write to; it is made if it does not exist.
     machine : str or Path, optional
@@ -178,7 +189,7 @@ def init_study(
     file = target / "benchmark.toml"
     _refuse_existing(force, file, *([target / "machine.toml"] if machine is None else []))
     target.mkdir(parents=True, exist_ok=True)
-    drafted = None if machine is not None else init(paths[0], target / "machine.toml", force=force, csv=csv)
+    drafted = None if machine is not None else _written(paths, target / "machine.toml", csv or {})
     machine_path = location(machine) if machine is not None else target / "machine.toml"
     made = draft_benchmark(paths, read_machine_file(machine_path), target)
     write_text(file, made.text)
@@ -197,8 +208,8 @@ def _refuse_existing(force: bool, *targets: Path) -> None:
             raise UsageError(f"{target}: already exists", "choose another name with -o, or overwrite it with --force")
 
 
-def _settled(log: Path, draft: Draft) -> Drafted:
-    """Return the draft with which `cdtool info` reads the log; guesses that the log contradicts are withdrawn.
+def _settled(logs: Sequence[Path], draft: Draft) -> Drafted:
+    """Return the draft with which `cdtool info` reads the first log; guesses that the logs contradict are withdrawn.
 
     Signs that the mechanics of the machine contradict are reversed.
     """
@@ -213,12 +224,16 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             trial.write_text(text, encoding="utf-8", newline="\n")
             mapped = tuple(name for name in draft.channels.found if name not in left_out)
             try:
-                findings = info(log, machine=read_machine_file(trial)).findings if mapped else ()
+                machine_file = read_machine_file(trial)
+                findings = info(logs[0], machine=machine_file).findings if mapped else ()
             except CdtoolError as fault:
                 if fault.channel not in mapped:
                     raise
                 left_out[fault.channel] = ""
                 continue
+            if len(logs) > 1 and mapped:
+                findings = tuple(item for item in findings if not isinstance(item.fact, ChannelCheck))
+                findings += _checked_together(logs[:ENOUGH_RUNS], machine_file)
             checks = [item.fact for item in findings if isinstance(item.fact, ChannelCheck)]
             wrong = [item for item in checks if item.answer == "contradicts"]
             agreed = {(item.channel, item.check) for item in checks if item.answer == "agrees"}
@@ -233,6 +248,16 @@ def _settled(log: Path, draft: Draft) -> Drafted:
             # The sign of a channel is usually that of all its joints, also of those whose motion does not show it.
             reverse += [item if (item.channel, item.check) in agreed else replace(item, joint="") for item in signs]
             left_out |= others
+
+
+def _checked_together(logs: Sequence[Path], machine_file: MachineFile) -> tuple[Finding, ...]:
+    """Return the checks of the channels by the mechanics of the machine, in all logs that can be read."""
+    parts = []
+    for log in logs:
+        with suppress(CdtoolError):
+            recording = with_scalar_force(read_log(log, machine_file), OnsetRule())
+            parts.append(before_contact(recording, contacts_shown(recording, OnsetRule())))
+    return check_channels(parts, machine_file.machine)
 
 
 def _surveyed(path: Path, found: Format, csv: Mapping[str, Any]) -> Source:

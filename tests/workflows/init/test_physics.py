@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool import init, init_study
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.streams import Stream
 from tests.data_folder import data, needs_data
@@ -214,6 +215,14 @@ def test_the_sign_of_a_real_robots_torque_is_reversed_with_the_reason(tmp_path):
     draft = drafted(data("ur3/id1.bag"), tmp_path)
     assert draft.channels["torque"]["scale"] == -1.0
     assert "gives power to the machine where friction takes it" in draft.said("torque")
+
+
+@needs_data("ur3/id1.bag")
+def test_a_sign_that_the_first_log_does_not_show_is_found_in_the_others(tmp_path):
+    bags = sorted(data("ur3").glob("*.bag"))
+    assert init(bags[0], tmp_path / "first.toml").text.count("scale = -1.0") == 0
+    init_study(bags, tmp_path / "study")
+    assert "scale = -1.0" in (tmp_path / "study" / "machine.toml").read_text(encoding="utf-8")
 
 
 @needs_data("ur_collisions/onsets.csv")
