@@ -38,9 +38,9 @@ from cdtool.workflows.init.draft_text import Clock, Draft, UnreadWord, draft_tex
 from cdtool.workflows.init.machine_side import side_of
 from cdtool.workflows.init.speed_ratio import Ratio, ratio_of
 from cdtool.workflows.init.streams import Channels, streams_of
-from cdtool.workflows.init.table_clock import TableClock, seconds, split_stamp, table_clock
+from cdtool.workflows.init.table_clock import TableClock, split_stamp, table_clock
 from cdtool.workflows.init.units import Evidence, fits_as_well, is_si
-from cdtool.workflows.init.units_in_names import unit_in_name
+from cdtool.workflows.init.units_in_names import factor_of, unit_in_name
 from cdtool.workflows.init.unmapped import Unmapped, unmapped_columns
 from cdtool.workflows.log_checks.log_findings import before_contact
 from cdtool.workflows.runs import read_log, several_logs
@@ -340,7 +340,7 @@ def _in_seconds(time: Clock, clock: TableClock | None, own: bool) -> float:
         return 0.0
     if time.rate is not None:
         return 0.0 if clock.counts and "placeholder" in time.check else 1.0 / (time.rate * clock.assumed)
-    return seconds(time.unit) / clock.assumed
+    return factor_of(time.unit) / clock.assumed
 
 
 def _joints(path: Path, channels: Channels, topics: bool) -> tuple[tuple[str, ...], str]:
@@ -361,7 +361,7 @@ def _doubt(channels: Channels, clock: TableClock | None, ratio: Ratio | None) ->
     """Return the doubt about a clock's unit that is only written: another fits the ratio, or the rate is too low."""
     if clock is None or not clock.written:
         return ""
-    rate = 1.0 / (clock.step * seconds(clock.unit))
+    rate = 1.0 / (clock.step * factor_of(clock.unit))
     slow = f"steps of {clock.step:.4g} {clock.unit} are {rate:.3g} Hz" if rate < _SLOWEST else ""
     if ratio is None or ratio.fitting:
         return slow
@@ -395,5 +395,5 @@ def _clock(clock: TableClock | None, ratio: Ratio | None, check: str) -> Clock:
     if clock.counts:
         text = "counts, not a time: 1000 steps per second is a placeholder; give the rate"
         return Clock(name, why=why, check=text, rate=1000.0 / clock.step)
-    rates = ", ".join(f"{1.0 / (clock.step * seconds(unit)):.6g} Hz in {unit}" for unit in clock.units())
+    rates = ", ".join(f"{1.0 / (clock.step * factor_of(unit)):.6g} Hz in {unit}" for unit in clock.units())
     return Clock(name, clock.unit, why, f"the unit is not stated: steps of {clock.step:.4g} are {rates}")

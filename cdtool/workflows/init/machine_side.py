@@ -12,6 +12,7 @@ from cdtool.workflows.init.quantity_words import words
 from cdtool.workflows.init.speed_ratio import Ratio, motion_kind, rotation_unit, seems_to_turn, stated, whole_numbers
 from cdtool.workflows.init.streams import Channels
 from cdtool.workflows.init.table_clock import TableClock
+from cdtool.workflows.init.units_in_names import factor_of, si_of
 
 # Above this a rotation [rad, rad/s] is the motor's, not the load's.
 _MOTOR_RANGE = 20.0
@@ -79,15 +80,16 @@ def side_of(channels: Channels, ratio: Ratio | None, clock: TableClock | None, m
 
 def _load_side(channels: Channels, ratio: Ratio | None, told: dict[str, str], messages_si: bool) -> Side:
     """Guess the kind of a single joint of which nothing indicates a motor or a length."""
-    if told.get("torque") == "N" and "angle" in _kinds(channels):
+    is_angle = "angle" in {motion_kind(name, channels) for name in ("position", "speed")}
+    if told.get("torque") == "N" and is_angle:
         return Side("linear_axis", "motor", "one joint, an angle and a force", _MOTOR_OF_SLIDE)
-    if "angle" in _kinds(channels):
+    if is_angle:
         return Side("rotary_axis", "load", "one joint, in angles", _MOTOR_OF_LOAD)
     if told.get("torque") == "N m":
         return Side("rotary_axis", "load", "one joint, a torque without a travel", _MOTOR_OF_LOAD)
     if seems_to_turn(channels):
         return Side("rotary_axis", "load", "one joint, a torque by its name", _MOTOR_OF_LOAD)
-    if ratio is not None and ratio.fitting and _is_angle(ratio.fitting[0].position):
+    if ratio is not None and ratio.fitting and si_of(ratio.fitting[0].position) == "rad":
         return Side("rotary_axis", "load", "one joint; angles fit its speed", _MOTOR_OF_LOAD)
     if messages_si:
         return Side("rotary_axis", "load", "one joint in SI units", "linear_axis for a sliding joint")
@@ -103,17 +105,17 @@ def _gear(channels: Channels, ratio: Ratio | None, clock: TableClock | None) -> 
     slope = ratio.per_second(clock.unit if clock is not None else "")
     correlation = f"from the position's derivative over the speed, r = {ratio.correlation:.3f}"
     if units[0].si == "rad" and units[1].si == "m/s":
-        travel = _factor(units[1].unit) / (slope * _factor(units[0].unit))
+        travel = factor_of(units[1].unit) / (slope * factor_of(units[0].unit))
         return Gear(units[0].unit, units[1].unit, travel, correlation)
     turning = units[1].unit if units[1].si == "rad/s" else rotation_unit(speed) if not units[1].si else ""
     if not turning:
         return None
     if units[0].si == "m":
-        return Gear(units[0].unit, turning, slope * _factor(units[0].unit) / _factor(turning), correlation)
+        return Gear(units[0].unit, turning, slope * factor_of(units[0].unit) / factor_of(turning), correlation)
     if units[0].si or motion_kind("position", channels) == "angle" or whole_numbers(position):
         return None
     for unit in _LENGTHS:
-        travel = slope * _factor(unit) / _factor(turning)
+        travel = slope * factor_of(unit) / factor_of(turning)
         if _GEARS[0] <= abs(travel) <= _GEARS[1]:
             return Gear(unit, turning, travel, correlation)
     return None
@@ -139,17 +141,3 @@ def _is_motor(channels: Channels, ratio: Ratio | None, messages_si: bool) -> tup
             limit = f"{_MOTOR_RANGE:g} {'rad' if messages_si else known.si}"
             return True, f"'{stream.name}' goes beyond {limit}, as only a motor does"
     return False, "nothing indicates a motor"
-
-
-def _kinds(channels: Channels) -> set[str]:
-    return {motion_kind(name, channels) for name in ("position", "speed")}
-
-
-def _is_angle(unit: str) -> bool:
-    known = find_unit(unit)
-    return known is not None and known.si == "rad"
-
-
-def _factor(unit: str) -> float:
-    known = find_unit(unit)
-    return known.factor if known is not None else 1.0

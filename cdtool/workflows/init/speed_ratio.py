@@ -15,8 +15,8 @@ from cdtool.units import find_unit
 from cdtool.workflows.init import motion_evidence as motion
 from cdtool.workflows.init.quantity_words import is_twist, motion_of, words
 from cdtool.workflows.init.streams import Channels, Stream
-from cdtool.workflows.init.table_clock import TableClock, seconds
-from cdtool.workflows.init.units_in_names import label, own_name, unit_in_name
+from cdtool.workflows.init.table_clock import TableClock
+from cdtool.workflows.init.units_in_names import factor_of, label, own_name, si_of, unit_in_name
 
 # Units of position and speed that belong together, the likelier first; the first of each kind are both SI.
 _PAIRS = (
@@ -30,6 +30,7 @@ _FAR = 2.5
 # Largest positions and speeds of axes, and of the joints of robots.
 _LIMITS = {"m": 30.0, "m/s": 20.0}
 _ROBOT_LIMITS = {"rad": 4.0 * math.pi, "rad/s": 25.0, "m": 30.0, "m/s": 20.0}
+_SI = {"length": "m", "angle": "rad"}
 _RPM = ("n", "rpm", "motor")
 _RAD_S = ("qd", "dq", "w", "omega", "dphi", "qp")
 
@@ -44,8 +45,7 @@ class Stated:
     @property
     def si(self) -> str:
         """Return the SI unit of its dimension, or an empty text if unknown."""
-        known = find_unit(self.unit) if self.unit else None
-        return known.si if known is not None else ""
+        return si_of(self.unit)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Ratio:
         """Return dx / (v dt), the time in seconds if the clock is in this unit (empty: as assumed, or its ticks)."""
         if self.tick:
             return self.raw * self.assumed / self.tick
-        return self.raw * self.assumed / seconds(clock) if clock else self.raw
+        return self.raw * self.assumed / factor_of(clock) if clock else self.raw
 
     @property
     def certain(self) -> bool:
@@ -182,13 +182,14 @@ def _pairs(channels: Channels, messages_si: bool) -> list[tuple[str, str]]:
     return [
         pair
         for pair in dict.fromkeys((*known, *named))
-        if _si(pair[1]) == f"{_si(pair[0])}/s" and all(_si(pair[0]) == {"length": "m", "angle": "rad"}[x] for x in told)
+        if si_of(pair[1]) == f"{si_of(pair[0])}/s"
+        and all(si_of(pair[0]) == {"length": "m", "angle": "rad"}[x] for x in told)
     ]
 
 
 def _tick(channels: Channels, bare: Ratio, pairs: list[tuple[str, str]]) -> float:
     """Return the step [s] of a counter for which the likeliest units fit."""
-    ticks = [bare.raw * bare.assumed * _factor(position) / _factor(speed) for position, speed in pairs]
+    ticks = [bare.raw * bare.assumed * factor_of(position) / factor_of(speed) for position, speed in pairs]
     made = [
         _combination(channels, None, "", pair, rank, replace(bare, tick=tick))
         for rank, (pair, tick) in enumerate(zip(pairs, ticks, strict=True))
@@ -201,11 +202,11 @@ def _tick(channels: Channels, bare: Ratio, pairs: list[tuple[str, str]]) -> floa
 def _combination(
     channels: Channels, clock: TableClock | None, unit: str, pair: tuple[str, str], rank: int, bare: Ratio
 ) -> Combination | None:
-    off = abs(bare.per_second(unit) * _factor(pair[0]) / _factor(pair[1]) - 1.0)
+    off = abs(bare.per_second(unit) * factor_of(pair[0]) / factor_of(pair[1]) - 1.0)
     if off > _NEAR:
         return None
     unlikely = 0.05 * rank + (clock.unlikely(unit) if clock is not None and unit and not clock.told else 0.0)
-    kind = "length" if _si(pair[0]) == "m" else "angle"
+    kind = "length" if si_of(pair[0]) == "m" else "angle"
     if kind == "length" and not pair[1].startswith(f"{pair[0]}/"):
         unlikely += 0.5  # m with mm/s
     # If no word indicates otherwise, one joint slides and several rotate.
@@ -225,13 +226,3 @@ def implausible(unit: str, stream: Stream, joints: int) -> bool:
     """Whether values in this unit are beyond what machines reach: a travel of 50 m, a robot's joint at 90 rad."""
     limit = _ROBOT_LIMITS.get(unit) if joints > 1 and unit in _ROBOT_LIMITS else _LIMITS.get(unit)
     return limit is not None and float(np.nanmax(np.abs(stream.values))) > limit
-
-
-def _si(unit: str) -> str:
-    known = find_unit(unit)
-    return known.si if known is not None else ""
-
-
-def _factor(unit: str) -> float:
-    known = find_unit(unit)
-    return known.factor if known is not None else 1.0

@@ -14,7 +14,7 @@ from cdtool.ingest.clock_guess import GuessedClock, guess_clock
 from cdtool.recording import MEASURED
 from cdtool.units import find_unit
 from cdtool.workflows.init.quantity_words import is_clock, is_counter, name_in_group, word_for, words
-from cdtool.workflows.init.units_in_names import unit_in_name
+from cdtool.workflows.init.units_in_names import factor_of, unit_in_name
 
 _NANOSECONDS = re.compile(r"(?<![a-z])n(?:ano)?s(?:ecs?|econds?)?$", re.IGNORECASE)
 _UNITS = ("s", "ms", "us", "ns", "min")
@@ -57,7 +57,7 @@ class TableClock:
 
     def unlikely(self, unit: str) -> float:
         """Return 0 if the unit gives a usual sampling rate, more otherwise."""
-        rate = 1.0 / (self.step * seconds(unit))
+        rate = 1.0 / (self.step * factor_of(unit))
         rare = _RARE if unit == "min" else _JITTERY if rate > _TIMED_BY_HARDWARE and self.jitter > _JITTERS else 0.0
         if _USUAL[0] <= rate <= _USUAL[1]:
             return rare
@@ -75,7 +75,7 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
     step = float(np.median(steps))
     jitter = float(np.median(np.abs(steps - step))) / abs(step) if step else 0.0
     assumed, taken_off = _assumed(column, found)
-    unit = min(_UNITS, key=lambda name: abs(np.log(assumed / seconds(name))))
+    unit = min(_UNITS, key=lambda name: abs(np.log(assumed / factor_of(name))))
     # Numbers that rise by one without a name are those of the rows; the rate follows from position and speed.
     is_row = not re.search(r"[^\W\d_]", found.column) and bool((steps == 1.0).all())
     counts = is_counter(found.column) or is_row
@@ -88,7 +88,7 @@ def table_clock(source: Source) -> tuple[TableClock, GuessedClock] | None:
         return replace(clock, unit=str(column.unit), told="the header, which states the unit", written=True), found
     if taken_off:
         # The reader of a table converts days to seconds.
-        days = assumed > 2.0 * seconds("min")
+        days = assumed > 2.0 * factor_of("min")
         return replace(clock, unit="s" if days else unit, told=_since(values[0], days) + against), found
     named = unit_in_name("time", found.column)
     if named and clock.unlikely(named) < 2 * _RARE:
@@ -107,12 +107,6 @@ def split_stamp(source: Source) -> tuple[str, str] | None:
             if not np.nanmax(source.columns[other].values % 1.0, initial=0.0):
                 return other, name
     return None
-
-
-def seconds(unit: str) -> float:
-    """Return a unit of time in seconds."""
-    known = find_unit(unit)
-    return known.factor if known is not None else 1.0
 
 
 def _named(source: Source) -> GuessedClock | None:

@@ -190,3 +190,15 @@ def _stands_for_itself(rest: str, tail: str) -> bool:
     if tail.startswith("/"):
         return True
     return len(tail) > 1 if tail not in _CAPITALS else rest != rest.upper()
+
+
+def factor_of(unit: str) -> float:
+    """Return the factor of a unit to SI; 1 for one that is not known."""
+    known = find_unit(unit)
+    return known.factor if known is not None else 1.0
+
+
+def si_of(unit: str) -> str:
+    """Return the SI unit of a unit's dimension; empty for one that is not known."""
+    known = find_unit(unit) if unit else None
+    return known.si if known is not None else ""
