@@ -143,8 +143,9 @@ class JointIdentification:
             wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
             found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
         if "static" in identified:
-            speed, unit = self.two_mass.model.friction.stribeck_speed, f"{self.units[2]}/s"
-            found.append(_exact("model.friction", "stribeck_speed", speed, unit))
+            friction, unit = self.two_mass.model.friction, f"{self.units[2]}/s"
+            found.append(_exact("model.friction", "stribeck_speed", friction.stribeck_speed, unit))
+            found.append(_exact("model.friction", "smoothing_speed", friction.smoothing_speed, unit))
         return found
 
     def _of_controller(self) -> list[Estimate]:
