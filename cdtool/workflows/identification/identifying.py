@@ -126,13 +126,28 @@ class JointIdentification:
         """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
         of_contacts = self.contacts.together if self.contacts else ()
         known = {(item.section, item.key) for item in (*self.estimates, *of_contacts)}
-        found: list[Estimate] = list(self.robot.together) if self.robot else []
+        found: list[Estimate] = [*(self.robot.together if self.robot else ()), *self._friction_of_starts()]
         found += [*self._of_starts(), *self._of_controller()]
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
         known |= {(item.section, item.key) for item in self.not_identifiable if not self.robot}
         return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
+
+    def _friction_of_starts(self) -> list[Estimate]:
+        """Return Coulomb and viscous friction where only their sum is known: without both a model has neither."""
+        keys = [("model.friction", key) for key in ("coulomb_forward", "coulomb_backward", "viscous")]
+        found = {(item.section, item.key) for item in self.estimates}
+        if not self.two_mass or "load_mass" not in self.two_mass.identified or found & {*keys}:
+            return []
+        refused = {(item.section, item.key) for item in self.two_mass.identified.not_identifiable}
+        units = (self.units[1], self.units[1], self.units[3])
+        friction = self.two_mass.model.friction
+        return [
+            _exact(*key, getattr(friction, key[1]), unit)
+            for key, unit in zip(keys, units, strict=True)
+            if key in refused
+        ]
 
     def _of_starts(self) -> list[Estimate]:
         """Return what the starts show together with the identified values: how far they go."""
@@ -168,7 +183,8 @@ class JointIdentification:
     def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
         """Return the parameters that no method could identify."""
         known = {(item.section, item.key) for item in self.estimates}
-        known |= {(item.section, item.key) for item in self.contacts.together} if self.contacts else set()
+        together = (*self._friction_of_starts(), *(self.contacts.together if self.contacts else ()))
+        known |= {(item.section, item.key) for item in together}
         found: dict[tuple[str, str], NotIdentifiable] = {}
         for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
             for item in fit.identified.not_identifiable if fit else ():
