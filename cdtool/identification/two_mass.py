@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -37,15 +37,12 @@ from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 
 # In the order of the vector of logarithms.
-PARAMETERS = (
-    *("load_mass", "stiffness", "coulomb", "static", "viscous", "smoothing", "damping_ratio"),
-    *("take_up", "end_stiffness"),
-)
+PARAMETERS = ("load_mass", "stiffness", "coulomb", "static", "viscous", "onset", "damping", "take_up", "end_stiffness")
 # Of a drive with one stiffness those before the take-up are fitted, which is beyond every wind-up.
 _ONE_STIFFNESS, _NEVER = PARAMETERS.index("take_up"), math.log(1e9)
 # Without the speed at which friction sets in and the drive's damping, starts give a wrong stiffness, or a second one;
 # alone they show both badly. Each is guessed within a factor (one standard deviation), from which the fit moves it.
-_GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("smoothing"), _ONE_STIFFNESS), np.log([2.0, 3.0])
+_GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("onset"), _ONE_STIFFNESS), np.log([2.0, 3.0])
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.5
 # The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
@@ -80,13 +77,11 @@ _INDEPENDENT = 20.0
 class TwoMassSettings:
     """`motor_mass` on the load side [kg, kg m2]; `sensors` as far as they are known.
 
-    `stribeck_speed` [m/s, rad/s] is a tenth of the nominal speed unless it is given. `surrogates`: number of random
-    friction profiles from which the standard errors are computed.
+    `surrogates`: number of random friction profiles from which the standard errors are computed.
     """
 
     motor_mass: float
     sensors: Sensors = field(default_factory=Sensors)
-    stribeck_speed: float | None = None
     surrogates: int = 24
     seed: int = 0
     units: tuple[str, str, str] = ("kg", "N", "m")
@@ -138,17 +133,13 @@ class _Problem:
 
     def __init__(self, runs: Sequence[AxisRun], ensembles: Sequence[StartEnsemble], settings: TwoMassSettings) -> None:
         # The model is driven by the torque as logged: the motion that it is compared with is made as late.
-        lag = settings.sensors.torque_filter_time
-        late = [
-            {
-                key: values if key == "torque" else first_order_low_pass(values, lag, item.period)
-                for key, values in item.mean.items()
-            }
-            for item in ensembles
-        ]
-        self.ensembles = tuple(replace(item, mean=mean) for item, mean in zip(ensembles, late, strict=True))
+        self.ensembles: tuple[StartEnsemble, ...] = ()
+        for item in ensembles:
+            lag = partial(first_order_low_pass, time_constant=settings.sensors.torque_filter_time, period=item.period)
+            mean = {key: values if key == "torque" else lag(values) for key, values in item.mean.items()}
+            self.ensembles += (replace(item, mean=mean),)
         self.settings = settings
-        self.stribeck = settings.stribeck_speed or _STRIBECK_SHARE * max(item.nominal_speed for item in ensembles)
+        self.stribeck = _STRIBECK_SHARE * max(item.nominal_speed for item in ensembles)
         self.start = _rough_values(self.ensembles[0], settings.motor_mass)
         self.scales = [_scales(item) for item in self.ensembles]
         total = settings.motor_mass + self.start["load_mass"]
@@ -174,7 +165,7 @@ class _Problem:
     def model(self, vector: FloatArray) -> AxisModel:
         """Return the model with the `PARAMETERS` exp(vector); the rest is the unknown friction at the knots."""
         values = map(float, np.exp(vector[: len(PARAMETERS)]))
-        load, stiffness, coulomb, rise, viscous, smoothing, ratio, take_up, end = values
+        load, stiffness, coulomb, rise, viscous, onset, ratio, take_up, end = values
         settings, motor = self.settings, self.settings.motor_mass
         damping = 2.0 * ratio * math.sqrt(stiffness * motor * load / (motor + load))
         drive = Drive(motor_mass=motor, load_mass=load, stiffness=stiffness, damping=damping)
@@ -186,7 +177,7 @@ class _Problem:
             static=coulomb + rise,
             stribeck_speed=self.stribeck,
             viscous=viscous,
-            smoothing_speed=smoothing,
+            smoothing_speed=onset,
         )
         period = self.ensembles[0].period
         gain = _CORRECTION_RATE * drive.total_mass
@@ -270,9 +261,10 @@ class _Problem:
             vector[1] = stiffness
             candidates.append((float(np.sum(np.abs(self.errors(vector)))), vector))
         candidates.sort(key=lambda item: item[0])
-        free = self.one_stiffness
-        rough, _ = min((self._fitted(item, free, 1e-2, 6) for _, item in candidates[:2]), key=lambda item: item[1])
-        vector, cost = self._fitted(rough, free, 1e-5, 30)
+        rough, _ = min(
+            (self._fitted(item, self.one_stiffness, 1e-2, 6) for _, item in candidates[:2]), key=lambda item: item[1]
+        )
+        vector, cost = self._fitted(rough, self.one_stiffness, 1e-5, 30)
         if abs(vector[0] - self.first[0]) > math.log(_MOST_CHANGE / _AT_BOUND):
             raise IdentificationError(
                 f"the load ends at {math.exp(vector[0]):.3g} {self.settings.units[0]}, the bound of the search",
@@ -362,9 +354,8 @@ class _Problem:
     def result(self, vector: FloatArray) -> TwoMassFit:
         """Return the fit with standard errors from surrogates of the friction over position."""
         model, frictions = self.model(vector), self.frictions(vector)
-        has_second = vector[_ONE_STIFFNESS] < _NEVER
-        count = len(PARAMETERS) if has_second else _ONE_STIFFNESS
-        free = np.arange(len(vector)) if has_second else self.one_stiffness
+        free = np.arange(len(vector)) if vector[_ONE_STIFFNESS] < _NEVER else self.one_stiffness
+        count = len(PARAMETERS) - len(vector) + len(free)
         jacobian = self.jacobian(vector, free)
         own = jacobian[:, :count]
         norms = np.linalg.norm(own, axis=0)
@@ -493,8 +484,8 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
         "coulomb": 0.8 * friction,
         "static": 0.2 * friction,
         "viscous": 0.2 * friction / top,
-        "smoothing": 0.005 * top,
-        "damping_ratio": 0.03,
+        "onset": 0.005 * top,
+        "damping": 0.03,
     }
 
 

@@ -136,18 +136,13 @@ class JointIdentification:
 
     def _friction_of_starts(self) -> list[Estimate]:
         """Return Coulomb and viscous friction where only their sum is known: without both a model has neither."""
-        keys = [("model.friction", key) for key in ("coulomb_forward", "coulomb_backward", "viscous")]
-        found = {(item.section, item.key) for item in self.estimates}
-        if not self.two_mass or "load_mass" not in self.two_mass.identified or found & {*keys}:
+        units = dict.fromkeys(("coulomb_forward", "coulomb_backward"), self.units[1]) | {"viscous": self.units[3]}
+        found = {item.key for item in self.estimates if item.section == "model.friction"}
+        if not self.two_mass or "load_mass" not in self.two_mass.identified or found & units.keys():
             return []
-        refused = {(item.section, item.key) for item in self.two_mass.identified.not_identifiable}
-        units = (self.units[1], self.units[1], self.units[3])
-        friction = self.two_mass.model.friction
-        return [
-            _exact(*key, getattr(friction, key[1]), unit)
-            for key, unit in zip(keys, units, strict=True)
-            if key in refused
-        ]
+        refused = {item.key for item in self.two_mass.identified.not_identifiable} & units.keys()
+        values = vars(self.two_mass.model.friction)
+        return [_exact("model.friction", key, values[key], units[key]) for key in units if key in refused]
 
     def _of_starts(self) -> list[Estimate]:
         """Return what the starts show together with the identified values: how far they go."""
@@ -158,9 +153,8 @@ class JointIdentification:
             wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
             found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
         if "static" in identified:
-            friction, unit = self.two_mass.model.friction, f"{self.units[2]}/s"
-            found.append(_exact("model.friction", "stribeck_speed", friction.stribeck_speed, unit))
-            found.append(_exact("model.friction", "smoothing_speed", friction.smoothing_speed, unit))
+            values, unit = vars(self.two_mass.model.friction), f"{self.units[2]}/s"
+            found += [_exact("model.friction", key, values[key], unit) for key in ("stribeck_speed", "smoothing_speed")]
         return found
 
     def _of_controller(self) -> list[Estimate]:
