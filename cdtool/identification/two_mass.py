@@ -408,7 +408,9 @@ class _Problem:
         static = coulomb + rise
         static_error = math.hypot(coulomb * relative[2], rise * relative[3]) / static
         load_error = math.hypot(relative[0], self.load_change / load)
-        dry = max(relative[2], relative[4])  # what is taken from one of the two is in the other
+        # What is taken from one of the two is in the other; one that has vanished has no error of its own.
+        vanished = np.min((vector - self.first)[[2, 4]]) < -math.log(_MOST_CHANGE / _AT_BOUND)
+        dry = math.inf if vanished else max(relative[2], relative[4])
         has_second = vector[_ONE_STIFFNESS] < _NEVER or not self.is_described
         gentler = (Missing.GENTLER_START,) if has_second else ()
         rows: list[tuple[str, str, float, float, float, str, tuple[Missing, ...]]] = [
