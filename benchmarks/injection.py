@@ -19,6 +19,7 @@ import argparse
 import math
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -43,9 +44,10 @@ from cdtool.identification.contact_fit import ContactSettings, identify_contacts
 from cdtool.identification.load_cell_contact import load_cell_contact  # noqa: E402
 from cdtool.identification.speed_controller import identify_controller  # noqa: E402
 from cdtool.identification.two_mass import TwoMassSettings, identify_two_mass  # noqa: E402
-from cdtool.injection.assumption import assumptions_of  # noqa: E402
+from cdtool.injection.assumption import ControllerReaction, assumptions_of  # noqa: E402
 from cdtool.injection.axis_contact import axis_contact  # noqa: E402
 from cdtool.injection.injected_recording import injected_recording  # noqa: E402
+from cdtool.injection.refusal import refusal  # noqa: E402
 from cdtool.machine_file import read_machine_file  # noqa: E402
 from cdtool.machines.axis import Axis  # noqa: E402
 from cdtool.machines.linear_axis import LinearAxis  # noqa: E402
@@ -279,7 +281,10 @@ def compare_plain(
     pairs: int = PLAIN_PAIRS,
     names: Sequence[str] = PLAIN_DETECTORS,
 ) -> Mapping[float, dict[str, Latencies]]:
-    """The latencies on a plain gate by the stiffness of the obstacle, with the identified model."""
+    """The latencies on a plain gate by the stiffness of the obstacle, with the identified model.
+
+    A detector is left out that `cdtool inject` refuses with this model.
+    """
     numbers = range(FIRST_PAIR, FIRST_PAIR + pairs)
     free = plain_gate.strokes(gate, seed, [*range(LEARNED), *numbers]).recordings
     struck = plain_gate.strokes(gate, seed, [*numbers] * len(stiffnesses), np.repeat(stiffnesses, pairs))
@@ -288,6 +293,8 @@ def compare_plain(
         for item in zip([*free[LEARNED:]] * len(stiffnesses), struck.recordings, struck.contacts, strict=True)
     ]
     model = identified_plain(gate, free[:LEARNED])
+    reaction = ControllerReaction.KNOWN if model.controller else ControllerReaction.FROZEN
+    names = [name for name in names if refusal(DETECTORS.load(name).needs, model, reaction) is None]
     table = {"name": "gate", "coordinates": "load", "load_mass": model.drive.total_mass}
     machine = LinearAxis.from_table(Table(table, "machine.toml"))
     return {
@@ -306,10 +313,12 @@ def compare_plain(
 def measure_plain(machines: int) -> bool:
     """Show how far the true means of plain gates are from the injected ones; at least 95 % within the stated range."""
     cells: dict[tuple[float, str], list[Latencies]] = {}
+    outside = []
     for seed in range(machines):
         for stiffness, of_detector in compare_plain(plain_gate.drawn_gate(seed), seed).items():
             for name, item in of_detector.items():
                 cells.setdefault((stiffness, name), []).append(item)
+                outside += [] if item.is_in_stated_range else [seed]
     for (stiffness, name), items in cells.items():
         true = [float(np.nanmean(item.true)) for item in items]
         pairs = np.concatenate([(item.injected - item.true)[0] for item in items])
@@ -318,12 +327,12 @@ def measure_plain(machines: int) -> bool:
         print(
             f"{stiffness / 1e3:4.0f} N/mm {name:18s} true {np.mean(true):6.1f} ms, mean of a machine "
             f"{min(shares):+4.0f} to {max(shares):+3.0f} %, one contact {np.nanmean(pairs):+5.1f} +- "
-            f"{np.nanstd(pairs):4.1f} ms, other misses on {missed} of {len(items)}"
+            f"{np.nanstd(pairs):4.1f} ms, other misses on {missed}, refused on {machines - len(items)} of {machines}"
         )
-    within = np.array([[item.is_in_stated_range for item in items] for items in cells.values()])
-    whole = int(np.sum(within.all(axis=0)))
-    print(f"within the stated range: {np.sum(within)} of {within.size} means, all of {whole} of {machines} machines")
-    return bool(np.mean(within) >= 0.95)
+    means, whole = sum(map(len, cells.values())), machines - len(set(outside))
+    print(f"within the stated range: {means - len(outside)} of {means} means, all of {whole} of {machines} machines")
+    print(f"outside, by machine: {dict(Counter(outside))}")
+    return len(outside) <= 0.05 * means
 
 
 def measure(seeds: int, pairs: int, contacts: int) -> bool:

@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
 
 from cdtool.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
-from cdtool.axis_model.sensor_filters import second_order_low_pass
+from cdtool.axis_model.sensor_filters import first_order_low_pass, second_order_low_pass
 from cdtool.axis_model.simulation import AxisInputs, AxisMotion, simulate_axis
 from cdtool.errors import ConfigurationError
 from cdtool.identification.axis_run import AxisRun
@@ -37,9 +37,12 @@ from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 
 # In the order of the vector of logarithms.
-PARAMETERS = ("load_mass", "stiffness", "coulomb", "static", "viscous", "take_up", "end_stiffness")
-# Of a drive with one stiffness the first five are fitted; its take-up is beyond every wind-up.
+PARAMETERS = ("load_mass", "stiffness", "coulomb", "static", "viscous", "onset", "damping", "take_up", "end_stiffness")
+# Of a drive with one stiffness those before the take-up are fitted, which is beyond every wind-up.
 _ONE_STIFFNESS, _NEVER = PARAMETERS.index("take_up"), math.log(1e9)
+# Without the speed at which friction sets in and the drive's damping, starts give a wrong stiffness, or a second one;
+# alone they show both badly. Each is guessed within a factor (one standard deviation), from which the fit moves it.
+_GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("onset"), _ONE_STIFFNESS), np.log([2.0, 3.0])
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.5
 # The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
@@ -48,8 +51,9 @@ _STIFFNESS_STARTS = 12
 _CORRECTION_RATE = 10.0
 # A channel's error counts in its run-to-run deviation, at least in this share of its largest value.
 _LEAST_SHARE = 0.01
-# The friction's rise is below a speed that a start passes in a few samples: it is given, not fitted [m/s, rad/s].
-_STRIBECK_SHARE = 0.1
+# The friction's rise is below a speed that a start passes in a few samples: it is given, not fitted. The standard
+# errors contain that it is wrong by a factor (one standard deviation) [-].
+_STRIBECK_SHARE, _STRIBECK_WITHIN = 0.1, 2.0
 _MOST_CHANGE, _AT_BOUND = 50.0, 1.02
 # The search for a second stiffness begins at each of these: the first one as a share of that of a drive with one
 # stiffness, the share of the largest wind-up at which the second begins, and its multiple of the first. The take-up may
@@ -73,13 +77,11 @@ _INDEPENDENT = 20.0
 class TwoMassSettings:
     """`motor_mass` on the load side [kg, kg m2]; `sensors` as far as they are known.
 
-    `stribeck_speed` [m/s, rad/s] is a tenth of the nominal speed unless it is given. `surrogates`: number of random
-    friction profiles from which the standard errors are computed.
+    `surrogates`: number of random friction profiles from which the standard errors are computed.
     """
 
     motor_mass: float
     sensors: Sensors = field(default_factory=Sensors)
-    stribeck_speed: float | None = None
     surrogates: int = 24
     seed: int = 0
     units: tuple[str, str, str] = ("kg", "N", "m")
@@ -130,9 +132,14 @@ class _Problem:
     """The fit of one set of ensembles: simulated and measured channels, weights, start values."""
 
     def __init__(self, runs: Sequence[AxisRun], ensembles: Sequence[StartEnsemble], settings: TwoMassSettings) -> None:
-        self.ensembles = tuple(ensembles)
+        # The model is driven by the torque as logged: the motion that it is compared with is made as late.
+        self.ensembles: tuple[StartEnsemble, ...] = ()
+        for item in ensembles:
+            lag = partial(first_order_low_pass, time_constant=settings.sensors.torque_filter_time, period=item.period)
+            mean = {key: values if key == "torque" else lag(values) for key, values in item.mean.items()}
+            self.ensembles += (replace(item, mean=mean),)
         self.settings = settings
-        self.stribeck = settings.stribeck_speed or _STRIBECK_SHARE * max(item.nominal_speed for item in ensembles)
+        self.stribeck = _STRIBECK_SHARE * max(item.nominal_speed for item in ensembles)
         self.start = _rough_values(self.ensembles[0], settings.motor_mass)
         self.scales = [_scales(item) for item in self.ensembles]
         total = settings.motor_mass + self.start["load_mass"]
@@ -149,25 +156,28 @@ class _Problem:
         logarithms = [math.log(self.start[name]) for name in PARAMETERS[:_ONE_STIFFNESS]]
         ends = np.cumsum([len(PARAMETERS), *map(len, self.prior)])
         self.of_knots = [slice(*pair) for pair in pairwise(ends)]
+        self.one_stiffness = np.delete(np.arange(ends[-1]), slice(_ONE_STIFFNESS, len(PARAMETERS)))
         self.first = np.array([*logarithms, _NEVER, 0.0, *np.zeros(ends[-1] - ends[0])])
         self.load_change, self.is_described = 0.0, True  # by a second stiffness; by either drive
         # The force at a knot acts on one ensemble: the others are as they were.
         self._part = lru_cache(maxsize=64)(self._errors_of)
 
     def model(self, vector: FloatArray) -> AxisModel:
-        """Return the model with the parameters exp(vector[:7]); the rest is the unknown friction at the knots."""
-        load, stiffness, coulomb, rise, viscous, take_up, end = np.exp(vector[: len(PARAMETERS)])
-        settings = self.settings
-        drive = Drive(motor_mass=settings.motor_mass, load_mass=float(load), stiffness=float(stiffness))
-        if vector[5] < _NEVER:
-            drive = replace(drive, take_up_travel=float(take_up), end_stiffness=float(end))
+        """Return the model with the `PARAMETERS` exp(vector); the rest is the unknown friction at the knots."""
+        values = map(float, np.exp(vector[: len(PARAMETERS)]))
+        load, stiffness, coulomb, rise, viscous, onset, ratio, take_up, end = values
+        settings, motor = self.settings, self.settings.motor_mass
+        damping = 2.0 * ratio * math.sqrt(stiffness * motor * load / (motor + load))
+        drive = Drive(motor_mass=motor, load_mass=load, stiffness=stiffness, damping=damping)
+        if vector[_ONE_STIFFNESS] < _NEVER:
+            drive = replace(drive, take_up_travel=take_up, end_stiffness=end, end_damping=damping)
         friction = Friction(
-            coulomb_forward=float(coulomb),
-            coulomb_backward=float(coulomb),
-            static=float(coulomb + rise),
+            coulomb_forward=coulomb,
+            coulomb_backward=coulomb,
+            static=coulomb + rise,
             stribeck_speed=self.stribeck,
-            viscous=float(viscous),
-            smoothing_speed=min(1e-3, 0.005 * self.ensembles[0].nominal_speed),
+            viscous=viscous,
+            smoothing_speed=onset,
         )
         period = self.ensembles[0].period
         gain = _CORRECTION_RATE * drive.total_mass
@@ -214,11 +224,15 @@ class _Problem:
         return {name: mean[name] for name in self.compared if name in mean}
 
     def errors(self, vector: FloatArray) -> FloatArray:
-        """Return the scaled errors of all channels and of the knots' forces; large where the model cannot be run."""
+        """Return the scaled errors of all channels, of what is guessed and of the knots' forces.
+
+        Those of the channels are large where the model cannot be run.
+        """
         parameters = vector[: len(PARAMETERS)].tobytes()
         parts = [self._part(number, parameters, vector[part].tobytes()) for number, part in enumerate(self.of_knots)]
+        guessed = (vector - self.first)[_GUESSED] / _GUESSED_WITHIN
         return np.concatenate(
-            (*parts, *(rows @ vector[part] for rows, part in zip(self.prior, self.of_knots, strict=True)))
+            (*parts, guessed, *(rows @ vector[part] for rows, part in zip(self.prior, self.of_knots, strict=True)))
         )
 
     def _errors_of(self, number: int, parameters: bytes, forces: bytes) -> FloatArray:
@@ -247,9 +261,10 @@ class _Problem:
             vector[1] = stiffness
             candidates.append((float(np.sum(np.abs(self.errors(vector)))), vector))
         candidates.sort(key=lambda item: item[0])
-        free = np.delete(np.arange(len(self.first)), [5, 6])
-        rough, _ = min((self._fitted(item, free, 1e-2, 6) for _, item in candidates[:2]), key=lambda item: item[1])
-        vector, cost = self._fitted(rough, free, 1e-5, 30)
+        rough, _ = min(
+            (self._fitted(item, self.one_stiffness, 1e-2, 6) for _, item in candidates[:2]), key=lambda item: item[1]
+        )
+        vector, cost = self._fitted(rough, self.one_stiffness, 1e-5, 30)
         if abs(vector[0] - self.first[0]) > math.log(_MOST_CHANGE / _AT_BOUND):
             raise IdentificationError(
                 f"the load ends at {math.exp(vector[0]):.3g} {self.settings.units[0]}, the bound of the search",
@@ -260,7 +275,7 @@ class _Problem:
         for softer, take_up, ratio in _SECOND_STARTS:
             first = vector.copy()
             first[1] += math.log(softer)
-            first[5:7] = math.log(take_up * largest), first[1] + math.log(ratio)
+            first[_ONE_STIFFNESS : len(PARAMETERS)] = math.log(take_up * largest), first[1] + math.log(ratio)
             others.append(self._fitted(first, np.arange(len(vector)), 1e-4, 20))
         other, lower = min(others, key=lambda item: item[1])
         if lower < cost:
@@ -275,7 +290,7 @@ class _Problem:
 
         count, knots = len(PARAMETERS), len(first) - len(PARAMETERS)
         reach = np.concatenate((np.full(count, math.log(_MOST_CHANGE)), np.full(knots, np.inf)))
-        reach[5] = math.log(2.0)
+        reach[_ONE_STIFFNESS] = math.log(2.0)
         reach = reach[free]
         scale = np.concatenate((np.full(count, 0.3), np.full(knots, 0.03 * self.start["coulomb"])))[free]
 
@@ -314,7 +329,7 @@ class _Problem:
         stiff = motor * load / (motor + load) * (2.0 * math.pi / (_PERIODS_OF_RIGID * period)) ** 2
         first = vector.copy()
         first[0], first[1] = self.first[0], math.log(max(stiff, 3.0 * stiffness))
-        _, rigid = self._fitted(first, np.delete(np.arange(len(vector)), [1, 5, 6]), 1e-3, 8)
+        _, rigid = self._fitted(first, np.delete(self.one_stiffness, 1), 1e-3, 8)
         if stiffness > _MOST_OF_RIGID * stiff or rigid < _CLEARLY_WORSE * cost:
             raise IdentificationError(
                 "a rigid drive describes the starts as well as an elastic one: its stiffness does not show",
@@ -339,8 +354,8 @@ class _Problem:
     def result(self, vector: FloatArray) -> TwoMassFit:
         """Return the fit with standard errors from surrogates of the friction over position."""
         model, frictions = self.model(vector), self.frictions(vector)
-        count = len(PARAMETERS) if vector[5] < _NEVER else _ONE_STIFFNESS
-        free = np.concatenate((np.arange(count), np.arange(len(PARAMETERS), len(vector))))
+        free = np.arange(len(vector)) if vector[_ONE_STIFFNESS] < _NEVER else self.one_stiffness
+        count = len(PARAMETERS) - len(vector) + len(free)
         jacobian = self.jacobian(vector, free)
         own = jacobian[:, :count]
         norms = np.linalg.norm(own, axis=0)
@@ -359,8 +374,8 @@ class _Problem:
     def _deviations(self, jacobian: FloatArray, vector: FloatArray) -> FloatArray:
         """Return how far other errors of the same colour would move the free values (surrogates, p).
 
-        Each is a random friction profile where the friction is not known, plus what the model leaves over in every
-        channel, with random phases.
+        Each is a random friction profile where the friction is not known, another Stribeck speed and other guesses,
+        plus what the model leaves over in every channel, with random phases.
         """
         rng = np.random.default_rng(self.settings.seed)
         inverse = np.linalg.pinv(jacobian, rcond=1e-6)
@@ -374,24 +389,29 @@ class _Problem:
         for surrogate in range(self.settings.surrogates):
             change = np.zeros(len(jacobian))
             used = 0
+            speed = self.stribeck * _STRIBECK_WITHIN ** rng.standard_normal()
+            other = replace(model, friction=replace(model.friction, stribeck_speed=speed))
             for number, (friction, left) in enumerate(zip(frictions, base, strict=True)):
-                moved = self.scaled_errors(number, model, friction + drawn[number][surrogate]) - left
+                moved = self.scaled_errors(number, other, friction + drawn[number][surrogate]) - left
                 channels = np.split(left, len(self.measured(number)))
                 change[used : used + len(left)] = moved + np.concatenate(
                     [random_phases(item, rng) for item in channels]
                 )
                 used += len(left)
+            change[used : used + len(_GUESSED_WITHIN)] = rng.standard_normal(len(_GUESSED_WITHIN))
             rows.append(-inverse @ change)
         return np.array(rows)
 
     def _identified(self, vector: FloatArray, relative: FloatArray, condition: float) -> Identified:
         mass, force, length = self.settings.units
-        load, stiffness, coulomb, rise, viscous = np.exp(vector[:_ONE_STIFFNESS])
+        load, stiffness, coulomb, rise, viscous = np.exp(vector[: _GUESSED.start])
         static = coulomb + rise
         static_error = math.hypot(coulomb * relative[2], rise * relative[3]) / static
         load_error = math.hypot(relative[0], self.load_change / load)
-        dry = max(relative[2], relative[4])  # what is taken from one of the two is in the other
-        has_second = vector[5] < _NEVER or not self.is_described
+        # What is taken from one of the two is in the other; one that has vanished has no error of its own.
+        vanished = np.min((vector - self.first)[[2, 4]]) < -math.log(_MOST_CHANGE / _AT_BOUND)
+        dry = math.inf if vanished else max(relative[2], relative[4])
+        has_second = vector[_ONE_STIFFNESS] < _NEVER or not self.is_described
         gentler = (Missing.GENTLER_START,) if has_second else ()
         rows: list[tuple[str, str, float, float, float, str, tuple[Missing, ...]]] = [
             ("machine", "load_mass", load, load_error, load_error, mass, gentler or (Missing.ACCELERATION,)),
@@ -466,6 +486,8 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
         "coulomb": 0.8 * friction,
         "static": 0.2 * friction,
         "viscous": 0.2 * friction / top,
+        "onset": 0.005 * top,
+        "damping": 0.03,
     }
 
 

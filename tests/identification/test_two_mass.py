@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from cdtool.axis_model.parameters import AxisModel, Controller, Drive, Friction, Sensors
+from cdtool.axis_model.sensor_filters import first_order_low_pass
 from cdtool.axis_model.simulation import AxisInputs, simulate_axis
-from cdtool.identification.axis_run import AxisRun
+from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import Estimate, IdentificationError, Missing
 from cdtool.identification.two_mass import TwoMassFit, TwoMassSettings, identify_two_mass
 from tests.synthetic.gate_runs import GATE, free_runs, on_any_track
+from tests.synthetic.plain_gate import drawn_gate, strokes
 
 SENSORS = Sensors(accelerometer_hz=GATE.accelerometer_frequency, accelerometer_damping=GATE.accelerometer_damping)
 SETTINGS = TwoMassSettings(motor_mass=GATE.motor_mass, sensors=SENSORS)
@@ -28,13 +30,15 @@ def fit(request: pytest.FixtureRequest) -> TwoMassFit:
 def test_the_gate_is_identified(fit: TwoMassFit) -> None:
     assert fit.identified["load_mass"].value == pytest.approx(GATE.leaf_mass, rel=0.15)
     assert fit.identified["stiffness"].value == pytest.approx(GATE.take_up_stiffness, rel=0.05)
-    assert fit.identified["coulomb_forward"].value == pytest.approx(COULOMB, rel=0.15)
+    assert fit.model.friction.coulomb_forward == pytest.approx(COULOMB, rel=0.15)
     assert fit.model.drive.load_mass == fit.identified["load_mass"].value
 
 
 def test_the_standard_errors_are_of_the_size_of_the_errors(fit: TwoMassFit) -> None:
     truth = {"load_mass": GATE.leaf_mass, "stiffness": GATE.take_up_stiffness, "coulomb_forward": COULOMB}
     for key, value in truth.items():
+        if key == "coulomb_forward" and key not in fit.identified:
+            continue  # one speed may refuse it
         estimate: Estimate = fit.identified[key]
         assert abs(estimate.value - value) < 3.0 * estimate.standard_error
         assert 0.002 < estimate.relative_error < 0.2
@@ -67,7 +71,8 @@ def test_standard_errors_cover_on_other_tracks() -> None:
             ("stiffness", GATE.take_up_stiffness),
             ("coulomb_forward", COULOMB),
         ):
-            inside.append(abs(found[key].value - value) < 2.0 * found[key].standard_error)
+            if key != "coulomb_forward" or key in found:
+                inside.append(abs(found[key].value - value) < 2.0 * found[key].standard_error)
     assert np.mean(inside) >= 0.8
 
 
@@ -140,3 +145,28 @@ def test_a_rigid_drive_is_not_given_a_stiffness() -> None:
         identify_two_mass(runs, TwoMassSettings(motor_mass=60.0))
     with pytest.raises(IdentificationError, match="the motor alone is stated"):
         identify_two_mass(runs, TwoMassSettings(motor_mass=600.0))
+
+
+@pytest.mark.parametrize("number", [0, 6])
+def test_a_damped_drive_keeps_its_one_stiffness(number: int) -> None:
+    """Gates of another simulator, with the damping and the friction near rest that starts do not show alone."""
+    gate = drawn_gate(number)
+    sensors = Sensors(torque_filter_time=gate.torque_filter, accelerometer_hz=gate.accelerometer_hz)
+    runs = [axis_run(recording) for recording in strokes(gate, number, range(14)).recordings]
+    found = identify_two_mass(runs, TwoMassSettings(motor_mass=gate.motor_mass, sensors=sensors)).identified
+    for key, value in (("stiffness", gate.stiffness), ("load_mass", gate.leaf_mass)):
+        assert abs(found[key].value - value) < 1.96 * found[key].standard_error
+
+
+def test_a_stated_low_pass_of_the_torque_is_undone() -> None:
+    model = AxisModel(
+        drive=Drive(motor_mass=150.0, load_mass=300.0, stiffness=9e4, damping=150.0),
+        friction=Friction(coulomb_forward=60.0, coulomb_backward=60.0, static=60.0),
+        controller=Controller(period=1e-3, speed_gain=4000.0, integral_gain=20_000.0),
+    )
+    motion = simulate_axis(model, AxisInputs(0.2 * np.clip((np.arange(3000) * 1e-3 - 0.5) / 0.5, 0.0, 1.0)))
+    torque = first_order_low_pass(motion["drive_force"], 0.03, 1e-3)
+    run = AxisRun("", 0.0, 1e-3, torque, speed=motion["motor_speed"], position=motion["motor_position"])
+    settings = TwoMassSettings(motor_mass=150.0, sensors=Sensors(torque_filter_time=0.03))
+    found = identify_two_mass([run], settings).model.drive
+    assert (found.load_mass, found.stiffness) == pytest.approx((300.0, 9e4), rel=0.05)

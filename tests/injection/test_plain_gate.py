@@ -16,8 +16,7 @@ SOFT, STIFF = 5e3, 500e3
 @pytest.mark.parametrize(
     ("gate", "names"),
     [
-        # Not pure torque: with today's identification 22 % early before the soft obstacle (docs/injection.md).
-        (drawn_gate(0), ("inertial_momentum", "friction_ekf")),
+        (drawn_gate(0), ("inertial_momentum", "friction_ekf", "momentum", "pure_torque")),
         (PlainGate(stiffness=math.inf), ("momentum", "pure_torque")),
     ],
     ids=["elastic", "rigid, logged at the load"],

@@ -126,13 +126,23 @@ class JointIdentification:
         """Return values that are not identifiable alone, but without which the identified ones describe nothing."""
         of_contacts = self.contacts.together if self.contacts else ()
         known = {(item.section, item.key) for item in (*self.estimates, *of_contacts)}
-        found: list[Estimate] = list(self.robot.together) if self.robot else []
+        found: list[Estimate] = [*(self.robot.together if self.robot else ()), *self._friction_of_starts()]
         found += [*self._of_starts(), *self._of_controller()]
         if ("model.friction", "coulomb_backward") in known and ("machine", "constant_force") in known:
             # The difference of the directions contains the constant force: it must not count twice.
             found.append(_exact("model.friction", "offset", 0.0, self.units[1]))
         known |= {(item.section, item.key) for item in self.not_identifiable if not self.robot}
         return (*of_contacts, *(item for item in found if (item.section, item.key) not in known))
+
+    def _friction_of_starts(self) -> list[Estimate]:
+        """Return Coulomb and viscous friction where only their sum is known: without both a model has neither."""
+        units = dict.fromkeys(("coulomb_forward", "coulomb_backward"), self.units[1]) | {"viscous": self.units[3]}
+        found = {item.key for item in self.estimates if item.section == "model.friction"}
+        if not self.two_mass or "load_mass" not in self.two_mass.identified or found & units.keys():
+            return []
+        refused = {item.key for item in self.two_mass.identified.not_identifiable} & units.keys()
+        values = vars(self.two_mass.model.friction)
+        return [_exact("model.friction", key, values[key], units[key]) for key in units if key in refused]
 
     def _of_starts(self) -> list[Estimate]:
         """Return what the starts show together with the identified values: how far they go."""
@@ -143,8 +153,8 @@ class JointIdentification:
             wind_up = drive.observed_wind_up if drive else self.two_mass.largest_wind_up
             found.append(_exact("model.drive", "observed_wind_up", wind_up, self.units[2]))
         if "static" in identified:
-            speed, unit = self.two_mass.model.friction.stribeck_speed, f"{self.units[2]}/s"
-            found.append(_exact("model.friction", "stribeck_speed", speed, unit))
+            values, unit = vars(self.two_mass.model.friction), f"{self.units[2]}/s"
+            found += [_exact("model.friction", key, values[key], unit) for key in ("stribeck_speed", "smoothing_speed")]
         return found
 
     def _of_controller(self) -> list[Estimate]:
@@ -167,7 +177,8 @@ class JointIdentification:
     def not_identifiable(self) -> tuple[NotIdentifiable, ...]:
         """Return the parameters that no method could identify."""
         known = {(item.section, item.key) for item in self.estimates}
-        known |= {(item.section, item.key) for item in self.contacts.together} if self.contacts else set()
+        together = (*self._friction_of_starts(), *(self.contacts.together if self.contacts else ()))
+        known |= {(item.section, item.key) for item in together}
         found: dict[tuple[str, str], NotIdentifiable] = {}
         for fit in (self.rigid, self.two_mass, self.controller, self.robot, self.contacts):
             for item in fit.identified.not_identifiable if fit else ():
