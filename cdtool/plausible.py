@@ -11,16 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import lru_cache
 from itertools import pairwise
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 
 from cdtool.findings import Finding
 from cdtool.findings.channels import ImplausibleValues, Leap, LeapingValues, LearnedInOtherUnit
 from cdtool.findings.plausibility import ChannelCheck
-from cdtool.kernels import READ_ONLY, kernel
 from cdtool.recording import MEASURED, REFERENCES, BoolArray, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
 
@@ -115,7 +113,7 @@ class PlausibleRanges:
                 findings.append(Finding(LearnedInOtherUnit(series.unit, known.unit), name))
                 continue
             of_channel = factors.get(name, ())
-            if not to_learn and not _has_suspects(series, known, FAR.get(name, _FAR_ELSE), of_channel):
+            if not to_learn and _is_usual(series, known, FAR.get(name, _FAR_ELSE)):
                 continue
             wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
             if to_learn and not name.endswith("position"):
@@ -258,77 +256,16 @@ def _implausible(series: Series, known: ChannelRange, far: float, factors: Seque
     return wrong
 
 
-class _FirstLook(NamedTuple):
-    """What `has_implausible` and `has_leap` compare a channel with."""
+def _is_usual(series: Series, known: ChannelRange, far: float) -> bool:
+    """Return True only if no value can be implausible and no step a leap: a quick look, as most channels have neither.
 
-    centre: FloatArray
-    beyond: float
-    ends: FloatArray
-    far: float
-    largest_step: FloatArray
-    rate: float
-
-
-@lru_cache(maxsize=256)
-def _first_look(known: ChannelRange, far: float, factors: tuple[float, ...]) -> _FirstLook:
-    scales = np.array(factors or [0.0] * len(known.centre), dtype=np.float64)
-    near = 0.5 * _WRAP * np.abs(scales)
-    if known.rate > 0.0:
-        largest_step, rate = np.full(len(scales), known.reach), _FASTER * known.rate
-    else:
-        largest_step, rate = np.where(near > _FAR_ENDS * known.reach, 2.0 * near, np.inf), 0.0
-    ends = np.multiply.outer(scales[: len(factors)], _ENDS)
-    beyond = max(far * known.reach, _BEYOND_EXTREME * known.extreme)
-    return _FirstLook(np.array(known.centre), beyond, ends, _FAR_ENDS * known.reach, largest_step, rate)
-
-
-def _has_suspects(series: Series, known: ChannelRange, far: float, factors: Sequence[float]) -> bool:
-    """Return whether a value of a channel is implausible, or a step of it a leap; most channels have neither."""
-    look = _first_look(known, far, tuple(factors))
-    return bool(
-        has_implausible(series.values, look.centre, look.beyond, look.ends, look.far)
-        or has_leap(series.time, series.values, look.largest_step, look.rate)
-    )
-
-
-@kernel(f"b1({_VALUES}, float64[::1], float64, float64[:,::1], float64)", exact=True)
-def has_implausible(values: FloatArray, centre: FloatArray, beyond: float, ends: FloatArray, far: float) -> bool:
-    """Return whether a value (n, J) is `beyond` this distance from `centre` (J,), or an end of the integer range.
-
-    `ends` (J, e) are these ends by joint; they count if they are `far` from the centre. Without rows, no value is one.
+    Near the centre neither an end of a range nor a step from one end to the other is possible.
     """
-    for j in range(values.shape[1]):
-        for k in range(values.shape[0]):
-            distance = abs(values[k, j] - centre[j])
-            if distance > beyond:
-                return True
-            if distance > far:
-                for i in range(ends.shape[1] if len(ends) else 0):
-                    if values[k, j] == ends[j, i]:
-                        return True
-    return False
-
-
-@kernel(f"b1({READ_ONLY}, {_VALUES}, float64[::1], float64)", exact=True)
-def has_leap(time: FloatArray, values: FloatArray, largest: FloatArray, rate: float) -> bool:
-    """Return whether a step between known values (n, J) of a joint is a leap.
-
-    It is one if it is larger than `largest` (J,) and than `rate` times the time [s] between the two values; with `rate`
-    0 also if it is as large as `largest`.
-    """
-    for j in range(values.shape[1]):
-        before = -1
-        for k in range(values.shape[0]):
-            if math.isnan(values[k, j]):
-                continue
-            step = abs(values[k, j] - values[before, j]) if before >= 0 else 0.0
-            if rate > 0.0:
-                if step > largest[j] and step > rate * (time[k] - time[before]):
-                    return True
-            elif step >= largest[j]:
-                return True
-            before = k
-    return False
+    with np.errstate(invalid="ignore"):
+        distance = np.abs(series.values - np.array(known.centre))
+        is_near = distance <= min(far * known.reach, _FAR_ENDS * known.reach)
+        steps = np.abs(np.diff(series.values, axis=0)) if known.rate > 0.0 else np.empty(0)
+        return bool(is_near.all() and (steps <= known.reach).all())
 
 
 def _spikes(values: FloatArray, known: ChannelRange, far: float) -> BoolArray:

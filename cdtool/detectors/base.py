@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 import numpy as np
 
 from cdtool.clock import previous_value
-from cdtool.clock.held_samples import READ_MARKS, READ_TABLE, fill_held, is_on_clock
+from cdtool.clock.held_samples import fill_held, is_on_clock
 from cdtool.clock.lost_samples import lost_samples
 from cdtool.detection import Signal, Status, StatusArray
 from cdtool.dynamics import Gain, Machine
@@ -501,19 +501,9 @@ def hold_last(values: FloatArray, missing: BoolArray) -> FloatArray:
     """
     if not missing.any():
         return values
-    held = np.empty(values.shape)
-    _fill_last(np.ascontiguousarray(values), np.ascontiguousarray(missing), held)
-    return held
-
-
-@kernel(f"void({READ_TABLE}, {READ_MARKS}, float64[:, ::1])")
-def _fill_last(values: FloatArray, missing: BoolArray, held: FloatArray) -> None:
-    for k in range(len(values)):
-        for j in range(values.shape[1]):
-            if not missing[k, j]:
-                held[k, j] = values[k, j]
-            else:
-                held[k, j] = held[k - 1, j] if k > 0 else 0.0
+    last = np.maximum.accumulate(np.where(missing, 0, np.arange(len(values))[:, np.newaxis]), axis=0)
+    started = np.logical_or.accumulate(~missing, axis=0)
+    return np.where(started, np.take_along_axis(values, last, axis=0), 0.0)
 
 
 def observe_momentum(

@@ -375,9 +375,10 @@ def disjoint_clock_findings(first_and_last: Mapping[str, tuple[float, float]]) -
 
 def _is_constant(series: Series) -> list[bool]:
     """Return, joint by joint, whether the value never changes."""
-    constant = np.zeros(series.joint_count, dtype=bool)
-    find_constant(series.values, constant)
-    found: list[bool] = constant.tolist()
+    known = np.isfinite(series.values)
+    lowest = np.where(known, series.values, np.inf).min(axis=0, initial=np.inf)
+    highest = np.where(known, series.values, -np.inf).max(axis=0, initial=-np.inf)
+    found: list[bool] = ((lowest == highest) & (known.sum(axis=0) > 1)).tolist()
     return found
 
 
@@ -405,23 +406,6 @@ def convert_and_mask(
                 continue
             masked[kind, j] += 1
             scaled[i, j] = math.nan
-
-
-@kernel(f"void({_TABLE}, b1[::1])")
-def find_constant(values: FloatArray, constant: BoolArray) -> None:
-    """Set `constant` (J,) where a joint has at least two finite values (n, J), which are all equal."""
-    for j in range(values.shape[1]):
-        first = math.nan
-        for i in range(values.shape[0]):
-            value = values[i, j]
-            if not math.isfinite(value):
-                continue
-            if math.isnan(first):
-                first = value
-            else:
-                constant[j] = value == first
-                if not constant[j]:
-                    break
 
 
 def as_table(values: FloatArray) -> FloatArray:
