@@ -63,7 +63,7 @@ def derivative_checks(recordings: Sequence[Recording], channel: str, other: str)
                 expected = np.abs(path[:, j]) / check.value
                 seen = expected > max(_LARGE * float(np.nanquantile(expected, 0.95)), _ABOVE_NOISE * of_change[j])
                 still = float(np.mean(np.abs(change[seen, j]) < _STILL * expected[seen]))
-                if still > _ODD:  # no ratio shows it: where the position rests there is none
+                if still > _ODD:  # no ratio shows it: at rest there is no ratio
                     check = replace(check, answer="contradicts", found="still", share=still)
         yield Finding(check, channel, "loss" if check.answer == "contradicts" else "note")
 

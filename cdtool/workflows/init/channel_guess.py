@@ -395,7 +395,7 @@ def _ground_truth(channels: Channels) -> None:
             if not (_is_other("force", stream) or side_of_gear(stream.name) or channels.is_of_family(stream))
             and motion.rests_and_peaks(stream)
         ]
-        if len(peaking) == 1:  # of several, none can be told to be the load cell
+        if len(peaking) == 1:  # several say nothing about which is the load cell
             channels.take("force", peaking[0], "constant level with short, high peaks", _BY_COURSE)
     questions = {
         "label": "is it that of the test, not the alarm of the controller?",
