@@ -25,7 +25,7 @@ class LoggedRecording:
     dialect: str = ""
 
     def on_load_side(
-        self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: bool = False
+        self, machine: Machine, ranges: PlausibleRanges | None = None, *, to_learn: tuple[float, float] | None = None
     ) -> Recording:
         """Return the recording on the load side, without values outside the plausible ranges."""
         plausible = self.recording if ranges is None else ranges.masked(self.recording, self.factors, to_learn=to_learn)

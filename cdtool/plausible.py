@@ -96,12 +96,16 @@ class PlausibleRanges:
         return cls(found)
 
     def masked(
-        self, recording: Recording, factors: Mapping[str, Sequence[float]], *, to_learn: bool = False
+        self,
+        recording: Recording,
+        factors: Mapping[str, Sequence[float]],
+        *,
+        to_learn: tuple[float, float] | None = None,
     ) -> Recording:
         """Return the recording without implausible values, and a loss for each joint with such values.
 
-        `factors` convert a channel's logged numbers to SI, per joint. A run `to_learn` from has no contact, so its
-        spikes are masked too.
+        `factors` convert a channel's logged numbers to SI, per joint. The section `to_learn` from [s] has no contact,
+        so its spikes are masked too.
         """
         recording = recording if to_learn else self.without_contradicted(recording)
         channels, findings = dict(recording.channels), list(recording.findings)
@@ -117,7 +121,8 @@ class PlausibleRanges:
                 continue
             wrong = _implausible(series, known, FAR.get(name, _FAR_ELSE), of_channel)
             if to_learn and not name.endswith("position"):
-                wrong |= _spikes(np.where(wrong, np.nan, series.values), known, _SPIKE.get(name, _SPIKE_ELSE))
+                spikes = _spikes(np.where(wrong, np.nan, series.values), known, _SPIKE.get(name, _SPIKE_ELSE))
+                wrong |= spikes & ((to_learn[0] <= series.time) & (series.time <= to_learn[1]))[:, np.newaxis]
             values = np.where(wrong, np.nan, series.values)
             for j in range(series.joint_count):
                 joint = recording.joints[j] if series.joint_count > 1 else ""

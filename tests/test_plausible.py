@@ -133,7 +133,7 @@ def test_a_spike_is_masked_in_a_run_to_learn_from_but_not_in_a_log_to_assess(run
     highest = max(float(np.nanmax(np.abs(item.recording[channel].values))) for item in free)
     spiked = with_values(free[3], channel, slice(300, 300 + samples), times * highest)
     ranges = learned_of([*free[:3], spiked, *free[4:]])
-    made = ranges.masked(spiked.recording, spiked.factors, to_learn=True)
+    made = ranges.masked(spiked.recording, spiked.factors, to_learn=(-np.inf, np.inf))
     assert np.flatnonzero(np.isnan(made[channel].values[:, 0])).tolist() == list(range(300, 300 + samples))
     assert made.findings[-1].severity == "loss" and made.findings[-1].channel == channel
     if times < 10.0:
@@ -143,7 +143,7 @@ def test_a_spike_is_masked_in_a_run_to_learn_from_but_not_in_a_log_to_assess(run
 def test_no_unchanged_sample_of_a_run_to_learn_from_is_a_spike(runs):
     free, ranges = runs
     for log in free:
-        made = ranges.masked(log.recording, log.factors, to_learn=True)
+        made = ranges.masked(log.recording, log.factors, to_learn=(-np.inf, np.inf))
         assert made.findings == log.recording.findings
 
 
@@ -160,7 +160,7 @@ def test_a_log_that_rests_most_of_its_time_has_no_spikes_where_it_moves():
     logs = [log(600.0) for _ in range(12)]
     ranges = learned_of(logs)
     for item in logs:
-        made = ranges.masked(item.recording, item.factors, to_learn=True)
+        made = ranges.masked(item.recording, item.factors, to_learn=(-np.inf, np.inf))
         assert np.isfinite(made["torque"].values).all()
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
+from functools import partial
 from glob import escape
 from pathlib import Path
 
@@ -114,9 +116,11 @@ def named_on_load_side(
     base: Path | None,
     ranges: PlausibleRanges | None,
     onset: OnsetRule,
+    to_learn: tuple[float, float] | None = None,
 ) -> Recording:
-    """Return what `read_named` returns, of a log or run that has been read."""
-    recording = replace(logged.on_load_side(machine_file.machine, ranges), name=shown_path(path, base))
+    """Return what `read_named` returns, of a log or run that has been read; `to_learn`: see PlausibleRanges.masked."""
+    whole = logged.on_load_side(machine_file.machine, ranges, to_learn=to_learn)
+    recording = replace(whole, name=shown_path(path, base))
     recording = with_scalar_force(recording, onset)
     return recording if ranges else without_contradicted(recording, machine_file.machine, onset)
 
@@ -255,11 +259,8 @@ def load_runs(
             if isinstance(item, CdtoolError):
                 raise item
             _refuse_doubted(path, item.recording)
-            recording = item.on_load_side(machine_file.machine, known.all, to_learn=True)
-            recording = with_scalar_force(replace(recording, name=shown_path(path, base)), rule)
-            contacts: Sequence[Contact] | None = None
-            if reading.part:
-                recording, contacts = reading.part(listed, recording)
+            load = partial(named_on_load_side, item, path, machine_file, base, known.all, rule)
+            recording, contacts = _to_learn_from(load, listed, reading.part)
             parts = operations_of(recording, reading.operations)
         except CdtoolError as fault:
             skipped.append(unread(path, base, fault))
@@ -286,6 +287,18 @@ def load_runs(
     by_name = {name: item.contradicted_by(checks) for name, item in known.by_name.items()}
     known = LearnedRanges(known.all.contradicted_by(checks), by_name)
     return Runs(tuple(operations), tuple(skipped), (*findings, *unchecked(without)), known, lasts)
+
+
+def _to_learn_from(
+    load: Callable[[tuple[float, float] | None], Recording],
+    listed: Path,
+    part: PartOfLog | None,
+) -> tuple[Recording, Sequence[Contact] | None]:
+    """Return what is learned from, and its contacts if known: beyond it, what looks like a spike may be one."""
+    if part is None:
+        return load((-math.inf, math.inf)), None
+    section, _ = part(listed, load(None))
+    return part(listed, load((section.start, section.end)))
 
 
 def to_be_seen(paths: Iterable[Path]) -> list[Path]:

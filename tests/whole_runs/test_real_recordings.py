@@ -118,3 +118,4 @@ def test_all_collisions_of_a_jittering_arm_are_found_with_three_edits_of_a_draft
     result = cdtool.benchmark(file)
     assert list(result.contacts.outcome) == ["detected"] * 16 and len(result.false_alarms) == 0
     assert result.contacts.clipped.sum() == 3
+    assert not [item for item in result.results.findings if item.is_loss]  # no peak of a contact is a spike
