@@ -87,10 +87,11 @@ class Ratio:
     def certain(self) -> bool:
         """Whether only one combination fits, well, and the names indicate the same.
 
-        Without the names a gear might have that ratio: 1 m per turn is that of turns and 1/min.
+        Without the names a gear might have that ratio: 1 m per turn is that of turns and 1/min. The rate of a counter
+        follows from the ratio: it fits any units.
         """
         first = self.fitting[0]
-        return len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
+        return not self.tick and len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
 
 
 def stated(channel: str, stream: Stream) -> Stated:
