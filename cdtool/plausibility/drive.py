@@ -120,7 +120,7 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
     elif not inertia and fit.value["viscous"] * mean > _LIKE_SPEED * fit.value["friction"] > 0.0:
         yield replace(check, found="viscous")
     else:
-        answer, found = _VERDICTS.get((friction, inertia), ("not checked", "unclear"))
+        answer, found = _VERDICTS.get((friction, inertia or _sure(fit, "viscous")), ("not checked", "unclear"))
         yield replace(check, answer=answer, found=found, share=fit.errors["friction"])
     expected = float(machine.nominal_inertia[j])
     if not machine.coupled and min(friction, inertia) > 0 and expected > 0.0:

@@ -188,3 +188,12 @@ def test_a_real_robot_that_is_pushed_hardly_moves_or_holds_a_pose_contradicts_no
     machine_file = read_machine_file(ROOT / "sample_logs" / "ur10e" / "machine.toml")
     found = checks([cdtool.read(ROOT / "sample_logs" / "ur10e" / f"{log}.csv.gz", machine_file)], machine_file)
     assert not [item for item in found if item.answer == "contradicts"]
+
+
+@pytest.mark.parametrize("name", ["ur3", "ur10e_motions"])
+@pytest.mark.parametrize("joint", ["Base", "Wrist 1", "Wrist 2", "Wrist 3"])
+def test_the_wrong_sign_of_one_joint_is_found_by_what_grows_with_its_speed(machine, name, joint):
+    machine_file, recordings = machine(name)
+    signs = [-1.0 if other == joint else 1.0 for other in JOINTS]
+    found = checks([channel("torque", lambda values: values * signs)(item) for item in recordings], machine_file)
+    assert [item.joint for item in found if item.answer == "contradicts"] == [joint]
