@@ -30,8 +30,9 @@ _KEPT = 0.9
 # A coefficient is sure above so many standard errors, if it is this share of the torque's spread, and if the other
 # columns leave this share of its own column unexplained. Blocks of so many windows are independent.
 _ERRORS, _SHARE, _OWN, _BLOCK = 6.0, 0.1, 0.1, 10
-# Larger shares for what is weaker evidence: an inertia, and friction that follows the motion of another joint.
-_INERTIA, _OF_OTHER = 0.3, 0.5
+# Larger shares for what is weaker evidence: the sign of an inertia, its size (smaller by a filtered torque or a coarse
+# speed), and friction that follows the motion of another joint.
+_INERTIA, _OF_SIZE, _OF_OTHER = 0.3, 0.5, 0.5
 # Above the first share a torque is a function of positions alone, above the second one of positions and speed, seen in
 # this number of windows for each term. Of weight and friction in one direction they explain 0.9995 in simulated arms.
 _PLACE, _EXACT, _TO_EXPLAIN = 0.99999, 0.999999, 10
@@ -123,7 +124,7 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
         answer, found = _VERDICTS.get((friction, inertia or _sure(fit, "viscous")), ("not checked", "unclear"))
         yield replace(check, answer=answer, found=found, share=fit.errors["friction"])
     expected = float(machine.nominal_inertia[j])
-    if not machine.coupled and min(friction, inertia) > 0 and expected > 0.0:
+    if not machine.coupled and min(friction, _sure(fit, f"inertia {j}", _OF_SIZE), expected) > 0:
         seen = fit.value[f"inertia {j}"]
         answer = "agrees" if 1.0 / _FACTOR < seen / expected < _FACTOR else "contradicts"
         unit = {"N": "kg", "N m": "kg m2"}.get(machine.force_unit, "")
