@@ -21,7 +21,8 @@ from cdtool.workflows.init.units_in_names import label, own_name, unit_in_name
 # Units of position and speed that belong together, the likelier first; the first of each kind are both SI.
 _PAIRS = (
     ("rad", "rad/s"), ("m", "m/s"), ("mm", "mm/s"), ("deg", "deg/s"), ("rad", "rpm"), ("deg", "rpm"), ("rev", "rpm"),
-    ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("m", "m/min"), ("rad", "deg/s"),
+    ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("mm", "mm/min"), ("m", "m/min"),
+    ("rad", "deg/s"), ("um", "mm/s"), ("deg", "deg/min"),
 )  # fmt: skip
 # Largest deviation of a ratio that fits; below the second one the fit is certain.
 _NEAR, _SURE = 0.02, 0.01
@@ -117,10 +118,8 @@ def seems_to_turn(channels: Channels) -> bool:
     """Whether a single joint turns by the name of its torque: no more than two turns, no name or unit of a length."""
     if channels.joints > 1 or "torque" not in channels.found:
         return False
-    if (
-        not is_twist(label(channels.found["torque"].stream))
-        or stated("torque", channels.found["torque"].stream).si == "N"
-    ):
+    drive = channels.found["torque"].stream
+    if not is_twist(label(drive)) or stated("torque", drive).si == "N":
         return False
     if any(motion_kind(name, channels) for name in ("position", "speed")):
         return False
