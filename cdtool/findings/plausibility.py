@@ -48,6 +48,7 @@ _WHY_NOT = {
     "rest": "the joint hardly moves",
     "few": "too little motion",
     "one direction": "motion in one direction, with no start that shows the sign",
+    "viscous": "it follows the speed, with neither dry friction nor inertia: it may be a set value of the speed",
     "unclear": "the motion does not show it",
     "apart": "in {value:.0%} of the motion it has the opposite sign of the derivative of the {other}",
 }
@@ -95,6 +96,5 @@ class ChannelCheck(Fact):
         text = f"{f'of {self.joint}: ' if self.joint else ''}{self.seen}"
         if self.answer != "contradicts":
             return text
-        cure = _CONTRADICTIONS[self.found][1].format(**vars(self))
-        confirm = f"or write confirmed = true under {self.channel} if it is right"
-        return f"{text}, not assessable: {cure}, {confirm}, and learn again"
+        cure = _CONTRADICTIONS[self.found][1] + ", or write confirmed = true under {channel} if it is right"
+        return f"{text}, not assessable: {cure.format(**vars(self))}, and learn again"

@@ -30,22 +30,23 @@ _KEPT = 0.9
 # A coefficient is sure above so many standard errors, if it is this share of the torque's spread, and if the other
 # columns leave this share of its own column unexplained. Blocks of so many windows are independent.
 _ERRORS, _SHARE, _OWN, _BLOCK = 6.0, 0.1, 0.1, 10
-# Larger shares for what is weaker evidence: an inertia, and friction that follows the motion of another joint.
-_INERTIA, _OF_OTHER = 0.3, 0.5
+# Larger shares for what is weaker evidence: the sign of an inertia, its size (smaller by a filtered torque or a coarse
+# speed), and friction that follows the motion of another joint.
+_INERTIA, _OF_SIZE, _OF_OTHER = 0.3, 0.5, 0.5
 # Above the first share a torque is a function of positions alone, above the second one of positions and speed, seen in
 # this number of windows for each term. Of weight and friction in one direction they explain 0.9995 in simulated arms.
 _PLACE, _EXACT, _TO_EXPLAIN = 0.99999, 0.999999, 10
 # Above this share an acceleration is a function of the place.
 _SINE = 0.95
+# Friction of which more than this share grows with the speed, without inertia, may be a set value of the speed.
+_LIKE_SPEED = 0.9
 # The inertia of the machine file may be wrong by this factor.
 _FACTOR = 3.0
 
 
 # The answer by the signs of friction and inertia, 0 if not sure. Friction alone is sure of several joints only.
 _VERDICTS: dict[tuple[int, int], tuple[Answer, str]] = {
-    (1, -1): ("agrees", "friction"),
-    (1, 0): ("agrees", "friction"),
-    (1, 1): ("agrees", "friction"),
+    **{(1, inertia): ("agrees", "friction") for inertia in (-1, 0, 1)},
     (-1, -1): ("contradicts", "friction"),
     (-1, 0): ("not checked", "against"),
 }
@@ -95,7 +96,8 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
     forward = float(np.mean(speed[moving, j] > 0.0)) if moving.any() else 0.0
     both = _BOTH < forward < 1.0 - _BOTH
     place = _place(position, known, j, (3, 4, 5))
-    columns = _motion_columns(windows, j, usual, both, float(np.mean(np.abs(speed[moving, j]))))
+    mean = float(np.mean(np.abs(speed[moving, j])))
+    columns = _motion_columns(windows, j, usual, both, mean)
     # Where strokes begin and end at the same places, higher powers would take the part of the inertia.
     table = np.column_stack([*columns.values(), place if both and len(usual) > 1 else _place(position, known, j)])
     used = moving & np.isfinite(table).all(axis=1)
@@ -116,11 +118,13 @@ def _checked(check: ChannelCheck, windows: Windows, j: int, machine: Machine) ->
         yield replace(check, found="one direction")
     elif follows := [k for k in range(len(usual)) if _follows(fit, k)]:
         yield replace(check, answer="contradicts", found="other joint", other=machine.joints[follows[0]])
+    elif not inertia and fit.value["viscous"] * mean > _LIKE_SPEED * fit.value["friction"] > 0.0:
+        yield replace(check, found="viscous")
     else:
-        answer, found = _VERDICTS.get((friction, inertia), ("not checked", "unclear"))
+        answer, found = _VERDICTS.get((friction, inertia or _sure(fit, "viscous")), ("not checked", "unclear"))
         yield replace(check, answer=answer, found=found, share=fit.errors["friction"])
     expected = float(machine.nominal_inertia[j])
-    if not machine.coupled and min(friction, inertia) > 0 and expected > 0.0:
+    if not machine.coupled and min(friction, _sure(fit, f"inertia {j}", _OF_SIZE), expected) > 0:
         seen = fit.value[f"inertia {j}"]
         answer = "agrees" if 1.0 / _FACTOR < seen / expected < _FACTOR else "contradicts"
         unit = {"N": "kg", "N m": "kg m2"}.get(machine.force_unit, "")
@@ -153,13 +157,11 @@ def explained(motion: FloatArray, torque: FloatArray) -> float:
 def _motion_columns(windows: Windows, j: int, usual: FloatArray, both: bool, mean: float) -> dict[str, FloatArray]:
     """Return a column of each term but the place: its name, and its value in each window (w,)."""
     speed, acceleration = windows.means["speed"], windows.rate("speed")
-    usual = np.where(np.isfinite(speed).any(axis=0), usual, 0.0)
     moved = [k for k in range(len(usual)) if usual[k] > _HARDLY * usual.max()]
     direction, size = np.sign(speed[:, j]), np.abs(speed[:, j])
-    # In one direction only, the mean is friction and weight in one.
     columns = {"friction": direction, "viscous": (size - mean) * direction}
-    if both:
-        columns["mean"] = np.ones(len(speed))
+    # In one direction only, the mean is friction and weight in one.
+    columns |= {"mean": np.ones(len(speed))} if both else {}
     columns |= {f"inertia {k}": acceleration[:, k] for k in moved}
     # Of another joint the sign of the speed, without a step where it turns round.
     return columns | {f"friction {k}": np.tanh(speed[:, k] / (0.05 * usual[k])) for k in moved if k != j}

@@ -110,6 +110,10 @@ def tool(position: np.ndarray) -> np.ndarray:
     return 0.6 * np.cos(2.0 * position + 0.3)
 
 
+def ahead(speed: np.ndarray) -> np.ndarray:
+    return np.roll(speed, -5, axis=0)
+
+
 # Each wrong map: the channel that is wrong, how, and what it needs.
 WRONG = {
     "torque with the wrong sign": ("torque", channel("torque", np.negative), "torque"),
@@ -120,6 +124,7 @@ WRONG = {
     "position for torque": ("torque", instead("torque", "position", np.positive), "position"),
     "tool for torque": ("torque", instead("torque", "position", tool), "position"),
     "speed for torque": ("torque", instead("torque", "speed", np.positive), "speed"),
+    "set speed for torque": ("torque", instead("torque", "speed", ahead), "speed"),
     "load cell for drive": ("torque", instead("torque", "force", np.positive), "force"),
     "tool for position": ("speed", channel("position", tool), "position"),
     "current of another joint": ("torque", channel("torque", lambda values: np.roll(values, 1, axis=1)), "joints"),
@@ -128,7 +133,8 @@ WRONG = {
 }
 # Those that are certain to be found, where the machine's motion shows what is wrong.
 FOUND = {
-    "gate": {*WRONG} - {"load cell for drive", "current of another joint", "swapped joints", "tool for position"},
+    "gate": {*WRONG} - {"set speed for torque", "load cell for drive", "current of another joint", "swapped joints",
+                        "tool for position"},
     "arm": {"speed with the wrong sign", "acceleration with the wrong sign", "deg for rad", "mm for m",
             "position for torque", "tool for torque", "speed for torque", "row number for time"},
     "emps": {"torque with the wrong sign", "position for torque", "tool for torque", "speed for torque"},
@@ -182,3 +188,12 @@ def test_a_real_robot_that_is_pushed_hardly_moves_or_holds_a_pose_contradicts_no
     machine_file = read_machine_file(ROOT / "sample_logs" / "ur10e" / "machine.toml")
     found = checks([cdtool.read(ROOT / "sample_logs" / "ur10e" / f"{log}.csv.gz", machine_file)], machine_file)
     assert not [item for item in found if item.answer == "contradicts"]
+
+
+@pytest.mark.parametrize("name", ["ur3", "ur10e_motions"])
+@pytest.mark.parametrize("joint", ["Base", "Wrist 1", "Wrist 2", "Wrist 3"])
+def test_the_wrong_sign_of_one_joint_is_found_by_what_grows_with_its_speed(machine, name, joint):
+    machine_file, recordings = machine(name)
+    signs = [-1.0 if other == joint else 1.0 for other in JOINTS]
+    found = checks([channel("torque", lambda values: values * signs)(item) for item in recordings], machine_file)
+    assert [item.joint for item in found if item.answer == "contradicts"] == [joint]

@@ -21,7 +21,8 @@ from cdtool.workflows.init.units_in_names import factor_of, label, own_name, si_
 # Units of position and speed that belong together, the likelier first; the first of each kind are both SI.
 _PAIRS = (
     ("rad", "rad/s"), ("m", "m/s"), ("mm", "mm/s"), ("deg", "deg/s"), ("rad", "rpm"), ("deg", "rpm"), ("rev", "rpm"),
-    ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("m", "m/min"), ("rad", "deg/s"),
+    ("deg", "rad/s"), ("m", "mm/s"), ("mm", "m/s"), ("mm", "m/min"), ("mm", "mm/min"), ("m", "m/min"),
+    ("rad", "deg/s"), ("um", "mm/s"), ("deg", "deg/min"),
 )  # fmt: skip
 # Largest deviation of a ratio that fits; below the second one the fit is certain.
 _NEAR, _SURE = 0.02, 0.01
@@ -87,10 +88,11 @@ class Ratio:
     def certain(self) -> bool:
         """Whether only one combination fits, well, and the names indicate the same.
 
-        Without the names a gear might have that ratio: 1 m per turn is that of turns and 1/min.
+        Without the names a gear might have that ratio: 1 m per turn is that of turns and 1/min. The rate of a counter
+        follows from the ratio: it fits any units.
         """
         first = self.fitting[0]
-        return len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
+        return not self.tick and len(self.fitting) == 1 and first.off < _SURE and first.named and first.unlikely < 1.0
 
 
 def stated(channel: str, stream: Stream) -> Stated:
@@ -116,10 +118,8 @@ def seems_to_turn(channels: Channels) -> bool:
     """Whether a single joint turns by the name of its torque: no more than two turns, no name or unit of a length."""
     if channels.joints > 1 or "torque" not in channels.found:
         return False
-    if (
-        not is_twist(label(channels.found["torque"].stream))
-        or stated("torque", channels.found["torque"].stream).si == "N"
-    ):
+    drive = channels.found["torque"].stream
+    if not is_twist(label(drive)) or stated("torque", drive).si == "N":
         return False
     if any(motion_kind(name, channels) for name in ("position", "speed")):
         return False

@@ -143,15 +143,28 @@ def test_a_ratio_near_that_of_units_does_not_match_them(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("position", "speed", "certain"),
-    [("phi", "n", True), ("pos", "n", False)],
-    ids=["an angle by name", "a position that may be a travel"],
+    ("clock", "position", "speed", "certain"),
+    [("t [s]", "phi", "n", True), ("t [s]", "pos", "n", False), ("ticks", "phi", "n", False)],
+    ids=["an angle by name", "a position that may be a travel", "a counter whose rate fits any ratio"],
 )
-def test_a_ratio_is_certain_only_if_the_names_agree(tmp_path, position, speed, certain):
+def test_a_ratio_is_certain_only_if_names_and_clock_agree(tmp_path, clock, position, speed, certain):
     run = stroke()
-    draft = drafted_columns(tmp_path, {"t [s]": run.time, position: run.travel, speed: run.speed * RPM})
+    time = run.time * (1e4 if clock == "ticks" else 1.0)
+    draft = drafted_columns(tmp_path, {clock: time, position: run.travel, speed: run.speed * RPM})
     assert (draft.unit("position"), draft.unit("speed")) == ("rad", "rpm")
     assert draft.checked("position") is not certain and draft.checked("speed") is not certain
+
+
+@pytest.mark.parametrize(
+    ("names", "factors"),
+    [(("travel", "velocity"), (7.0, 420.0)), (("angle", "angular velocity"), (9.0, 540.0)), (("Weg", "v"), (9e3, 9.0))],
+    ids=["mm and mm/min, or m and m/min", "deg and deg/min, or rev and rpm", "um and mm/s, or mm and m/s"],
+)
+def test_a_ratio_of_units_of_any_size_is_not_certain(tmp_path, names, factors):
+    run = stroke()
+    columns = {"t [s]": run.time, names[0]: factors[0] * run.travel, names[1]: factors[1] * run.speed}
+    draft = drafted_columns(tmp_path, columns)
+    assert draft.checked("position") and draft.checked("speed")
 
 
 def test_units_in_names_that_fit_the_ratio_are_not_marked(tmp_path):
