@@ -144,7 +144,7 @@ def _mapped(draft: Draft, name: str, logged: Logged | None, reverse: Sequence[Ch
     turned = {joint for item in reverse for joint in ([item.joint] if item.joint else draft.joints)}
     signs = [-1.0 if joint in turned else 1.0 for joint in draft.joints]
     # A force in a guessed unit is not compared with limits.
-    guess = ", unit_confirmed = false }" if name in RIG_UNITS and logged is not None and logged.check else " }"
+    guess = ", unit_confirmed = false }" if name in RIG_UNITS and logged and logged.check and not logged.why else " }"
     line = f"{name} = {_channel(draft, name, logged, signs).removesuffix(' }')}{guess}"
     return _commented(line, _marked(why, "; ".join(check for check in checks if check)))
 

@@ -211,7 +211,7 @@ def test_a_stated_unit_that_makes_a_log_slower_than_any_is_marked_without_a_moti
 
 
 @pytest.mark.parametrize(
-    ("name", "confirmed"), [("load cell [N]", None), ("load cell", False), ("load cell [kg]", False)]
+    ("name", "confirmed"), [("load cell [N]", None), ("load cell", False), ("load cell [kg]", None), ("F_cell_N", None)]
 )
 def test_a_force_in_a_guessed_unit_is_not_confirmed(tmp_path, name, confirmed):
     run = stroke()
