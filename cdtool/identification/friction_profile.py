@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class FrictionProfile:
     spacing: float
     parts: FloatArray
     level_deviation: float
-    shares: FloatArray
+    shares: FloatArray = field(default_factory=lambda: np.eye(4)[0])
 
     __repr__ = short_repr
 
@@ -65,17 +65,13 @@ class FrictionProfile:
         Where the profile is known they are the random level of the mean of the runs alone.
         """
         moving = np.clip(travelled / self.spacing, 0.0, 1.0)
-        unknown = travelled < self.begins
-        drawn = np.empty((count, len(travelled)))
-        for number in range(count):
-            force = np.full(len(travelled), self.level_deviation * rng.standard_normal())
-            if len(self.force):
-                profile = random_phases(self.force, rng)
-                grid = self.spacing * np.arange(len(profile))
-                extended = np.interp(travelled, grid, profile, period=self.spacing * len(profile))
-                force = force + np.where(unknown, extended, 0.0)
-            drawn[number] = force * moving
-        return drawn
+        known, drawn = self.force, []
+        grid = self.spacing * np.arange(len(known) + 1)
+        for _ in range(count):
+            level = self.level_deviation * rng.standard_normal()
+            profile = np.interp(travelled, grid[:-1], random_phases(known, rng), period=grid[-1]) if len(known) else 0.0
+            drawn.append((level + np.where(travelled < self.begins, profile, 0.0)) * moving)
+        return np.array(drawn)
 
     def knots(self) -> tuple[FloatArray, FloatArray]:
         """Return positions (k,) [m, rad] where the profile is not known, and the covariance (k, k) of its forces there.
@@ -119,12 +115,11 @@ def friction_profile(runs: Sequence[AxisRun], ensemble: StartEnsemble, motor_mas
     begins = max((position[0] for position, _ in known), default=0.0)
     ends = min((position[-1] for position, _ in known if len(position) >= 0.5 * longest), default=0.0)
     count = int((ends - begins) / spacing) + 1
-    shares = friction_shares(0.0, np.inf, 0.0)
     if longest < _FEWEST or count < _FEWEST:
-        return FrictionProfile(np.inf, spacing, np.zeros((4, 0)), level, shares)
+        return FrictionProfile(np.inf, spacing, np.zeros((4, 0)), level)
     grid = begins + spacing * np.arange(count)
     mean = np.mean([[np.interp(grid, position, part) for part in parts] for position, parts in known], axis=0)
-    return FrictionProfile(float(begins), spacing, mean - np.mean(mean, axis=1, keepdims=True), level, shares)
+    return FrictionProfile(float(begins), spacing, mean - np.mean(mean, axis=1, keepdims=True), level)
 
 
 def _settled(
@@ -140,15 +135,13 @@ def _settled(
     speed, torque = (ensemble.direction * np.nan_to_num(values[first:]) for values in (motor_speed(run), run.torque))
     smooth, acceleration = rate(speed, 0), rate(speed, 1)
     force, curvature = (rate(torque, order) - motor_mass * rate(speed, order + 1) for order in (0, 2))
-    fast = np.flatnonzero(smooth >= _REACHED * ensemble.nominal_speed)
-    if not len(fast):
-        return None
-    begin = int(fast[0]) + round(_SETTLED_AFTER / run.period)
+    is_fast = smooth >= _REACHED * ensemble.nominal_speed
+    begin = int(np.argmax(is_fast)) + round(_SETTLED_AFTER / run.period)
     left = np.flatnonzero(np.abs(smooth[begin:] / ensemble.nominal_speed - 1.0) > _BAND)
     # The averages at the end of a log reach beyond it.
     end = min(begin + int(left[0]) if len(left) else len(speed), len(speed) - round(3.0 * _AVERAGED / run.period))
     step = max(round(_GRID / run.period), 1)
-    if end - begin < _FEWEST * step:
+    if not is_fast.any() or end - begin < _FEWEST * step:
         return None
     kept = slice(begin, end, step)
     travelled = np.maximum.accumulate((np.cumsum(speed) * run.period)[kept])

@@ -43,8 +43,10 @@ PARAMETERS = (*_ALWAYS, "take_up", "end_stiffness")
 _ONE_STIFFNESS, _NEVER = len(_ALWAYS), math.log(1e9)
 # Without the speed at which friction sets in and the drive's damping, starts give a wrong stiffness, or a second one;
 # without the friction's rise towards rest, a wrong load. Alone they show these badly, and a rise that vanishes has no
-# error: each is guessed within a factor (one standard deviation), from which the fit moves it.
+# error: each is guessed within a factor (one standard deviation), from which the fit moves it by at most so many of
+# them. Friction that sets in only where its rise has gone again had 5 times the static friction.
 _GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("static"), _ONE_STIFFNESS), np.log([3.0, 2.0, 3.0, 2.0])
+_MOST_GUESSED = 2.0
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.5
 # The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
@@ -179,7 +181,7 @@ class _Problem:
             static=coulomb + rise,
             stribeck_speed=rise_speed,
             viscous=viscous,
-            smoothing_speed=onset,
+            smoothing_speed=onset * rise_speed,
         )
         period = self.ensembles[0].period
         gain = _CORRECTION_RATE * drive.total_mass
@@ -294,8 +296,9 @@ class _Problem:
 
         count, knots = len(PARAMETERS), len(first) - len(PARAMETERS)
         reach = np.concatenate((np.full(count, math.log(_MOST_CHANGE)), np.full(knots, np.inf)))
-        reach[_ONE_STIFFNESS] = math.log(2.0)
-        reach = reach[free]
+        reach[_ONE_STIFFNESS], reach[_GUESSED] = math.log(2.0), _MOST_GUESSED * _GUESSED_WITHIN
+        centre = np.array([*first[: _GUESSED.start], *self.first[_GUESSED], *first[_GUESSED.stop :]])
+        bounds = (centre - reach)[free], (centre + reach)[free]
         scale = np.concatenate((np.full(count, 0.3), np.full(knots, 0.03 * self.start["coulomb"])))[free]
 
         def whole(values: FloatArray) -> FloatArray:
@@ -317,7 +320,7 @@ class _Problem:
             ftol=tolerance,
             xtol=1e-4,
             max_nfev=calls,
-            bounds=(first[free] - reach, first[free] + reach),
+            bounds=bounds,
             x_scale=scale,
         )
         return whole(np.asarray(found.x, dtype=np.float64)), 2.0 * float(found.cost)
@@ -359,15 +362,14 @@ class _Problem:
         """Return the fit with standard errors from surrogates of the friction over position."""
         model, frictions = self.model(vector), self.frictions(vector)
         free = np.arange(len(vector)) if vector[_ONE_STIFFNESS] < _NEVER else self.one_stiffness
-        count = len(PARAMETERS) - len(vector) + len(free)
         jacobian = self.jacobian(vector, free)
-        own = jacobian[:, :count]
+        own = jacobian[:, free < len(PARAMETERS)]
         norms = np.linalg.norm(own, axis=0)
         condition = float(np.linalg.cond(own / np.where(norms > 0.0, norms, 1.0)))
-        inverse = np.linalg.pinv(jacobian, rcond=1e-6)
+        inverse = np.asarray(np.linalg.pinv(jacobian, rcond=1e-6), np.float64)
         # At least what the weights of the fit give: what it leaves over is smaller where it follows the noise.
-        relative = np.maximum(self._relative_deviation(inverse, vector), np.linalg.norm(inverse, axis=1))
-        relative = relative if self.is_described else np.full(len(relative), np.inf)
+        least = np.linalg.norm(inverse, axis=1) if self.is_described else np.full(len(free), np.inf)
+        relative = np.maximum(self._relative_deviation(inverse, vector), least)
         return TwoMassFit(
             identified=self._identified(vector, relative, condition),
             model=replace(model, controller=None),
@@ -394,18 +396,14 @@ class _Problem:
         base = [self.scaled_errors(number, model, friction) for number, friction in enumerate(frictions)]
         rows = []
         for surrogate in range(self.settings.surrogates):
-            change = np.zeros(inverse.shape[1])
-            used = 0
+            parts = []
             for number, (friction, left) in enumerate(zip(frictions, base, strict=True)):
                 moved = self.scaled_errors(number, model, friction + drawn[number][surrogate]) - left
                 channels = np.split(left, len(self.measured(number)))
-                change[used : used + len(left)] = moved + np.concatenate(
-                    [random_phases(item, rng) for item in channels]
-                )
-                used += len(left)
-            change[used : used + len(_GUESSED_WITHIN)] = rng.standard_normal(len(_GUESSED_WITHIN))
-            rows.append(inverse @ change)
-        return np.sqrt(np.mean(np.square(rows), axis=0))
+                parts.append(moved + np.concatenate([random_phases(item, rng) for item in channels]))
+            change = np.concatenate((*parts, rng.standard_normal(len(_GUESSED_WITHIN))))
+            rows.append(inverse[:, : len(change)] @ change)
+        return np.asarray(np.sqrt(np.mean(np.square(rows), axis=0)))
 
     def _identified(self, vector: FloatArray, relative: FloatArray, condition: float) -> Identified:
         mass, force, length = self.settings.units
@@ -469,7 +467,8 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
     """Return start values from the accelerated and from the settled part of a start."""
     sign = float(ensemble.direction)
     speed, force = sign * ensemble.mean["speed"], sign * ensemble.mean["torque"]
-    speed = _smooth(speed, ensemble.period, 0.05)
+    width = max(round(0.05 / ensemble.period), 1)
+    speed = np.convolve(speed, np.full(width, 1.0 / width), mode="same")
     acceleration = np.gradient(speed, ensemble.period)
     top = float(np.max(speed))
     settled = speed > 0.95 * top
@@ -491,7 +490,7 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
         "coulomb": 0.8 * friction,
         "static": 0.2 * friction,
         "viscous": 0.2 * friction / top,
-        "onset": 0.005 * top,
+        "onset": 0.05,
         "damping": 0.03,
         "rise_speed": 0.1 * top,
     }
@@ -517,8 +516,3 @@ def _scales(ensemble: StartEnsemble) -> dict[str, float]:
         spread = float(np.sqrt(np.mean(ensemble.deviation[name] ** 2)))
         scales[name] = max(spread, _LEAST_SHARE * float(np.max(np.abs(mean))), 1e-300)
     return scales
-
-
-def _smooth(values: FloatArray, period: float, seconds: float) -> FloatArray:
-    width = max(round(seconds / period), 1)
-    return np.convolve(values, np.full(width, 1.0 / width), mode="same")
