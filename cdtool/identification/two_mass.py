@@ -43,10 +43,9 @@ PARAMETERS = (*_ALWAYS, "take_up", "end_stiffness")
 _ONE_STIFFNESS, _NEVER = len(_ALWAYS), math.log(1e9)
 # Without the speed at which friction sets in and the drive's damping, starts give a wrong stiffness, or a second one;
 # without the friction's rise towards rest, a wrong load. Alone they show these badly, and a rise that vanishes has no
-# error: each is guessed within a factor (one standard deviation), from which the fit moves it by at most so many of
-# them. Friction that sets in only where its rise has gone again had 5 times the static friction.
+# error: each is guessed within a factor (one standard deviation), by which the fit moves it at most. Friction that sets
+# in only where its rise has gone again had 5 times the static friction, and a long rise took the place of the load.
 _GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("static"), _ONE_STIFFNESS), np.log([3.0, 2.0, 3.0, 2.0])
-_MOST_GUESSED = 2.0
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.5
 # The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
@@ -276,14 +275,14 @@ class _Problem:
                 f"the load ends at {math.exp(vector[0]):.3g} {self.settings.units[0]}, the bound of the search",
                 "check machine.motor_inertia, the torque's scale, and that the logs are of this machine",
             )
-        self._refuse_rigid(vector, cost)
-        largest, others = self.largest_wind_up(vector), []
+        largest, others = self.largest_wind_up(rough), []
         for softer, take_up, ratio in _SECOND_STARTS:
-            first = vector.copy()
+            first = rough.copy()
             first[1] += math.log(softer)
             first[_ONE_STIFFNESS : len(PARAMETERS)] = math.log(take_up * largest), first[1] + math.log(ratio)
             others.append(self._fitted(first, np.arange(len(vector)), 1e-4, 20))
         other, lower = min(others, key=lambda item: item[1])
+        self._refuse_rigid(vector, min(cost, lower))
         if lower < cost:
             self.load_change = float(np.exp(other[0]) - np.exp(vector[0]))
         independent = sum(_INDEPENDENT * item.count * len(self.measured(n)) for n, item in enumerate(self.ensembles))
@@ -296,7 +295,7 @@ class _Problem:
 
         count, knots = len(PARAMETERS), len(first) - len(PARAMETERS)
         reach = np.concatenate((np.full(count, math.log(_MOST_CHANGE)), np.full(knots, np.inf)))
-        reach[_ONE_STIFFNESS], reach[_GUESSED] = math.log(2.0), _MOST_GUESSED * _GUESSED_WITHIN
+        reach[_ONE_STIFFNESS], reach[_GUESSED] = math.log(2.0), _GUESSED_WITHIN
         centre = np.array([*first[: _GUESSED.start], *self.first[_GUESSED], *first[_GUESSED.stop :]])
         bounds = (centre - reach)[free], (centre + reach)[free]
         scale = np.concatenate((np.full(count, 0.3), np.full(knots, 0.03 * self.start["coulomb"])))[free]
