@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,10 +20,11 @@ from cdtool.short_repr import short_repr
 
 # The motion is settled this long after it reached this share of the nominal speed, while it stays within a band [s, -].
 _SETTLED_AFTER, _REACHED, _BAND = 0.5, 0.95, 0.3
-# The grid over the travel: this long at nominal speed; force and speed are averaged over this long [s].
-_GRID, _AVERAGED = 0.01, 0.1
-# The unknown part has its friction at so many points, linear between them.
-_KNOTS = 6
+# The grid over the travel: this long at nominal speed; force and speed pass a Gaussian of this deviation, so that the
+# third derivative of the speed is above its noise [s].
+_GRID, _AVERAGED = 0.01, 0.04
+# The unknown part has its friction at so many points, linear between them: with 6, waves of 0.13 m were lost.
+_KNOTS = 10
 # Fewer grid points are no profile.
 _FEWEST = 20
 
@@ -32,23 +33,31 @@ _FEWEST = 20
 class FrictionProfile:
     """Deviation of the friction from its mean, every `spacing` [m, rad] from `begins`, along the direction of travel.
 
-    `force` (n,) [N, N m] opposes the motion; empty if the motion never settles. `level_deviation`: standard deviation
-    of the mean friction of the runs that were averaged. Positions count from the rest before the start.
+    `parts` (4, n), without their means and empty if the motion never settles: force of the drive, acceleration and
+    speed of the motor, second derivative of that force. Their sum weighted with `shares` (4,) is the friction, which
+    opposes the motion. `level_deviation`: standard deviation of the mean friction of the runs that were averaged.
+    Positions count from the rest before the start.
     """
 
     begins: float
     spacing: float
-    force: FloatArray
+    parts: FloatArray
     level_deviation: float
+    shares: FloatArray = field(default_factory=lambda: np.eye(4)[0])
 
     __repr__ = short_repr
 
+    @property
+    def force(self) -> FloatArray:
+        """Return the deviation of the friction (n,) [N, N m]."""
+        return np.asarray(self.shares @ self.parts)
+
     def at(self, travelled: FloatArray) -> FloatArray:
-        """Return the known deviation at distances travelled [m, rad]; 0 where it is not known."""
-        if not len(self.force):
-            return np.zeros(len(travelled))
-        grid = self.begins + self.spacing * np.arange(len(self.force))
-        return np.interp(travelled, grid, self.force, left=0.0, right=0.0)
+        """Return the parts (4, m) at distances travelled [m, rad]; 0 where they are not known."""
+        grid = self.begins + self.spacing * np.arange(self.parts.shape[1])
+        if not len(grid):
+            return np.zeros((len(self.parts), len(travelled)))
+        return np.stack([np.interp(travelled, grid, part, left=0.0, right=0.0) for part in self.parts])
 
     def surrogates(self, travelled: FloatArray, count: int, rng: np.random.Generator) -> FloatArray:
         """Return `count` random deviations (count, n) from what is known, at distances travelled from the rest.
@@ -56,17 +65,13 @@ class FrictionProfile:
         Where the profile is known they are the random level of the mean of the runs alone.
         """
         moving = np.clip(travelled / self.spacing, 0.0, 1.0)
-        unknown = travelled < self.begins
-        drawn = np.empty((count, len(travelled)))
-        for number in range(count):
-            force = np.full(len(travelled), self.level_deviation * rng.standard_normal())
-            if len(self.force):
-                profile = random_phases(self.force, rng)
-                grid = self.spacing * np.arange(len(profile))
-                extended = np.interp(travelled, grid, profile, period=self.spacing * len(profile))
-                force = force + np.where(unknown, extended, 0.0)
-            drawn[number] = force * moving
-        return drawn
+        known, drawn = self.force, []
+        grid = self.spacing * np.arange(len(known) + 1)
+        for _ in range(count):
+            level = self.level_deviation * rng.standard_normal()
+            profile = np.interp(travelled, grid[:-1], random_phases(known, rng), period=grid[-1]) if len(known) else 0.0
+            drawn.append((level + np.where(travelled < self.begins, profile, 0.0)) * moving)
+        return np.array(drawn)
 
     def knots(self) -> tuple[FloatArray, FloatArray]:
         """Return positions (k,) [m, rad] where the profile is not known, and the covariance (k, k) of its forces there.
@@ -86,54 +91,61 @@ class FrictionProfile:
         return positions, (vectors * np.maximum(values, floor)) @ vectors.T
 
 
-def friction_profile(runs: Sequence[AxisRun], ensemble: StartEnsemble, total_mass: float) -> FrictionProfile:
-    """Return the profile of the settled motion of an ensemble's runs: torque minus total mass times acceleration.
+def friction_shares(load_mass: float, stiffness: float, viscous: float) -> FloatArray:
+    """Return the shares of the parts of a profile for a load, its drive and its viscous friction.
+
+    The load moves as the motor does, less the wind-up: force of the drive over stiffness.
+    """
+    return np.array([1.0, -load_mass, -viscous, load_mass / stiffness])
+
+
+def friction_profile(runs: Sequence[AxisRun], ensemble: StartEnsemble, motor_mass: float) -> FrictionProfile:
+    """Return the profile of the settled motion of an ensemble's runs, with the shares of no load.
 
     The controller keeps the short waves of the friction out of the torque and leaves them in the speed, so that both
-    are needed. It fails above the drive's resonance, where motor and load do not move as one.
+    are needed. With a guessed load the profile would pull the fit to the guess, and without the drive's elasticity
+    friction near the resonance looks several times as large: the shares are those of the fit.
     """
     spacing = _GRID * ensemble.nominal_speed
-    parts = [
-        part for number, first in ensemble.members if (part := _settled(runs[number], first, ensemble, total_mass))
+    known = [
+        part for number, first in ensemble.members if (part := _settled(runs[number], first, ensemble, motor_mass))
     ]
-    longest = max((len(force) for _, force in parts), default=0)
-    level = _level_deviation(ensemble, [float(np.mean(force)) for _, force in parts])
-    if longest < _FEWEST:
-        return FrictionProfile(np.inf, spacing, np.zeros(0), level)
-    begins = max(position[0] for position, _ in parts)
-    ends = min(position[-1] for position, force in parts if len(force) >= 0.5 * longest)
+    longest = max((len(position) for position, _ in known), default=0)
+    level = _level_deviation(ensemble, [float(np.mean(parts[0])) for _, parts in known])
+    begins = max((position[0] for position, _ in known), default=0.0)
+    ends = min((position[-1] for position, _ in known if len(position) >= 0.5 * longest), default=0.0)
     count = int((ends - begins) / spacing) + 1
-    if count < _FEWEST:
-        return FrictionProfile(np.inf, spacing, np.zeros(0), level)
+    if longest < _FEWEST or count < _FEWEST:
+        return FrictionProfile(np.inf, spacing, np.zeros((4, 0)), level)
     grid = begins + spacing * np.arange(count)
-    mean = np.mean([np.interp(grid, position, force) for position, force in parts], axis=0)
-    return FrictionProfile(float(begins), spacing, mean - np.mean(mean), level)
+    mean = np.mean([[np.interp(grid, position, part) for part in parts] for position, parts in known], axis=0)
+    return FrictionProfile(float(begins), spacing, mean - np.mean(mean, axis=1, keepdims=True), level)
 
 
 def _settled(
-    run: AxisRun, first: int, ensemble: StartEnsemble, total_mass: float
+    run: AxisRun, first: int, ensemble: StartEnsemble, motor_mass: float
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return travelled distance and friction of one run's settled motion."""
-    sign = float(ensemble.direction)
-    speed = sign * np.nan_to_num(motor_speed(run)[first:])
-    torque = sign * np.nan_to_num(run.torque[first:])
-    width = max(round(_AVERAGED / run.period), 1)
-    kernel = np.full(width, 1.0 / width)
-    smooth = np.convolve(speed, kernel, mode="same")
-    force = np.convolve(torque, kernel, mode="same") - total_mass * np.gradient(smooth, run.period)
-    fast = np.flatnonzero(smooth >= _REACHED * ensemble.nominal_speed)
-    if not len(fast):
-        return None
-    begin = int(fast[0]) + round(_SETTLED_AFTER / run.period)
+    """Return travelled distance (n,) and the parts of the friction (4, n) of one run's settled motion."""
+    from scipy.ndimage import gaussian_filter1d
+
+    def rate(values: FloatArray, order: int) -> FloatArray:
+        width = _AVERAGED / run.period
+        return np.asarray(gaussian_filter1d(values, width, order=order, mode="nearest") / run.period**order)
+
+    speed, torque = (ensemble.direction * np.nan_to_num(values[first:]) for values in (motor_speed(run), run.torque))
+    smooth, acceleration = rate(speed, 0), rate(speed, 1)
+    force, curvature = (rate(torque, order) - motor_mass * rate(speed, order + 1) for order in (0, 2))
+    is_fast = smooth >= _REACHED * ensemble.nominal_speed
+    begin = int(np.argmax(is_fast)) + round(_SETTLED_AFTER / run.period)
     left = np.flatnonzero(np.abs(smooth[begin:] / ensemble.nominal_speed - 1.0) > _BAND)
     # The averages at the end of a log reach beyond it.
-    end = min(begin + int(left[0]) if len(left) else len(speed), len(speed) - width)
-    if end - begin < _FEWEST * width // 4:
-        return None
-    travelled = np.cumsum(speed) * run.period
+    end = min(begin + int(left[0]) if len(left) else len(speed), len(speed) - round(3.0 * _AVERAGED / run.period))
     step = max(round(_GRID / run.period), 1)
+    if not is_fast.any() or end - begin < _FEWEST * step:
+        return None
     kept = slice(begin, end, step)
-    return np.maximum.accumulate(travelled[kept]), force[kept]
+    travelled = np.maximum.accumulate((np.cumsum(speed) * run.period)[kept])
+    return travelled, np.stack((force, acceleration, smooth, curvature))[:, kept]
 
 
 def _level_deviation(ensemble: StartEnsemble, levels: Sequence[float]) -> float:

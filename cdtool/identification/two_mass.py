@@ -31,18 +31,21 @@ from cdtool.identification.estimate import (
     NotIdentifiable,
 )
 from cdtool.identification.filtered_regression import IntArray
-from cdtool.identification.friction_profile import friction_profile, random_phases
+from cdtool.identification.friction_profile import FrictionProfile, friction_profile, friction_shares, random_phases
 from cdtool.identification.start_ensemble import StartEnsemble, start_ensembles
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 
 # In the order of the vector of logarithms.
-PARAMETERS = ("load_mass", "stiffness", "coulomb", "static", "viscous", "onset", "damping", "take_up", "end_stiffness")
+_ALWAYS = ("load_mass", "stiffness", "coulomb", "viscous", "static", "onset", "damping", "rise_speed")
+PARAMETERS = (*_ALWAYS, "take_up", "end_stiffness")
 # Of a drive with one stiffness those before the take-up are fitted, which is beyond every wind-up.
-_ONE_STIFFNESS, _NEVER = PARAMETERS.index("take_up"), math.log(1e9)
+_ONE_STIFFNESS, _NEVER = len(_ALWAYS), math.log(1e9)
 # Without the speed at which friction sets in and the drive's damping, starts give a wrong stiffness, or a second one;
-# alone they show both badly. Each is guessed within a factor (one standard deviation), from which the fit moves it.
-_GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("onset"), _ONE_STIFFNESS), np.log([2.0, 3.0])
+# without the friction's rise towards rest, a wrong load. Alone they show these badly, and a rise that vanishes has no
+# error: each is guessed within a factor (one standard deviation), by which the fit moves it at most. Friction that sets
+# in only where its rise has gone again had 5 times the static friction, and a long rise took the place of the load.
+_GUESSED, _GUESSED_WITHIN = slice(PARAMETERS.index("static"), _ONE_STIFFNESS), np.log([3.0, 2.0, 3.0, 2.0])
 # A parameter with a larger relative standard error is not identifiable.
 LARGEST_RELATIVE_ERROR = 0.5
 # The fit's stiffness starts at these multiples of the smallest plausible one; the cost has local minima between.
@@ -51,9 +54,6 @@ _STIFFNESS_STARTS = 12
 _CORRECTION_RATE = 10.0
 # A channel's error counts in its run-to-run deviation, at least in this share of its largest value.
 _LEAST_SHARE = 0.01
-# The friction's rise is below a speed that a start passes in a few samples: it is given, not fitted. The standard
-# errors contain that it is wrong by a factor (one standard deviation) [-].
-_STRIBECK_SHARE, _STRIBECK_WITHIN = 0.1, 2.0
 _MOST_CHANGE, _AT_BOUND = 50.0, 1.02
 # The search for a second stiffness begins at each of these: the first one as a share of that of a drive with one
 # stiffness, the share of the largest wind-up at which the second begins, and its multiple of the first. The take-up may
@@ -82,7 +82,7 @@ class TwoMassSettings:
 
     motor_mass: float
     sensors: Sensors = field(default_factory=Sensors)
-    surrogates: int = 24
+    surrogates: int = 96
     seed: int = 0
     units: tuple[str, str, str] = ("kg", "N", "m")
 
@@ -92,7 +92,8 @@ class TwoMassFit:
     """The identified model and how well it follows the log.
 
     `relative_error`: RMS error by channel over its RMS. `condition_number` of the scaled Jacobian. `largest_wind_up`
-    [m, rad] of the drive in the starts, or its take-up travel: beyond it nothing is known of its stiffness.
+    [m, rad] of the drive in the starts, or its take-up travel: beyond it nothing is known of its stiffness. `profiles`:
+    of the friction along the travel, by ensemble.
     """
 
     identified: Identified
@@ -101,6 +102,7 @@ class TwoMassFit:
     relative_error: Mapping[str, float]
     condition_number: float
     largest_wind_up: float
+    profiles: tuple[FrictionProfile, ...]
 
 
 def identify_two_mass(runs: Sequence[AxisRun], settings: TwoMassSettings) -> TwoMassFit:
@@ -139,17 +141,12 @@ class _Problem:
             mean = {key: values if key == "torque" else lag(values) for key, values in item.mean.items()}
             self.ensembles += (replace(item, mean=mean),)
         self.settings = settings
-        self.stribeck = _STRIBECK_SHARE * max(item.nominal_speed for item in ensembles)
         self.start = _rough_values(self.ensembles[0], settings.motor_mass)
         self.scales = [_scales(item) for item in self.ensembles]
-        total = settings.motor_mass + self.start["load_mass"]
         self.travelled = [_travelled(item) for item in self.ensembles]
-        self.profiles = [friction_profile(runs, item, total) for item in self.ensembles]
+        self.profiles = [friction_profile(runs, item, settings.motor_mass) for item in self.ensembles]
         self.known = [profile.at(way) for profile, way in zip(self.profiles, self.travelled, strict=True)]
-        self.knots = [profile.knots() for profile in self.profiles]
-        # Rows that weigh the unknown forces by what the known profile makes plausible.
-        self.prior = [np.linalg.inv(np.linalg.cholesky(covariance)) for _, covariance in self.knots]
-
+        self._weigh(friction_shares(self.start["load_mass"], math.inf, 0.0))
         self.compared = ["torque", "speed", "position"]
         if settings.sensors.accelerometer_hz > 0.0:
             self.compared.append("acceleration")
@@ -162,10 +159,16 @@ class _Problem:
         # The force at a knot acts on one ensemble: the others are as they were.
         self._part = lru_cache(maxsize=64)(self._errors_of)
 
+    def _weigh(self, shares: FloatArray) -> None:
+        """Weigh the unknown forces by what the known profile, as these shares give it, makes plausible."""
+        self.profiles = [replace(profile, shares=shares) for profile in self.profiles]
+        self.knots = [profile.knots() for profile in self.profiles]
+        self.prior = [np.linalg.inv(np.linalg.cholesky(covariance)) for _, covariance in self.knots]
+
     def model(self, vector: FloatArray) -> AxisModel:
         """Return the model with the `PARAMETERS` exp(vector); the rest is the unknown friction at the knots."""
         values = map(float, np.exp(vector[: len(PARAMETERS)]))
-        load, stiffness, coulomb, rise, viscous, onset, ratio, take_up, end = values
+        load, stiffness, coulomb, viscous, rise, onset, ratio, rise_speed, take_up, end = values
         settings, motor = self.settings, self.settings.motor_mass
         damping = 2.0 * ratio * math.sqrt(stiffness * motor * load / (motor + load))
         drive = Drive(motor_mass=motor, load_mass=load, stiffness=stiffness, damping=damping)
@@ -175,9 +178,9 @@ class _Problem:
             coulomb_forward=coulomb,
             coulomb_backward=coulomb,
             static=coulomb + rise,
-            stribeck_speed=self.stribeck,
+            stribeck_speed=rise_speed,
             viscous=viscous,
-            smoothing_speed=onset,
+            smoothing_speed=onset * rise_speed,
         )
         period = self.ensembles[0].period
         gain = _CORRECTION_RATE * drive.total_mass
@@ -186,10 +189,11 @@ class _Problem:
 
     def frictions(self, vector: FloatArray) -> list[FloatArray]:
         """Return the deviation of the friction from the model's along each ensemble (n,): known, or at the knots."""
-        return [self._friction(number, vector[part]) for number, part in enumerate(self.of_knots)]
+        return [self._friction(number, vector, vector[part]) for number, part in enumerate(self.of_knots)]
 
-    def _friction(self, number: int, forces: FloatArray) -> FloatArray:
-        known, travelled, (positions, _) = self.known[number], self.travelled[number], self.knots[number]
+    def _friction(self, number: int, vector: FloatArray, forces: FloatArray) -> FloatArray:
+        travelled, (positions, _) = self.travelled[number], self.knots[number]
+        known = _shares(vector) @ self.known[number]
         if not len(positions):
             return known
         moving = np.clip(travelled / max(positions[1], 1e-300), 0.0, 0.1) * 10.0
@@ -237,7 +241,7 @@ class _Problem:
 
     def _errors_of(self, number: int, parameters: bytes, forces: bytes) -> FloatArray:
         vector = np.frombuffer(parameters)
-        friction = self._friction(number, np.frombuffer(forces))
+        friction = self._friction(number, vector, np.frombuffer(forces))
         try:
             found = self.scaled_errors(number, self.model(vector), friction)
         except ConfigurationError:
@@ -264,20 +268,21 @@ class _Problem:
         rough, _ = min(
             (self._fitted(item, self.one_stiffness, 1e-2, 6) for _, item in candidates[:2]), key=lambda item: item[1]
         )
+        self._weigh(_shares(rough))
         vector, cost = self._fitted(rough, self.one_stiffness, 1e-5, 30)
         if abs(vector[0] - self.first[0]) > math.log(_MOST_CHANGE / _AT_BOUND):
             raise IdentificationError(
                 f"the load ends at {math.exp(vector[0]):.3g} {self.settings.units[0]}, the bound of the search",
                 "check machine.motor_inertia, the torque's scale, and that the logs are of this machine",
             )
-        self._refuse_rigid(vector, cost)
-        largest, others = self.largest_wind_up(vector), []
+        largest, others = self.largest_wind_up(rough), []
         for softer, take_up, ratio in _SECOND_STARTS:
-            first = vector.copy()
+            first = rough.copy()
             first[1] += math.log(softer)
             first[_ONE_STIFFNESS : len(PARAMETERS)] = math.log(take_up * largest), first[1] + math.log(ratio)
             others.append(self._fitted(first, np.arange(len(vector)), 1e-4, 20))
         other, lower = min(others, key=lambda item: item[1])
+        self._refuse_rigid(vector, min(cost, lower))
         if lower < cost:
             self.load_change = float(np.exp(other[0]) - np.exp(vector[0]))
         independent = sum(_INDEPENDENT * item.count * len(self.measured(n)) for n, item in enumerate(self.ensembles))
@@ -290,8 +295,9 @@ class _Problem:
 
         count, knots = len(PARAMETERS), len(first) - len(PARAMETERS)
         reach = np.concatenate((np.full(count, math.log(_MOST_CHANGE)), np.full(knots, np.inf)))
-        reach[_ONE_STIFFNESS] = math.log(2.0)
-        reach = reach[free]
+        reach[_ONE_STIFFNESS], reach[_GUESSED] = math.log(2.0), _GUESSED_WITHIN
+        centre = np.array([*first[: _GUESSED.start], *self.first[_GUESSED], *first[_GUESSED.stop :]])
+        bounds = (centre - reach)[free], (centre + reach)[free]
         scale = np.concatenate((np.full(count, 0.3), np.full(knots, 0.03 * self.start["coulomb"])))[free]
 
         def whole(values: FloatArray) -> FloatArray:
@@ -313,7 +319,7 @@ class _Problem:
             ftol=tolerance,
             xtol=1e-4,
             max_nfev=calls,
-            bounds=(first[free] - reach, first[free] + reach),
+            bounds=bounds,
             x_scale=scale,
         )
         return whole(np.asarray(found.x, dtype=np.float64)), 2.0 * float(found.cost)
@@ -355,13 +361,14 @@ class _Problem:
         """Return the fit with standard errors from surrogates of the friction over position."""
         model, frictions = self.model(vector), self.frictions(vector)
         free = np.arange(len(vector)) if vector[_ONE_STIFFNESS] < _NEVER else self.one_stiffness
-        count = len(PARAMETERS) - len(vector) + len(free)
         jacobian = self.jacobian(vector, free)
-        own = jacobian[:, :count]
+        own = jacobian[:, free < len(PARAMETERS)]
         norms = np.linalg.norm(own, axis=0)
         condition = float(np.linalg.cond(own / np.where(norms > 0.0, norms, 1.0)))
-        deviations = self._deviations(jacobian, vector)
-        relative = np.sqrt(np.mean(deviations**2, axis=0)) if self.is_described else np.full(count, np.inf)
+        inverse = np.asarray(np.linalg.pinv(jacobian, rcond=1e-6), np.float64)
+        # At least what the weights of the fit give: what it leaves over is smaller where it follows the noise.
+        least = np.linalg.norm(inverse, axis=1) if self.is_described else np.full(len(free), np.inf)
+        relative = np.maximum(self._relative_deviation(inverse, vector), least)
         return TwoMassFit(
             identified=self._identified(vector, relative, condition),
             model=replace(model, controller=None),
@@ -369,48 +376,43 @@ class _Problem:
             relative_error=self._relative_error(model, frictions),
             condition_number=condition,
             largest_wind_up=min(self.largest_wind_up(vector), model.drive.take_up_travel),
+            profiles=tuple(replace(profile, shares=_shares(vector)) for profile in self.profiles),
         )
 
-    def _deviations(self, jacobian: FloatArray, vector: FloatArray) -> FloatArray:
-        """Return how far other errors of the same colour would move the free values (surrogates, p).
+    def _relative_deviation(self, inverse: FloatArray, vector: FloatArray) -> FloatArray:
+        """Return how far (RMS) other errors of the same colour would move the free values (p,), by the fit's inverse.
 
-        Each is a random friction profile where the friction is not known, another Stribeck speed and other guesses,
-        plus what the model leaves over in every channel, with random phases.
+        Each is a random friction profile where the friction is not known and other guesses, plus what the model leaves
+        over in every channel, with random phases.
         """
         rng = np.random.default_rng(self.settings.seed)
-        inverse = np.linalg.pinv(jacobian, rcond=1e-6)
         model, frictions = self.model(vector), self.frictions(vector)
+        # All starts pass the same track: their frictions are as wrong together.
         drawn = [
-            profile.surrogates(travelled, self.settings.surrogates, rng)
+            profile.surrogates(travelled, self.settings.surrogates, np.random.default_rng((self.settings.seed, 1)))
             for profile, travelled in zip(self.profiles, self.travelled, strict=True)
         ]
         base = [self.scaled_errors(number, model, friction) for number, friction in enumerate(frictions)]
         rows = []
         for surrogate in range(self.settings.surrogates):
-            change = np.zeros(len(jacobian))
-            used = 0
-            speed = self.stribeck * _STRIBECK_WITHIN ** rng.standard_normal()
-            other = replace(model, friction=replace(model.friction, stribeck_speed=speed))
+            parts = []
             for number, (friction, left) in enumerate(zip(frictions, base, strict=True)):
-                moved = self.scaled_errors(number, other, friction + drawn[number][surrogate]) - left
+                moved = self.scaled_errors(number, model, friction + drawn[number][surrogate]) - left
                 channels = np.split(left, len(self.measured(number)))
-                change[used : used + len(left)] = moved + np.concatenate(
-                    [random_phases(item, rng) for item in channels]
-                )
-                used += len(left)
-            change[used : used + len(_GUESSED_WITHIN)] = rng.standard_normal(len(_GUESSED_WITHIN))
-            rows.append(-inverse @ change)
-        return np.array(rows)
+                parts.append(moved + np.concatenate([random_phases(item, rng) for item in channels]))
+            change = np.concatenate((*parts, rng.standard_normal(len(_GUESSED_WITHIN))))
+            rows.append(inverse[:, : len(change)] @ change)
+        return np.asarray(np.sqrt(np.mean(np.square(rows), axis=0)))
 
     def _identified(self, vector: FloatArray, relative: FloatArray, condition: float) -> Identified:
         mass, force, length = self.settings.units
-        load, stiffness, coulomb, rise, viscous = np.exp(vector[: _GUESSED.start])
+        load, stiffness, coulomb, viscous, rise = np.exp(vector[: _GUESSED.start + 1])
         static = coulomb + rise
-        static_error = math.hypot(coulomb * relative[2], rise * relative[3]) / static
+        static_error = math.hypot(coulomb * relative[2], rise * relative[4]) / static
         load_error = math.hypot(relative[0], self.load_change / load)
         # What is taken from one of the two is in the other; one that has vanished has no error of its own.
-        vanished = np.min((vector - self.first)[[2, 4]]) < -math.log(_MOST_CHANGE / _AT_BOUND)
-        dry = math.inf if vanished else max(relative[2], relative[4])
+        vanished = np.min((vector - self.first)[[2, 3]]) < -math.log(_MOST_CHANGE / _AT_BOUND)
+        dry = math.inf if vanished else max(relative[2], relative[3])
         has_second = vector[_ONE_STIFFNESS] < _NEVER or not self.is_described
         gentler = (Missing.GENTLER_START,) if has_second else ()
         rows: list[tuple[str, str, float, float, float, str, tuple[Missing, ...]]] = [
@@ -429,7 +431,7 @@ class _Problem:
                 for key in self._directions()
             ),
             ("model.friction", "static", static, static_error, static_error, force, (Missing.MORE_RECORDINGS,)),
-            ("model.friction", "viscous", viscous, relative[4], dry, f"{force} s/{length}", (Missing.SECOND_SPEED,)),
+            ("model.friction", "viscous", viscous, relative[3], dry, f"{force} s/{length}", (Missing.SECOND_SPEED,)),
         ]
         estimates, missing = [], []
         for section, key, value, error, judged, unit, needed in rows:
@@ -464,7 +466,8 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
     """Return start values from the accelerated and from the settled part of a start."""
     sign = float(ensemble.direction)
     speed, force = sign * ensemble.mean["speed"], sign * ensemble.mean["torque"]
-    speed = _smooth(speed, ensemble.period, 0.05)
+    width = max(round(0.05 / ensemble.period), 1)
+    speed = np.convolve(speed, np.full(width, 1.0 / width), mode="same")
     acceleration = np.gradient(speed, ensemble.period)
     top = float(np.max(speed))
     settled = speed > 0.95 * top
@@ -486,9 +489,16 @@ def _rough_values(ensemble: StartEnsemble, motor_mass: float) -> dict[str, float
         "coulomb": 0.8 * friction,
         "static": 0.2 * friction,
         "viscous": 0.2 * friction / top,
-        "onset": 0.005 * top,
+        "onset": 0.05,
         "damping": 0.03,
+        "rise_speed": 0.1 * top,
     }
+
+
+def _shares(vector: FloatArray) -> FloatArray:
+    """Return the shares of the parts of the known friction for these `PARAMETERS`."""
+    load, stiffness, *_, viscous = np.exp(vector[: _GUESSED.start])
+    return friction_shares(load, stiffness, viscous)
 
 
 def _travelled(ensemble: StartEnsemble) -> FloatArray:
@@ -505,8 +515,3 @@ def _scales(ensemble: StartEnsemble) -> dict[str, float]:
         spread = float(np.sqrt(np.mean(ensemble.deviation[name] ** 2)))
         scales[name] = max(spread, _LEAST_SHARE * float(np.max(np.abs(mean))), 1e-300)
     return scales
-
-
-def _smooth(values: FloatArray, period: float, seconds: float) -> FloatArray:
-    width = max(round(seconds / period), 1)
-    return np.convolve(values, np.full(width, 1.0 / width), mode="same")

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from cdtool.identification.friction_profile import FrictionProfile, friction_profile, random_phases
+from cdtool.identification.axis_run import axis_run
+from cdtool.identification.friction_profile import FrictionProfile, friction_profile, friction_shares, random_phases
 from cdtool.identification.start_ensemble import start_ensembles
 from tests.synthetic.gate_runs import GATE, free_runs
+from tests.synthetic.plain_gate import WAVES, drawn_gate, strokes
 
-TOTAL = GATE.leaf_mass + GATE.motor_mass
+SHARES = friction_shares(GATE.leaf_mass, GATE.take_up_stiffness, GATE.viscous_friction)
 
 
 def test_the_gates_track_is_found() -> None:
     runs = free_runs(GATE, 11, 10)
-    profile = friction_profile(runs, start_ensembles(runs)[0], TOTAL)
+    profile = replace(friction_profile(runs, start_ensembles(runs)[0], GATE.motor_mass), shares=SHARES)
     position = profile.begins + profile.spacing * np.arange(len(profile.force))
     true = sum(
         weight * np.sin(2.0 * np.pi * position / length + phase) for length, phase, weight in GATE.friction_waves
@@ -25,13 +29,24 @@ def test_the_gates_track_is_found() -> None:
     assert profile.level_deviation == pytest.approx(0.03 * 150.0 / np.sqrt(10.0), rel=0.6)
 
 
+def test_waves_near_the_resonance_have_their_own_size() -> None:
+    gate = drawn_gate(4)
+    runs = [axis_run(recording) for recording in strokes(gate, 4, range(6)).recordings]
+    profile = friction_profile(runs, start_ensembles(runs)[0], gate.motor_mass)
+    profile = replace(profile, shares=friction_shares(gate.leaf_mass, gate.stiffness, gate.viscous))
+    position = profile.begins + profile.spacing * np.arange(len(profile.force))
+    phases = np.random.default_rng(4).uniform(0.0, 2.0 * np.pi, len(WAVES))
+    true = gate.friction * gate.waviness * np.sin(2.0 * np.pi * position[:, np.newaxis] / WAVES + phases).sum(axis=1)
+    assert np.std(profile.force - true) < 0.5 * np.std(true)  # a rigid drive: 1.1
+
+
 def test_without_settled_motion_there_is_no_profile() -> None:
     runs = free_runs(GATE, 12, 3)
     ensemble = start_ensembles(runs)[0]
     short = [type(run)(run.name, 0.0, run.period, run.torque[:1500], run.speed[:1500]) for run in runs]
-    profile = friction_profile(short, ensemble, TOTAL)
+    profile = friction_profile(short, ensemble, GATE.motor_mass)
     assert len(profile.force) == 0
-    np.testing.assert_array_equal(profile.at(np.linspace(0.0, 1.0, 5)), np.zeros(5))
+    np.testing.assert_array_equal(profile.at(np.linspace(0.0, 1.0, 5)), np.zeros((4, 5)))
     positions, covariance = profile.knots()
     assert positions.shape == (0,)
     assert covariance.shape == (0, 0)
@@ -47,7 +62,7 @@ def test_random_phases_keep_the_spectrum() -> None:
 
 def test_surrogates_are_the_level_alone_where_the_profile_is_known() -> None:
     force = 5.0 * np.sin(np.arange(200) / 7.0)
-    profile = FrictionProfile(0.2, 0.01, force, 2.0)
+    profile = FrictionProfile(0.2, 0.01, force[np.newaxis], 2.0, np.ones(1))
     travelled = np.linspace(0.0, 2.0, 400)
     drawn = profile.surrogates(travelled, 300, np.random.default_rng(0))
     known = travelled >= 0.2
@@ -59,7 +74,7 @@ def test_surrogates_are_the_level_alone_where_the_profile_is_known() -> None:
 
 def test_the_covariance_at_the_knots_is_that_of_the_profile() -> None:
     force = 5.0 * np.sin(np.arange(400) / 7.0)
-    positions, covariance = FrictionProfile(0.2, 0.01, force, 2.0).knots()
+    positions, covariance = FrictionProfile(0.2, 0.01, force[np.newaxis], 2.0, np.ones(1)).knots()
     assert positions[0] == 0.0
     assert positions[-1] == 0.2
     assert np.all(np.linalg.eigvalsh(covariance) > 0.0)

@@ -20,7 +20,6 @@ from cdtool.errors import CdtoolError, RecordingError
 from cdtool.identification.axis_run import AxisRun, axis_run
 from cdtool.identification.estimate import Missing, NotIdentifiable
 from cdtool.identification.excitation import PlannedMotion, plan_motions
-from cdtool.identification.friction_profile import friction_profile
 from cdtool.identification.rigid_axis import (
     RigidAxisFit,
     identify_rigid_axis,
@@ -230,7 +229,7 @@ def _joint_evidence(
     return JointEvidence(
         joint.joint,
         None if joint.rigid is None else predict_unseen(joint.rigid, runs),
-        () if joint.two_mass is None else compare_starts(joint.two_mass, runs, known_accelerometer),
+        () if joint.two_mass is None else compare_starts(joint.two_mass, known_accelerometer),
         None if joint.controller is None else compare_controller(joint.controller, runs),
         plan_of(joint),
     )
@@ -289,9 +288,7 @@ def _last_part(run: AxisRun) -> BoolArray:
     return last
 
 
-def compare_starts(
-    fit: TwoMassFit, runs: Sequence[AxisRun], known_accelerometer: bool = False
-) -> tuple[StartComparison, ...]:
+def compare_starts(fit: TwoMassFit, known_accelerometer: bool = False) -> tuple[StartComparison, ...]:
     """Return each ensemble of starts against the identified two-mass model, driven by the mean force.
 
     The friction along the travel is added where the settled motion shows it. The model is corrected weakly towards the
@@ -299,14 +296,13 @@ def compare_starts(
     force that the model does not explain. The acceleration is compared if the accelerometer's low-pass is known.
     """
     compared = []
-    for ensemble in fit.ensembles:
-        profile = friction_profile(runs, ensemble, fit.model.drive.total_mass)
+    for ensemble, profile in zip(fit.ensembles, fit.profiles, strict=True):
         travelled = ensemble.direction * np.cumsum(ensemble.mean["speed"]) * ensemble.period
         inputs = AxisInputs(
             ensemble.mean["speed"],
             command=ensemble.mean["torque"],
             feed_forward=True,
-            disturbance=-ensemble.direction * profile.at(travelled),
+            disturbance=-ensemble.direction * (profile.shares @ profile.at(travelled)),
         )
         gain = _CORRECTION_RATE * fit.model.drive.total_mass
         correction = Controller(period=ensemble.period, speed_gain=gain, speed_filter_order=0)

@@ -74,13 +74,13 @@ def test_of_a_single_run_only_the_part_that_was_left_out_is_shown(runs: Sequence
 
 def test_the_starts_follow_the_model_and_a_wrong_drive_shows(runs: Sequence[AxisRun]) -> None:
     fit = identify_two_mass(runs, TwoMassSettings(motor_mass=PARAMETERS.motor_mass))
-    (start,) = compare_starts(fit, runs)
+    (start,) = compare_starts(fit)
     error = np.sqrt(np.mean((start.measured["torque"] - start.modelled["torque"]) ** 2))
     assert start.count == 3
     assert error < 0.05 * np.max(np.abs(start.measured["torque"]))
     assert start.time[0] == pytest.approx(-0.3)
     soft = replace(fit, model=replace(fit.model, drive=replace(fit.model.drive, stiffness=2e4)))
-    (wrong,) = compare_starts(soft, runs)
+    (wrong,) = compare_starts(soft)
     assert np.sqrt(np.mean((wrong.measured["torque"] - wrong.modelled["torque"]) ** 2)) > 2.0 * error
 
 
