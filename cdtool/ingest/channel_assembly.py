@@ -134,13 +134,14 @@ class _Assembly:
         self.channels = channels
         self.columns = source.columns if isinstance(source.columns, dict) else dict(source.columns)
         self.origin = source.origin
-        self.findings = guessed_units(channels)
+        self.findings: list[Finding] = []
         self.table: CleanTime | None = None
         self.clock: Series | None = None  # the table's times, which its channels share
         self._topic_clocks: dict[tuple[int, bool], _TopicClock] = {}  # by the identity of the stamps
         if not channels.topics:
             self.table = self._table_clock()
             self.findings += unit_findings(source, channels)
+        self.findings += guessed_units(channels, {found.channel for found in self.findings})
 
     @property
     def rows(self) -> TableRows | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Literal
 from unicodedata import normalize
@@ -48,8 +48,11 @@ def unit_findings(source: Source, channels: ChannelMap) -> list[Finding]:
     return findings
 
 
-def guessed_units(channels: ChannelMap) -> list[Finding]:
-    """Return a note for a force whose unit the machine file itself does not confirm; of a pressure a loss."""
+def guessed_units(channels: ChannelMap, reported: Collection[str]) -> list[Finding]:
+    """Return a note for a force whose unit the machine file itself does not confirm; of a pressure a loss.
+
+    Not of the `reported` channels, whose header says more.
+    """
     return [
         Finding(
             UnitContradicted("", "", 0, item.stated or "", 0.0, "confirm"),
@@ -57,7 +60,7 @@ def guessed_units(channels: ChannelMap) -> list[Finding]:
             "loss" if item.channel == CONTACT_PRESSURE else "note",
         )
         for item in channels.sources
-        if item.unit_confirmed is False and item.channel in RIG_UNITS
+        if item.unit_confirmed is False and item.channel in RIG_UNITS and item.channel not in reported
     ]
 
 

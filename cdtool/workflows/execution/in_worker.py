@@ -10,6 +10,7 @@ import faulthandler
 import os
 import pickle
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -80,6 +81,7 @@ def begin(work: Callable[[Any], Any], claims: Any, free_claims: Any, limit: floa
     keep_freed_memory()
     ignore_interruption()
     signal.signal(signal.SIGTERM, _end)
+    sys.unraisablehook = _end_from_callback
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -88,6 +90,13 @@ def _end(*_: object) -> None:
     if _claim[1] <= 0:  # waiting for work, in code that would print where it was interrupted
         os._exit(TOLD_TO_END)
     raise SystemExit(TOLD_TO_END)  # temporary files of the piece are removed
+
+
+def _end_from_callback(unraisable: sys.UnraisableHookArgs) -> None:
+    """End a worker that was told so in a callback from C, as while LLVM compiles: no exception passes C code."""
+    if unraisable.exc_type is SystemExit:
+        os._exit(TOLD_TO_END)
+    sys.__unraisablehook__(unraisable)
 
 
 def _end_with_parent() -> None:
