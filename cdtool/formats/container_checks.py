@@ -34,9 +34,8 @@ def library(module: str, extra: str, path: Path) -> Any:
 
 def check_size(path: Path, values: int) -> None:
     """Raise RecordingError if a file declares far more numbers than a log of its size can contain."""
-    # A product of damaged dimensions may exceed every float.
-    size, declared = path.stat().st_size, min(8 * values, 2**63)
-    if declared > _FREE and declared > _RATIO * size:
+    declared = min(8 * values, 2**63)  # a product of damaged dimensions may exceed every float
+    if declared > _FREE and declared > _RATIO * (size := path.stat().st_size):
         raise RecordingError(
             f"{path}: unpacks to {declared / 2**20:.0f} MiB, {declared / max(size, 1):.0f} times its size: refused",
             "name fewer columns in the machine file, or save it without compression",

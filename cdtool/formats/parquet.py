@@ -19,7 +19,6 @@ from cdtool.findings.clocks import StampsAsSeconds
 from cdtool.findings.containers import CutBehindRow
 from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, split_unit
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
-from cdtool.formats.parquet_check import check_batches, check_pages
 from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
@@ -125,8 +124,8 @@ class _ArrowTable:
                 yield Piece(key, time[~absent], {key: values[~absent]}, int(np.count_nonzero(~absent)))
 
     def _of_parquet(self, keys: Sequence[str]) -> Iterator[Any]:
-        check_size(self.path, self._file.metadata.num_rows * len(keys))
-        check_pages(self.path, self._file.metadata, keys)
+        metadata = self._file.metadata
+        check_size(self.path, sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)) * len(keys))
         return iter(self._file.iter_batches(max(_FEWEST_ROWS, VALUES_PER_PIECE // len(keys)), columns=list(keys)))
 
     def _numbers(self, key: str, column: Any) -> tuple[FloatArray, Any]:
@@ -173,10 +172,12 @@ class _Feather:
     def __init__(self, path: Path, arrow: Any, findings: list[Finding]) -> None:
         self._path, self._arrow, self._findings = path, arrow, findings
         self._ipc = library("pyarrow.ipc", "parquet", path)
-        check_batches(path)
         try:
             self._whole = self._ipc.open_file(os.fspath(path))
             self.schema = self._whole.schema
+            # A batch is decompressed as a whole; this counts its rows by its head.
+            counted = library("pyarrow.dataset", "parquet", path).dataset(os.fspath(path), format="feather")
+            check_size(path, counted.count_rows() * len(self.schema.names))
         except arrow.ArrowInvalid:
             self._whole = None
             with path.open("rb") as stream:
@@ -184,12 +185,10 @@ class _Feather:
 
     def batches(self, keys: Sequence[str]) -> Iterator[Any]:
         """Yield the columns `keys`, batch by batch. Arrow does not check a file's declarations without `validate`."""
-        for batch in self._before_cut() if self._whole is None else map(self._whole.get_batch, self._batch_numbers()):
+        count = 0 if self._whole is None else self._whole.num_record_batches
+        for batch in self._before_cut() if self._whole is None else map(self._whole.get_batch, range(count)):
             batch.validate(full=True)
             yield batch.select(list(keys))
-
-    def _batch_numbers(self) -> range:
-        return range(self._whole.num_record_batches)
 
     def _before_cut(self) -> Iterator[Any]:
         """Yield the batches before the cut."""

@@ -124,6 +124,17 @@ def feather_of_zeros(path: Path, compression: str = "zstd", batches: int = 20) -
     return path
 
 
+def feather_with_a_false_buffer(path: Path) -> Path:
+    """Write 1000 numbers whose compressed buffer declares a TiB."""
+    import pyarrow as arrow
+    import pyarrow.feather as feather
+
+    feather.write_feather(arrow.table({"a": np.arange(1000.0)}), str(path), compression="zstd")
+    content = path.read_bytes()
+    path.write_bytes(content.replace(struct.pack("<q", 8 * 1000), struct.pack("<q", 2**40), 1))
+    return path
+
+
 def varint(value: int) -> bytes:
     """Return an unsigned integer in the varint encoding of Thrift and protobuf."""
     encoded = bytearray()

@@ -17,7 +17,7 @@ from cdtool.findings.containers import RowsAsColumns, VariableLeftOut, WithoutCl
 from cdtool.formats.clock_beside import is_clock_name
 from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
 from cdtool.formats.mat.runs import StructRuns, short_name
-from cdtool.formats.mat.variables import Cells, Numbers, Structs, Text, Value, Variables, left_out
+from cdtool.formats.mat.variables import Numbers, Value, Variables, left_out
 
 _DETAIL = 80
 # A matrix in a struct with more columns than this is an image or a model.
@@ -99,12 +99,12 @@ class _Walk:
         """Add a value, or what is inside of it."""
         if isinstance(value, Numbers):
             self._array(value, name, last, structs)
-        elif isinstance(value, Text):
-            if text := " ".join(value.text.split()):
+        elif isinstance(value, str):
+            if text := " ".join(value.split()):
                 self.texts[name] = text[:_DETAIL]
-        elif isinstance(value, Structs):
+        elif isinstance(value, list):
             self._structs(value, name, structs)
-        elif isinstance(value, Cells):
+        elif isinstance(value, tuple):
             self._cells(value, name, last, structs)
         else:
             self.findings.append(left_out(name, value.what))
@@ -120,31 +120,31 @@ class _Walk:
         else:
             self.leaves.append(Leaf(name, last, structs, value))
 
-    def _cells(self, value: Cells, name: str, last: str, structs: tuple[str, ...]) -> None:
-        if not any(_has_array(element) for element in value.elements):
-            texts = bool(value.elements) and all(isinstance(element, Text) for element in value.elements)
+    def _cells(self, value: tuple[Value, ...], name: str, last: str, structs: tuple[str, ...]) -> None:
+        if not any(_has_array(element) for element in value):
+            texts = bool(value) and all(isinstance(element, str) for element in value)
             self.findings.append(left_out(name, "cell of texts" if texts else "cell"))
             return
-        for number, element in enumerate(value.elements, 1):
+        for number, element in enumerate(value, 1):
             self.value(element, f"{name}{{{number}}}", last, structs)
 
-    def _structs(self, value: Structs, name: str, structs: tuple[str, ...]) -> None:
-        if not value.elements:
+    def _structs(self, value: list[dict[str, Value]], name: str, structs: tuple[str, ...]) -> None:
+        if not value:
             self.findings.append(left_out(name, "empty array of structs"))
-        elif len(value.elements) == 1:
-            self._fields(value.elements[0], name, structs)
+        elif len(value) == 1:
+            self._fields(value[0], name, structs)
         elif not (self._with_runs and self._runs(value, name)):
-            for number, element in enumerate(value.elements, 1):
+            for number, element in enumerate(value, 1):
                 self._fields(element, f"{name}({number})", structs)
 
     def _fields(self, element: Mapping[str, Value], name: str, structs: tuple[str, ...]) -> None:
         for key, part in element.items():
             self.value(part, f"{name}.{key}", key, (*structs, name))
 
-    def _runs(self, value: Structs, name: str) -> bool:
+    def _runs(self, value: list[dict[str, Value]], name: str) -> bool:
         """Add the elements of an array of structs as runs; False if they are not runs."""
         walks = []
-        for number, element in enumerate(value.elements, 1):
+        for number, element in enumerate(value, 1):
             walk = _Walk(runs=False)
             walk._fields(element, f"{name}({number})", ())
             walks.append(walk)
@@ -168,9 +168,9 @@ def _has_array(value: Value) -> bool:
     """Return whether a value, or one inside of it, is an array of more than one number."""
     if isinstance(value, Numbers):
         return value.shape != (1, 1) and 0 not in value.shape
-    if isinstance(value, Structs):
-        return any(_has_array(part) for element in value.elements for part in element.values())
-    return isinstance(value, Cells) and any(_has_array(part) for part in value.elements)
+    if isinstance(value, list):
+        return any(_has_array(part) for element in value for part in element.values())
+    return isinstance(value, tuple) and any(_has_array(part) for part in value)
 
 
 def _clocks(leaves: Sequence[Leaf]) -> dict[str, dict[int, str]]:
