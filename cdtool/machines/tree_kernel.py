@@ -376,7 +376,7 @@ def _carry_momentum(body: FloatArray, pair: FloatArray) -> None:
         put_vector(pair, V + j, times(rotation, angular))
 
 
-@kernel(f"void({ROW}, int64, {_MATRICES}, int64, int64, int64, int64, {ROW})", inline=True)
+@kernel(f"void({ROW}, int64, {_MATRICES}, int64, int64, int64, int64, {ROW})")
 def _give_element(
     rows: FloatArray,
     first: int,

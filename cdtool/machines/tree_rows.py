@@ -57,14 +57,14 @@ def work_space(route: IndexArray, first: int, base: FloatArray) -> tuple[FloatAr
     return slots, aligned_zeros(2 * BLOCK)
 
 
-@kernel(f"{ROW}({ROW}, int64)", inline=True)
+@kernel(f"{ROW}({ROW}, int64)")
 def pair_of(slots: FloatArray, before: int) -> FloatArray:
     """The slot before a joint's own, and its own."""
     pair: FloatArray = part_of(slots, before * SLOT, 2 * SLOT)
     return pair
 
 
-@kernel(f"{READ_ONLY}({READ_TABLE}, int64)", inline=True)
+@kernel(f"{READ_ONLY}({READ_TABLE}, int64)")
 def body_of(bodies: FloatArray, joint: int) -> FloatArray:
     """The constants of a joint."""
     body: FloatArray = part_of(bodies, joint * CONSTANTS, CONSTANTS)
@@ -143,7 +143,7 @@ def inverse_rotation_of(body: FloatArray) -> Matrix:
     return body[0], body[3], body[6], body[1], body[4], body[7], body[2], body[5], body[8]
 
 
-@kernel(f"void({READ_TABLE}, int64, int64, int64, {ROW}, int64, {ROW})", inline=True)
+@kernel(f"void({READ_TABLE}, int64, int64, int64, {ROW}, int64, {ROW})")
 def take_column(
     values: FloatArray, column: int, begin: int, count: int, pair: FloatArray, row: int, fault: FloatArray
 ) -> None:
@@ -162,7 +162,7 @@ def take_column(
         add_products(fault, j, pair, SLOT + row + j, fault, BLOCK + j, 1)
 
 
-@kernel(f"void({ROW}, int64, {TABLE}, int64, int64, int64, {ROW})", inline=True)
+@kernel(f"void({ROW}, int64, {TABLE}, int64, int64, int64, {ROW})")
 def give_column(
     pair: FloatArray, row: int, values: FloatArray, column: int, begin: int, count: int, fault: FloatArray
 ) -> None:
