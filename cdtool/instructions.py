@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -32,15 +32,13 @@ class _Instruction(Kernel):
     """Used in kernels like another kernel; there is nothing to compile, and numba is loaded only on use."""
 
     def __init__(self, function: Callable[..., Any], made: Callable[[], Callable[..., Any]]) -> None:
-        super().__init__(function, "")
+        super().__init__(function, "", False)
         self._made = made
 
-    @property
-    def compiled(self) -> Callable[..., Any]:
+    @cached_property
+    def part(self) -> Any:
         """Return the numba function for use in a kernel."""
-        if self._compiled is None:
-            self._compiled = self._made()
-        return self._compiled
+        return self._made()
 
 
 def _prefetch(data: Any, at: int) -> None:

@@ -35,7 +35,7 @@ Bytes = npt.NDArray[np.uint8]
 _BYTES = "Array(uint8, 1, 'C', readonly=True)"
 
 
-@kernel(f"uint64({_BYTES}, uint64, uint64)", inline=True)
+@kernel(f"uint64({_BYTES}, uint64, uint64)")
 def _number(data: Bytes, at: np.uint64, size: np.uint64) -> np.uint64:
     """Return the little-endian number of some bytes."""
     number = np.uint64(0)
@@ -44,7 +44,7 @@ def _number(data: Bytes, at: np.uint64, size: np.uint64) -> np.uint64:
     return number
 
 
-@kernel("uint64(uint64, uint64)", inline=True)
+@kernel("uint64(uint64, uint64)")
 def _rotated(word: np.uint64, bits: np.uint64) -> np.uint64:
     """Return the lower 32 bits of a word, rotated to the left."""
     low = np.uint64(_LOW)
@@ -70,7 +70,7 @@ def _short_hash(data: Bytes, at: np.uint64, size: np.uint64) -> np.uint64:
     return value ^ (value >> np.uint64(16))
 
 
-@kernel(f"uint64({_BYTES}, uint64, uint64)", inline=True)
+@kernel(f"uint64({_BYTES}, uint64, uint64)")
 def _end_of_length(packed: Bytes, at: np.uint64, end: np.uint64) -> np.uint64:
     """Return the byte after the further bytes of a length: all of them 255 but the last; 0 if they do not end."""
     one, every = np.uint64(1), np.uint64(255)

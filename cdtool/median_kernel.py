@@ -18,7 +18,7 @@ _MANY = 64
 _FACTOR, _MODULUS = 48271, 2147483647
 
 
-@kernel("float64(float64[::1], int64, int64, int64)", exact=True, inline=True)
+@kernel("float64(float64[::1], int64, int64, int64)", exact=True)
 def _pivot(values: FloatArray, low: int, high: int, random: int) -> float:
     """Return the median of three of the values from `low` to `high`."""
     first = low

@@ -45,7 +45,7 @@ def test_addresses_beyond_the_array_are_harmless():
 def test_the_instruction_is_in_the_machine_code():
     from numba import njit
 
-    namespace = {"prefetch": prefetch.compiled}
+    namespace = {"prefetch": prefetch.part}
     exec("def touch(data, at):\n    prefetch(data, at)\n", namespace)
     touch = njit("void(uint8[::1], int64)")(namespace["touch"])
     (code,) = touch.inspect_llvm().values()
@@ -193,7 +193,7 @@ def cubed(values, results):
 def test_with_the_widest_vectors_the_numbers_are_the_same():
     from numba import njit
 
-    namespace = {"widest_vectors": widest_vectors.compiled}
+    namespace = {"widest_vectors": widest_vectors.part}
     exec(
         "def cubed(values, results):\n    widest_vectors()\n    for i in range(len(values)):\n"
         "        results[i] = values[i] * values[i] * values[i] + 0.1\n",

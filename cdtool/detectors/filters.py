@@ -347,7 +347,7 @@ def _fill_powers(
             rows[_S33 + k] += own[_CUBE + k] * own[_CUBE + k]
 
 
-@kernel(f"void({READ_TABLE}, int64, int64, float64[::1])", inline=True)
+@kernel(f"void({READ_TABLE}, int64, int64, float64[::1])")
 def _take_window(values: FloatArray, begin: int, joint: int, column: FloatArray) -> None:
     """Fill `column` with the samples of one joint from `begin` on, those beyond the ends as the last one there."""
     count, joints = values.shape
@@ -360,7 +360,7 @@ def _take_window(values: FloatArray, begin: int, joint: int, column: FloatArray)
             column[i] = values[min(max(begin + i, 0), count - 1), joint]
 
 
-@kernel("void(float64[::1], int64, int64, float64[:, ::1], float64[:, ::1])", inline=True)
+@kernel("void(float64[::1], int64, int64, float64[:, ::1], float64[:, ::1])")
 def _give_rates(rows: FloatArray, begin: int, joint: int, first: FloatArray, second: FloatArray) -> None:
     """The rates of one joint in a block of samples, where there are enough before them."""
     count, joints = first.shape

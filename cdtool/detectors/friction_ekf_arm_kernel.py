@@ -114,7 +114,7 @@ def correct(
     return corrected, update_covariance(p, column, k, innovation)
 
 
-@kernel("void(Samples, Link, Variances, AngleVariances, Bounds, float64[::1], uint8[::1])")
+@kernel()
 def run_arm_filter(
     samples: Samples,
     link: Link,

@@ -339,10 +339,7 @@ def known(what: str, value: Any, allowed: Sequence[str]) -> str:
     return str(value)
 
 
-@kernel(
-    f"void({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), Grids, int32[::1], int32[::1], float64[::1])",
-    exact=True,
-)
+@kernel(exact=True)
 def locate(  # noqa: C901  a kernel: one loop, arrays one by one
     elapsed: FloatArray,
     travel: FloatArray,

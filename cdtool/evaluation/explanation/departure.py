@@ -308,11 +308,7 @@ def _mean(values: FloatArray) -> float:
     return float(np.add.reduce(known) / len(known)) if len(known) else math.nan
 
 
-@kernel(
-    f"UniTuple(int64, 3)({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), Limits, float64, float64, "
-    "float64, int64, int64, int64)",
-    exact=True,
-)
+@kernel(exact=True)
 def find_departure(  # noqa: C901, PLR0913  a kernel: one loop, arrays and numbers one by one
     raw: FloatArray,
     raw_level: FloatArray,
@@ -385,7 +381,7 @@ def own_distances(
     return own, _limited(median_of_known(raw_level, scratch, least), reach)
 
 
-@kernel("float64(float64, float64)", exact=True, inline=True)
+@kernel("float64(float64, float64)", exact=True)
 def _limited(middle: float, reach: float) -> float:
     if math.isnan(middle):
         return 0.0 if math.isfinite(reach) else math.nan

@@ -190,7 +190,7 @@ def fill_sums(time: FloatArray, value: FloatArray, mean: float, sums: FloatArray
             sums[i, k + 1] = sums[i, k] + terms[i] if k > 0 else terms[i]
 
 
-@kernel(f"UniTuple(float64, 3)({READ_ONLY}, float64[:, ::1], int64, int64, float64)", exact=True, inline=True)
+@kernel(f"UniTuple(float64, 3)({READ_ONLY}, float64[:, ::1], int64, int64, float64)", exact=True)
 def line_of(time: FloatArray, sums: FloatArray, first: int, after: int, length: float) -> tuple[float, float, float]:
     """Return the least-squares line through the samples from `first` until `after`: mean time and value, and slope.
 
@@ -246,7 +246,7 @@ def _usual(  # noqa: PLR0913  a kernel: arrays and numbers one by one
     return float(_MAD * median_of(sizes, known)) if known >= _ENOUGH else math.nan
 
 
-@kernel("float64(float64, UniTuple(float64, 3))", exact=True, inline=True)
+@kernel("float64(float64, UniTuple(float64, 3))", exact=True)
 def _interpolated(since: float, usual: tuple[float, float, float]) -> float:
     """Return the usual deviation this long after the end of a line [s], between those after `_AHEAD`."""
     if since <= _AHEAD[0]:

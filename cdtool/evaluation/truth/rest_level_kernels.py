@@ -115,7 +115,6 @@ def count_until(times: FloatArray, until: float) -> int:
 
 @kernel(
     f"float64({_FLOATS}, {_FLOATS}, {_FLOATS}, boolean[::1], {_FLOATS}, float64, {_FLOATS}, {_FLOATS})",
-    entry=True,
     exact=True,
 )
 def fit_before(  # noqa: PLR0913  a kernel: arrays one by one

@@ -25,14 +25,14 @@ _LOW_BITS, _ABOVE_NINE, _HIGH_BITS = map(np.uint64, (0x7F7F7F7F7F7F7F7F, 0x76767
 _PAIRS, _UPPER, _LOWER = map(np.uint64, (0x000000FF000000FF, 0x000F424000000064, 0x0000271000000001))
 
 
-@kernel("uint64(uint64)", inline=True)
+@kernel("uint64(uint64)")
 def digit_count(word: np.uint64) -> np.uint64:
     """Return the number of digits at the start of a word, 0 to 8."""
     count: np.uint64 = trailing_zeros((((word & _LOW_BITS) + _ABOVE_NINE) | word) & _HIGH_BITS) >> _3
     return count
 
 
-@kernel("int64(uint64, uint64)", inline=True)
+@kernel("int64(uint64, uint64)")
 def first_digits(word: np.uint64, count: np.uint64) -> np.int64:
     """Return the number of the first `count` digits of a word; 0 for none."""
     # Shifted up, so that zeros precede them; in two steps, as no word can be shifted by 64 bits.

@@ -38,7 +38,7 @@ def count_lines(data: Bytes, line_end: int) -> int:
     return count
 
 
-@kernel(f"int64({BYTES}, int64, b1)", inline=True)
+@kernel(f"int64({BYTES}, int64, b1)")
 def _past_blanks(data: Bytes, at: int, tabs: bool) -> int:
     """Return the first position from `at` that is not a blank, nor a tab if `tabs` is True."""
     p = at

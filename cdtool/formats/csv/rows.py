@@ -133,7 +133,6 @@ class RowReader:
         if len(begin) < 2 or workers == 1:
             yield from starmap(self._block, chain(begin, blocks))
             return
-        _ = read_rows.compiled  # once, not in every thread
         pending: deque[Future[_Block]] = deque()
         with ThreadPoolExecutor(workers) as pool:
             try:

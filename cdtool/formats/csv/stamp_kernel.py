@@ -84,7 +84,7 @@ def _days(year: int, month: int, day: int) -> int:
     return era * 146097 + of_era * 365 + of_era // 4 - of_era // 100 + of_year - 719468
 
 
-@kernel(f"UniTuple(int64, 2)({BYTES}, int64, {PROGRAM})", entry=True)
+@kernel(f"UniTuple(int64, 2)({BYTES}, int64, {PROGRAM})")
 def read_stamp(data: Bytes, at: int, program: npt.NDArray[np.int64]) -> tuple[int, int]:
     """Return the nanoseconds since 1970-01-01 (for a time of day since midnight) and the end, or NOT_A_NUMBER."""
     year, month, day, hour, minute, second, nano, east, half = 1970, 1, 1, 0, 0, 0, 0, 0, -1

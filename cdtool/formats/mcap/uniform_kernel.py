@@ -60,7 +60,7 @@ _ROWS = "Array(uint64, 2, 'C', readonly=True)"
 _TOKENS = "Array(int64, 2, 'C', readonly=True)"
 
 
-@kernel(f"b1({_BYTES}, uint64, int64, int64, {_TABLE}, {_TABLE}, {_TABLE})", inline=True)
+@kernel(f"b1({_BYTES}, uint64, int64, int64, {_TABLE}, {_TABLE}, {_TABLE})")
 def _matches(
     data: ByteArray, begin: np.uint64, first: int, last: int, compared: _Words, mask: _Words, pattern: _Words
 ) -> bool:
@@ -72,7 +72,7 @@ def _matches(
     return not differing
 
 
-@kernel(f"void({_BYTES}, uint64, int64, int64, {_ROWS}, uint64)", inline=True)
+@kernel(f"void({_BYTES}, uint64, int64, int64, {_ROWS}, uint64)")
 def _copy_doubles(data: ByteArray, begin: np.uint64, first: int, last: int, numbers: _Words, row: np.uint64) -> None:
     """Copy float64 that follow each other into a row of their columns."""
     for i in range(first, last):
@@ -84,7 +84,7 @@ def _copy_doubles(data: ByteArray, begin: np.uint64, first: int, last: int, numb
             store(place + at, load(data, byte + at))
 
 
-@kernel(f"void({_BYTES}, uint64, int64, int64, {_ROWS}, uint64)", inline=True)
+@kernel(f"void({_BYTES}, uint64, int64, int64, {_ROWS}, uint64)")
 def _copy_others(data: ByteArray, begin: np.uint64, first: int, last: int, numbers: _Words, row: np.uint64) -> None:
     """Copy numbers of other types than float64 into a row of their columns."""
     for i in range(first, last):

@@ -168,7 +168,7 @@ class _Tokens:
         return row
 
 
-@kernel("uint64(int64, uint64)", inline=True)
+@kernel("uint64(int64, uint64)")
 def _float_bits(kind: int, word: np.uint64) -> np.uint64:
     """Return the bits of a number as float64; `word` is a varint, or the bytes of a number of fixed width."""
     if kind == DOUBLE:
@@ -193,7 +193,7 @@ def _float_bits(kind: int, word: np.uint64) -> np.uint64:
     return np.float64(number).view(np.uint64)
 
 
-@kernel(f"int64({_BYTES}, int64, int64, int64)", inline=True)
+@kernel(f"int64({_BYTES}, int64, int64, int64)")
 def _after_value(data: ByteArray, p: int, end: int, wire: int) -> int:
     """Return the byte after a value of this wire type; -1 if it is missing, or a group."""
     if wire == 0:

@@ -19,7 +19,6 @@ from cdtool.evaluation.explanation.normal_choice import Absence, NormalMotions
 from cdtool.evaluation.results import CalibrationResult, RecordingFinding, Skipped
 from cdtool.findings import Finding
 from cdtool.findings.scoring import DetectorLeftOut
-from cdtool.kernel_warm_up import compile_package
 from cdtool.operations import Operation
 from cdtool.plausible import LearnedRanges, PlausibleRanges
 from cdtool.remote.remote_path import location
@@ -151,7 +150,6 @@ class Teaching:
     @cached_property
     def _read(self) -> tuple[Runs, float]:
         """Return the runs, and the time that it took to read them [s]."""
-        compile_package()
         begin = perf_counter()
         runs = load_runs(self.setup.learn, self.setup.machine_file, self.setup.run_reading(self.workers))
         return runs, perf_counter() - begin
