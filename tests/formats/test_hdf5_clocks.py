@@ -77,6 +77,7 @@ def test_stamps_before_the_first_one_keep_their_sign(saved):
         ("days since 1899-12-30", 45_293.0, 2.0**-20),
         ("hours since 2024-01-01 02:00:00 +02:00", 24.0, 2.0**-12),
         ("minutes since 2024-01-01 22:00:00 -0200", 0.0, 0.5),
+        ("secs since 2023-12-31  6:59:59,75 -5:00", 129_600.25, 1),
     ],
 )
 def test_a_time_since_a_date_is_a_clock_since_1970(saved, tmp_path, unit, first, step):
@@ -107,9 +108,10 @@ def test_any_date_is_converted_like_in_the_calendar(date, minutes, gap):
     ("attributes", "why"),
     [
         ({"units": "seconds since the start"}, "the date of 'seconds since the start' cannot be read"),
+        ({"units": "hours since 2024-01-01 25:00"}, "the date of 'hours since 2024-01-01 25:00' cannot be read"),
         ({"units": "seconds since 2024-01-01", "calendar": "360_day"}, "its calendar '360_day'"),
     ],
-    ids=["date", "calendar"],
+    ids=["date", "hour", "calendar"],
 )
 def test_a_time_since_an_unreadable_date_is_reported_and_not_used_as_a_clock(saved, attributes, why):
     source = survey(saved(time=(np.arange(9.0), attributes), q=(np.arange(9.0), {})))

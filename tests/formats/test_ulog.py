@@ -195,6 +195,14 @@ def test_messages_after_a_damaged_one_are_read_from_the_next_mark(tmp_path):
     assert MessagesDamaged in kinds(source) and 6.0 in source.columns["sensor_accel/x"].values
 
 
+def test_a_message_that_is_longer_than_its_file_is_read_once(tmp_path):
+    """pyulog goes back by the 150 bytes that the message declares: it left the file, or read its end for ever."""
+    path = UlogFile().format("a", "uint64_t timestamp;float v;").write(tmp_path / "log.ulg")
+    path.write_bytes(path.read_bytes() + bytes(200) + b"\x96\x00\x00" + bytes(20))
+    with pytest.raises(RecordingError, match="contains no message with numbers"):
+        survey(path)
+
+
 def test_definitions_that_multiply_without_end_are_refused(tmp_path):
     log = UlogFile().format("a0", "uint64_t timestamp;float v;")
     for i in range(1, 40):

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
-
-import numpy.typing as npt
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RowsAsColumns, VariableLeftOut, WithoutClock
+from cdtool.findings.containers import VariableLeftOut, WithoutClock
 from cdtool.formats.clock_beside import is_clock_name
-from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
+from cdtool.formats.mat.leaves import Leaf, MatColumn
 from cdtool.formats.mat.runs import StructRuns, short_name
 from cdtool.formats.mat.variables import Numbers, Value, Variables, left_out
 
@@ -72,15 +69,6 @@ def arrange_columns(variables: Variables) -> Layout:
         into.update({name: MatColumn((section,), clock) for name, section in leaf.columns()})
     layout.columns = {name: layout.columns[name] for name in _in_file_order(layout.columns, variables)}
     return layout
-
-
-def as_table(section: Section, whole: npt.NDArray[Any], findings: list[Finding]) -> npt.NDArray[Any]:
-    """Return an array as a table (n, k), its rows along the longer dimension; a note is added if it is read across."""
-    table = whole.reshape(-1, 1) if 1 in whole.shape else whole
-    if table.shape[0] >= table.shape[1]:
-        return table
-    findings.append(Finding(RowsAsColumns("variable", section.name, *whole.shape), severity="note"))
-    return table.T
 
 
 class _Walk:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,16 @@ class Numbers:
     shape: tuple[int, ...]
     read: Callable[[], npt.NDArray[Any]]
     is_complex: bool = False
+
+    @property
+    def is_across(self) -> bool:
+        """Return whether its rows are along the second dimension, because that is the longer one."""
+        return 1 < self.shape[0] < self.shape[1]
+
+    @cached_property
+    def table(self) -> npt.NDArray[Any]:
+        """Return a vector or matrix as a table (n, k), its rows along the longer dimension."""
+        return (self.read() if self.shape[0] >= self.shape[1] else self.read().T).reshape(max(self.shape), -1)
 
 
 @dataclass(frozen=True)
