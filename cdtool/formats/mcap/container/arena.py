@@ -13,7 +13,6 @@ from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.messages import NO_DATE, MessageTable
 from cdtool.formats.mcap.container.walk_kernel import Bytes
 from cdtool.messages.batch import Batch
-from cdtool.messages.fast_path import ChunkRows
 
 
 @dataclass(frozen=True)
@@ -21,14 +20,13 @@ class MessageBlock:
     """Messages in one memory block, channel by channel.
 
     `covered`: a CRC covers the bytes. `cuts` maps channels whose definition changes to the offset in `data` where it
-    changes. `taken` are chunks whose messages the fast path has read; then there are no batches.
+    changes.
     """
 
     data: Bytes
     batches: tuple[tuple[int, Batch], ...]
     covered: bool
     cuts: Mapping[int, int]
-    taken: tuple[ChunkRows, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,6 @@ class Arena:
         self._used = 0
         self._covered = False
         self._cuts: dict[int, int] = {}
-        self._taken: list[ChunkRows] = []
 
     def fits(self, size: int, covered: bool) -> bool:
         """Return whether `size` more bytes have space, and a CRC covers both these and earlier bytes, or neither."""
@@ -66,19 +63,8 @@ class Arena:
         """Start again with `memory`, after `flush`."""
         self._data, self._covered = memory, covered
 
-    def is_ready_for(self, size: int) -> bool:
-        """Return whether a chunk of `size` bytes, with a CRC, whose messages the fast path has read can be added."""
-        return self.fits(size, covered=True) and not self._table.count
-
-    def add_taken(self, size: int, taken: ChunkRows) -> None:
-        """Add the next `size` bytes as a chunk whose messages the fast path has read, if that `is_ready_for` it."""
-        self._taken.append(taken)
-        self._used += size
-
     def walk(self, size: int, top_level: bool = False) -> Generator[MessageBlock, None, WalkResult]:
         """Add the messages of the next `size` bytes; yield blocks if the table is full, and return the result."""
-        if self._taken:
-            yield from self.blocks()
         at, end, before = self._used, self._used + size, self._table.count
         faults: list[str] = []
         emptied = False
@@ -122,10 +108,6 @@ class Arena:
 
     def blocks(self) -> Iterator[MessageBlock]:
         """Yield the messages added since the last block."""
-        if self._taken:
-            taken, self._taken = tuple(self._taken), []
-            self._note_first_time(taken[0].first_time)
-            yield MessageBlock(self._data, (), self._covered, {}, taken)
         if not self._table.count:
             return
         self._note_first_time(self._table.first_time())

@@ -7,7 +7,7 @@ again one by one, and damage is reported then.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -21,14 +21,11 @@ import numpy as np
 from cdtool.cores import usable_cores
 from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, ChunkHeader, Decompressor, chunk_header
 from cdtool.formats.mcap.container.damage import DamageError
-from cdtool.formats.mcap.container.definitions import Definitions
 from cdtool.formats.mcap.container.file_bytes import FileBytes
 from cdtool.formats.mcap.container.records import PREFIX, Chunk, ChunkIndex
 from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.messages.fast_path import ChunkReader, ChunkRows
-from cdtool.messages.large_pages import Buffers
 
 # The size of a group [bytes] (writers make chunks of slightly more than one MiB). Larger groups exceed the processor's
 # cache; with smaller ones the effort per group dominates.
@@ -41,12 +38,6 @@ _MOST_THREADS = 4
 _BEFORE_ENTRIES, _ENTRY = PREFIX + 6, 16
 
 
-# The first use of memory costs as much time as decompressing into it. Messages are far apart, and a page of 4 KiB
-# contains few of them: with small pages, address translation needs a quarter of the time of decompressing and half of
-# the time of gathering.
-BUFFERS = Buffers(JOINED, kept=3)
-
-
 class CheckedChunk(NamedTuple):
     """A checked chunk: its header, and either its messages, if the fast path has read them, or its address.
 
@@ -56,7 +47,6 @@ class CheckedChunk(NamedTuple):
     header: ChunkHeader
     end: int
     address: int = 0
-    taken: ChunkRows | None = None
 
 
 class _Reader:
@@ -88,17 +78,9 @@ class ChunkReadAhead:
     The fast path (`chunk_reader`) is applied to each chunk as long as no id in `definitions` is ambiguous.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        summary: Summary,
-        skip: Container[int],
-        definitions: Definitions,
-        chunk_reader: ChunkReader | None,
-    ) -> None:
-        self._path, self._definitions, self._chunk_reader = path, definitions, chunk_reader
+    def __init__(self, path: Path, summary: Summary, skip: Container[int]) -> None:
+        self._path = path
         chunks = [index for at, index in sorted(summary.chunks.items()) if at not in skip] if summary.verified else []
-        self._rows = expected_rows(chunks) if chunk_reader is not None else {}
         self._count = min(usable_cores(), _MOST_THREADS, len(chunks))
         self._groups = {group[0].chunk_start_offset: group for group in _groups(chunks)} if self._count > 1 else {}
         self._following = dict(pairwise(self._groups))
@@ -119,11 +101,6 @@ class ChunkReadAhead:
         while not self._readers.empty():
             self._readers.get().file.close()
 
-    @property
-    def is_fast(self) -> bool:
-        """Return whether its threads read the messages, too: as far as is known, nothing else takes long."""
-        return self._threads is not None and self._chunk_reader is not None and self._chunk_reader.is_ready
-
     def begins(self, at: int) -> bool:
         """Return whether the chunk at byte `at` is the first of a group, which has its own memory."""
         return at in self._groups
@@ -134,9 +111,7 @@ class ChunkReadAhead:
         for earlier in [start for start in self._started if start < at]:
             del self._started[earlier]
         following: int | None = at
-        # The fast path must learn from the first group before the next ones are started.
-        learning = self._chunk_reader is not None and at == next(iter(self._groups))
-        for _ in range(1 if learning else 1 + _GROUPS_AHEAD):
+        for _ in range(1 + _GROUPS_AHEAD):
             if following is not None and following not in self._started:
                 self._started[following] = self._start(self._groups[following])
             following = self._following.get(following) if following is not None else None
@@ -149,14 +124,11 @@ class ChunkReadAhead:
 
     def checked(self, at: int) -> CheckedChunk | None:
         """Return the chunk at byte `at` of the current group; None if it must be read."""
-        chunk = self._checked.get(at)
-        if chunk is not None and chunk.taken is not None and self._definitions.ambiguous:
-            return None
-        return chunk
+        return self._checked.get(at)
 
     def _start(self, chunks: list[ChunkIndex]) -> _Group:
         assert self._threads is not None
-        memory = BUFFERS.take(sum(index.uncompressed_size for index in chunks))
+        memory = np.empty(sum(index.uncompressed_size for index in chunks), np.uint8)
         targets, end = [], 0
         for index in chunks:
             start, end = end, end + index.uncompressed_size
@@ -189,15 +161,7 @@ class ChunkReadAhead:
             header.check()
             packed = record[header.data - at : header.data - at + header.size]
             end = at + (length if only_message_indexes(record.data, header.length) else header.length)
-            if self._chunk_reader is None or not self._chunk_reader.is_ready or at not in self._rows:
-                reader.decompressor.fill(header, packed, content)
-                return CheckedChunk(header, end, content.ctypes.data)
-            target = reader.buffer(len(content)) if header.compression else packed
-            reader.decompressor.fill(header, packed, target)
-            taken = self._chunk_reader.read(target, self._rows[at], self._is_known)
-            if taken is not None:
-                return CheckedChunk(header, end, taken=taken)
-            content[:] = target
+            reader.decompressor.fill(header, packed, content)
             return CheckedChunk(header, end, content.ctypes.data)
         except (DamageError, OSError):
             return None
@@ -210,9 +174,6 @@ class ChunkReadAhead:
         end, length = index.chunk_start_offset + index.chunk_length, index.message_index_length
         is_usual = length <= index.uncompressed_size and self._next_chunk.get(index.chunk_start_offset) == end + length
         return length if is_usual else 0
-
-    def _is_known(self, opcode: int, body: bytes) -> bool:
-        return self._definitions.is_known(opcode, body, covered=True)
 
     def _reader(self) -> _Reader:
         try:
@@ -234,28 +195,3 @@ def _groups(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
             size += index.uncompressed_size
     if group:
         yield group
-
-
-def expected_rows(chunks: Iterable[ChunkIndex]) -> dict[int, Mapping[int, range]]:
-    """Return the expected row numbers of the messages, by the chunk's byte and the channel's id.
-
-    A row number is the position of a message among all messages of its channel in these chunks. They follow from the
-    lengths of the message indexes, which have 16 bytes per message of a channel and whose positions are in the chunk's
-    index (section "Chunk Index"). The result ends before the first chunk whose message indexes have impossible lengths.
-    """
-    expected: dict[int, Mapping[int, range]] = {}
-    before: dict[int, int] = {}
-    for index in chunks:
-        channels = sorted(index.message_index_offsets, key=index.message_index_offsets.__getitem__)
-        starts = [index.message_index_offsets[channel] for channel in channels]
-        starts.append(index.chunk_start_offset + index.chunk_length + index.message_index_length)
-        rows = {}
-        for number, channel in enumerate(channels):
-            count, rest = divmod(starts[number + 1] - starts[number] - _BEFORE_ENTRIES, _ENTRY)
-            if count < 0 or rest:
-                return expected
-            first = before.get(channel, 0)
-            before[channel] = end = first + count
-            rows[channel] = range(first, end)
-        expected[index.chunk_start_offset] = rows
-    return expected

@@ -16,7 +16,7 @@ import numpy as np
 from cdtool.formats.mcap.container import walk_kernel
 from cdtool.formats.mcap.container.arena import Arena, MessageBlock, WalkResult
 from cdtool.formats.mcap.container.attachments import check_attachment
-from cdtool.formats.mcap.container.chunk_read_ahead import BUFFERS, CheckedChunk, ChunkReadAhead
+from cdtool.formats.mcap.container.chunk_read_ahead import JOINED, CheckedChunk, ChunkReadAhead
 from cdtool.formats.mcap.container.chunks import (
     HEADER_LENGTH,
     LARGEST,
@@ -45,7 +45,6 @@ from cdtool.formats.mcap.container.records import (
 from cdtool.formats.mcap.container.skippable_chunks import only_message_indexes, only_message_indexes_between
 from cdtool.formats.mcap.container.summary import Summary, matches_header
 from cdtool.formats.mcap.container.walk_kernel import Bytes
-from cdtool.messages.fast_path import ChunkReader, ChunkRows
 
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _OUTSIDE_CHUNKS = (Schema.opcode, Channel.opcode, Message.opcode)
@@ -71,7 +70,6 @@ class DataSection:
         summary: Summary,
         definitions: Definitions,
         skip: Mapping[int, object],
-        chunk_reader: ChunkReader | None,
     ) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}
@@ -82,16 +80,11 @@ class DataSection:
         self._file, self._summary, self._skip = file, summary, skip
         self._following = dict(pairwise(sorted(summary.chunks)))
         self._decompressor = Decompressor()
-        self._ahead = ChunkReadAhead(file.path, summary, skip, definitions, chunk_reader)
+        self._ahead = ChunkReadAhead(file.path, summary, skip)
         self._window = _SMALLEST_WINDOW
         self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
-
-    @property
-    def is_fast(self) -> bool:
-        """Return whether threads read the messages of the chunks ahead."""
-        return self._ahead.is_fast
 
     def pieces(self) -> Iterator[MessageBlock]:
         """Yield all messages that can be read."""
@@ -156,24 +149,8 @@ class DataSection:
             checked = self._ahead.checked(at)
             if checked is None:
                 return at
-            if checked.taken is None or not self._take(checked.header, checked.taken):
-                yield from self._chunk(checked.header, checked)
+            yield from self._chunk(checked.header, checked)
             at = checked.end if self._lost is None else at + checked.header.length
-
-    def _take(self, header: ChunkHeader, taken: ChunkRows) -> bool:
-        """Add a chunk that the fast path has read if that needs nothing else; otherwise return False."""
-        if not self.arena.is_ready_for(header.uncompressed_size):
-            return False
-        try:
-            self._claims.add(header)
-        except RefusedError:
-            return False
-        self._lost = None
-        self.chunks[header.at] = header
-        self._resync.verified_to = header.at + header.length
-        self.arena.add_taken(header.uncompressed_size, taken)
-        self.other_times += taken.times != (header.message_start_time, header.message_end_time)
-        return True
 
     def _chunk(self, header: ChunkHeader, checked: CheckedChunk | None = None) -> Iterator[MessageBlock]:
         self._lost = None
@@ -188,25 +165,18 @@ class DataSection:
             self._claims.add(header)
             if not self.arena.fits(header.uncompressed_size, covered):
                 yield from self.arena.flush()
-                self.arena.reset(BUFFERS.take(header.uncompressed_size), covered)
+                self.arena.reset(np.empty(max(JOINED, header.uncompressed_size), np.uint8), covered)
             content = self.arena.reserve(header.uncompressed_size)
-            taken = None if checked is None else checked.taken
-            if taken is None and (checked is None or checked.address != content.ctypes.data):
+            if checked is None or checked.address != content.ctypes.data:
                 self._decompressor.read(self._file, header, content)
         except DamageError as fault:
             loss = Loss.of_chunk(header, self._summary, str(fault), refused=isinstance(fault, RefusedError))
             self._lost = self.losses.add(loss)
             return
         self._resync.verified_to = header.at + header.length
-        if taken is not None:
-            if not self.arena.is_ready_for(0):
-                yield from self.arena.blocks()
-            self.arena.add_taken(len(content), taken)
-            times: tuple[int, int] | None = taken.times
-        else:
-            walked = yield from self.arena.walk(len(content))
-            self._note(walked, header.at, len(content))
-            times = walked.times if walked.reason == walk_kernel.DONE else None
+        walked = yield from self.arena.walk(len(content))
+        self._note(walked, header.at, len(content))
+        times = walked.times if walked.reason == walk_kernel.DONE else None
         if times is not None:
             self.other_times += times != (header.message_start_time, header.message_end_time)
 
@@ -244,7 +214,7 @@ class DataSection:
         self.losses.stopped = True
         self.losses.add(loss)
         yield from self.arena.flush()
-        self.arena.reset(BUFFERS.take(header.uncompressed_size), covered=False)
+        self.arena.reset(np.empty(max(JOINED, header.uncompressed_size), np.uint8), covered=False)
         content = self.arena.reserve(header.uncompressed_size)
         packed = self._file.read_scratch(header.data, left)
         if header.compression:

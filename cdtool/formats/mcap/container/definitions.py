@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from cdtool.formats.mcap.container.damage import DamageError
 from cdtool.formats.mcap.container.records import Channel, Schema
 from cdtool.formats.mcap.container.summary import Summary
-from cdtool.messages.stream import Stream
+from cdtool.messages.batch import Stream
 
 
 @dataclass(frozen=True)

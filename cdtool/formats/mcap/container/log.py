@@ -32,23 +32,18 @@ from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
 from cdtool.formats.mcap.container.skippable_chunks import skippable_chunks
 from cdtool.formats.mcap.container.summary import matches_header, read_summary
 from cdtool.formats.source import TopicDetails
-from cdtool.messages.batch import NO_BATCH, Batch
-from cdtool.messages.fast_path import ChunkReader, WrittenRows
+from cdtool.messages.batch import Batch
 
 _LONGEST_HEADER = 1 << 12
 
 
 @dataclass(frozen=True)
 class Messages:
-    """Messages of one channel; `covered`: a CRC covers them and their definitions.
-
-    They are either a batch, or `parts` that the fast path has written to columns, chunk by chunk.
-    """
+    """Messages of one channel; `covered`: a CRC covers them and their definitions."""
 
     stream: DefinedStream
     batch: Batch
     covered: bool
-    parts: tuple[WrittenRows, ...] = ()
 
 
 @dataclass
@@ -67,8 +62,7 @@ class Log:
 
     `wanted` selects topics: messages of other topics are only counted, and chunks without wanted topics are skipped if
     the summary is verified. Without `use_index` every chunk is read, from the start. If not `strict`, a file without
-    any readable message, or with values that are known to be wrong, is a finding instead of an error. `chunk_reader` is
-    the fast path for chunks.
+    any readable message, or with values that are known to be wrong, is a finding instead of an error.
     """
 
     def __init__(
@@ -77,7 +71,6 @@ class Log:
         wanted: Callable[[str], bool] | None = None,
         use_index: bool = True,
         strict: bool = True,
-        chunk_reader: ChunkReader | None = None,
     ) -> None:
         self.path = path
         self._strict = strict
@@ -86,7 +79,7 @@ class Log:
         self.summary = read_summary(self._file)
         self._skip = skippable_chunks(self._file, self.summary, self._wanted) if use_index and wanted else {}
         self._definitions = Definitions(self.summary)
-        self.section = DataSection(self._file, self.summary, self._definitions, self._skip, chunk_reader)
+        self.section = DataSection(self._file, self.summary, self._definitions, self._skip)
         self.profile = profile_of(self._file)
         self.counts: Counter[int] = Counter()
         self.topics: dict[str, Topic] = {}
@@ -125,28 +118,17 @@ class Log:
         return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
     def _usable(self, piece: MessageBlock) -> Iterator[Messages]:
-        counts: dict[int, int] = {}
-        parts: dict[int, list[WrittenRows]] = {}
-        for taken in piece.taken:
-            for channel, count in taken.counts.items():
-                counts[channel] = counts.get(channel, 0) + count
-            for channel, part in taken.parts.items():
-                parts.setdefault(channel, []).append(part)
-        for channel, count in counts.items():
-            yield from self._counted(channel, count, piece.covered, NO_BATCH, tuple(parts.get(channel, ())))
         for channel, batch in piece.batches:
             if channel in piece.cuts:
                 unambiguous = int(np.searchsorted(batch.start, piece.cuts[channel]))
                 if unambiguous < len(batch):
                     reason = self._definitions.ambiguous[channel]
                     self.section.losses.messages[reason] += len(batch) - unambiguous
-                batch = batch.first(unambiguous)
+                batch = batch.rows(slice(unambiguous))
             if len(batch):
                 yield from self._counted(channel, len(batch), piece.covered, batch)
 
-    def _counted(
-        self, channel: int, count: int, covered: bool, batch: Batch, parts: tuple[WrittenRows, ...] = ()
-    ) -> Iterator[Messages]:
+    def _counted(self, channel: int, count: int, covered: bool, batch: Batch) -> Iterator[Messages]:
         try:
             stream = self._definitions.stream(channel)
         except DamageError as fault:
@@ -156,7 +138,7 @@ class Log:
         covered = covered and stream.covered
         self.unverified += 0 if covered else count
         if self._wanted(stream.topic):
-            yield Messages(stream, batch, covered, parts)
+            yield Messages(stream, batch, covered)
 
     def _finish(self) -> None:
         self._file.check_unchanged()

@@ -1,11 +1,9 @@
-"""Messages -> columns: every wanted field of a whole batch at once; one module per message encoding."""
+"""The decoder of a channel, by the encodings of its messages and of its schema."""
 
 from __future__ import annotations
 
-from cdtool.messages.columns.decoded_batch import DecodedBatch, Decoder, FieldValues, UndecodableError
-from cdtool.messages.layouts.layout import SchemaError
-
-__all__ = ["DecodedBatch", "Decoder", "FieldValues", "UndecodableError", "decoder_for"]
+from cdtool.messages.decoded_batch import Decoder, UndecodableError
+from cdtool.messages.layout import SchemaError
 
 
 def decoder_for(message_encoding: str, schema_encoding: str, schema_name: str, schema_data: bytes) -> Decoder:
@@ -19,24 +17,20 @@ def decoder_for(message_encoding: str, schema_encoding: str, schema_name: str, s
 def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, schema_data: bytes) -> Decoder:
     match message_encoding, schema_encoding:
         case "json", _:
-            from cdtool.messages.columns.json import json_decoder
+            from cdtool.messages.json_messages import JsonDecoder
 
-            return json_decoder()
-        case "cdr", "ros2msg":
-            from cdtool.messages.columns.cdr import cdr_decoder
-            from cdtool.messages.layouts.ros2msg import parse_ros2msg
+            return JsonDecoder()
+        case ("cdr", "ros2msg") | ("ros1", "ros1msg"):
+            from cdtool.messages.ros_definitions import parse_definitions
+            from cdtool.messages.sequential import cdr_decoder, ros1_decoder
 
-            return cdr_decoder(parse_ros2msg(schema_name, schema_data))
-        case "ros1", "ros1msg":
-            from cdtool.messages.columns.cdr import ros1_decoder
-            from cdtool.messages.layouts.ros1msg import parse_ros1msg
-
-            return ros1_decoder(parse_ros1msg(schema_name, schema_data))
+            ros = 2 if message_encoding == "cdr" else 1
+            schema = parse_definitions(schema_name, schema_data, ros)
+            return cdr_decoder(schema) if ros == 2 else ros1_decoder(schema)
         case "protobuf", "protobuf":
-            from cdtool.messages.columns.protobuf import protobuf_decoder
-            from cdtool.messages.layouts.protobuf import parse_protobuf
+            from cdtool.messages.protobuf import protobuf_decoder
 
-            return protobuf_decoder(parse_protobuf(schema_name, schema_data))
+            return protobuf_decoder(schema_name, schema_data)
         case "cdr", "" if schema_name:
             raise UndecodableError(
                 f"the log has no definition of the message type '{schema_name}' (`ros2 bag convert` to MCAP adds it)"
