@@ -73,8 +73,8 @@ def decompression(path: Path) -> Callable[[], None]:
     import lz4.frame
     import zstandard
 
-    from cdtool.formats.mcap.container.chunks import HEADER_LENGTH, chunk_header
-    from cdtool.formats.mcap.container.log import Log
+    from cdtool.formats.mcap.chunks import HEADER_LENGTH, chunk_header
+    from cdtool.formats.mcap.log import Log
 
     content = path.read_bytes()
     chunks = []

@@ -28,7 +28,7 @@ from mcap_peers import by_mcap_ros2_support, by_orjson, by_protobuf, by_rosbags,
 from timing import Spread, interleaved, main, ratio, table, verdict
 
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.container.checksums import crc32
+from cdtool.formats.mcap.records import crc32
 
 SECONDS = 300.0
 ROUNDS, PEER_ROUNDS = 9, 5

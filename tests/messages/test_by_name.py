@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
 from cdtool.formats.mcap import Mcap
-from cdtool.messages.encodings import decoder_for
 from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS, PRESENT
+from cdtool.messages.encodings import decoder_for
 from tests.formats.mcap_files import by_hand, wanted  # noqa: F401
 from tests.messages import test_cdr, test_ros1
 from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, same

@@ -12,9 +12,8 @@ from mcap.reader import make_reader
 from mcap_ros2._cdr import CdrWriter, EncapsulationKind
 from mcap_ros2._dynamic import _for_each_msgdef, _write_complex_type, generate_dynamic
 
-from cdtool.messages.decoded_batch import UndecodableError
+from cdtool.messages.decoded_batch import ABSENT, UndecodableError
 from cdtool.messages.encodings import decoder_for
-from cdtool.messages.decoded_batch import ABSENT
 from cdtool.messages.fields import FieldMissingError, header_stamp, numeric_fields
 from tests.data_folder import DATA, data, needs_data
 from tests.messages.batches import assert_follows_field_language, batch_of, fields_of

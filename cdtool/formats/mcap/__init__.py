@@ -13,11 +13,10 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.mcap.container.log import Log
-from cdtool.formats.mcap.container.messages import NO_DATE
-from cdtool.formats.mcap.container.read_ahead import read_ahead
-from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times, with_exact_pieces, with_exact_times
+from cdtool.formats.mcap.log import Log
+from cdtool.formats.mcap.messages import NO_DATE
+from cdtool.formats.mcap.records import MAGIC
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
@@ -54,7 +53,7 @@ class Mcap:
         topics: dict[str, TopicSurvey] = {}
         jumps = SequenceJumps()
         origin: int | None = None
-        for piece in read_ahead(log.pieces()):
+        for piece in log.pieces():
             origin = _origin(path, log) if origin is None else origin
             jumps.add(piece, origin)
             for messages in piece:
@@ -103,7 +102,7 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
 
 def _origin(path: Path, log: Log) -> int:
     """Return the time [ns] of a log's first message, after its first piece was read."""
-    first = log.section.arena.first_time or 0
+    first = log.section.first_time or 0
     if first >= NO_DATE:  # the times so far are not dates: the first valid one is known after reading all messages
         log = Log(path)
         for _ in log.pieces():
@@ -134,8 +133,8 @@ class MappedFields:
         topics = wanted_topics(self.path, self.wanted, Topic, () if self._converted is None else (EXACT_TIME,))
         log = Log(self.path, topics.__contains__)
         start = self.origin
-        for piece in read_ahead(log.pieces()):
-            first = log.section.arena.first_time
+        for piece in log.pieces():
+            first = log.section.first_time
             if start is None and self.wanted.time.clock == "log" and first is not None and first < NO_DATE:
                 start = first
             for messages in piece:

@@ -6,15 +6,15 @@ The records are those of the `mcap` package. Its writer is not used because it w
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import IO, Any
 
 import numpy as np
 from mcap import records as written
 from mcap.data_stream import RecordBuilder
 
-from cdtool.formats.mcap.container.checksums import crc32
-from cdtool.formats.mcap.container.log import Messages
-from cdtool.formats.mcap.container.records import MAGIC, AttachmentIndex, Metadata
+from cdtool.formats.mcap.log import Messages
+from cdtool.formats.mcap.records import MAGIC, crc32
 
 _HEADER = 31  # bytes before a payload: opcode, length, channel id, sequence, two times
 
@@ -57,16 +57,16 @@ class CleanFile:
             offset += _HEADER + length
         self._chunk(b"".join(content), entries, covered)
 
-    def add_attachment(self, record: Iterable[bytes], index: AttachmentIndex) -> None:
+    def add_attachment(self, record: Iterable[bytes], index: written.AttachmentIndex) -> None:
         """Write an attachment's record unchanged, in pieces, and add it to the index; `index` is its previous entry."""
-        self._attachments.append(written.AttachmentIndex(**(vars(index) | {"offset": self._file.tell()})))
+        self._attachments.append(replace(index, offset=self._file.tell()))
         for piece in record:
             self._file.write(piece)
 
-    def add_metadata(self, metadata: Metadata) -> None:
+    def add_metadata(self, metadata: written.Metadata) -> None:
         """Write a metadata record and add it to the index."""
         at = self._file.tell()
-        self._write(written.Metadata(name=metadata.name, metadata=dict(metadata.metadata)))
+        self._write(metadata)
         self._metadata.append(written.MetadataIndex(offset=at, length=self._file.tell() - at, name=metadata.name))
 
     def finish(self) -> None:
@@ -106,9 +106,9 @@ class CleanFile:
         known.add(channel.id)
         self._defined.add(channel.id)
         if schema is not None:
-            self._schemas[schema.id] = written.Schema(**vars(schema))
+            self._schemas[schema.id] = schema
             self._schemas[schema.id].write(builder)
-        self._channels[channel.id] = written.Channel(**vars(channel))
+        self._channels[channel.id] = channel
         self._channels[channel.id].write(builder)
 
     def _chunk(self, content: bytes, entries: dict[int, list[tuple[int, int]]], covered: bool) -> None:

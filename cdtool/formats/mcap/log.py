@@ -22,15 +22,12 @@ from cdtool.findings.containers import (
     SummaryDamaged,
     Unverified,
 )
-from cdtool.formats.mcap.container.arena import MessageBlock
-from cdtool.formats.mcap.container.damage import DamageError
-from cdtool.formats.mcap.container.data_section import DataSection
-from cdtool.formats.mcap.container.definitions import DefinedStream, Definitions
-from cdtool.formats.mcap.container.file_bytes import FileBytes
-from cdtool.formats.mcap.container.losses import Loss
-from cdtool.formats.mcap.container.records import MAGIC, PREFIX, Footer, Header
-from cdtool.formats.mcap.container.skippable_chunks import skippable_chunks
-from cdtool.formats.mcap.container.summary import matches_header, read_summary
+from cdtool.formats.mcap.data_section import Block, DataSection
+from cdtool.formats.mcap.definitions import DefinedStream, Definitions
+from cdtool.formats.mcap.file_bytes import FileBytes
+from cdtool.formats.mcap.losses import Loss
+from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, parse
+from cdtool.formats.mcap.summary import matches_header, read_summary, skippable_chunks
 from cdtool.formats.source import TopicDetails
 from cdtool.messages.batch import Batch
 
@@ -117,16 +114,16 @@ class Log:
         counts = summary.statistics.channel_message_counts
         return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
-    def _usable(self, piece: MessageBlock) -> Iterator[Messages]:
-        for channel, batch in piece.batches:
-            if channel in piece.cuts:
-                unambiguous = int(np.searchsorted(batch.start, piece.cuts[channel]))
+    def _usable(self, block: Block) -> Iterator[Messages]:
+        for channel, batch in block.piece.batches:
+            if channel in block.cuts:
+                unambiguous = int(np.searchsorted(batch.start, block.cuts[channel]))
                 if unambiguous < len(batch):
                     reason = self._definitions.ambiguous[channel]
                     self.section.losses.messages[reason] += len(batch) - unambiguous
                 batch = batch.rows(slice(unambiguous))
             if len(batch):
-                yield from self._counted(channel, len(batch), piece.covered, batch)
+                yield from self._counted(channel, len(batch), block.covered, batch)
 
     def _counted(self, channel: int, count: int, covered: bool, batch: Batch) -> Iterator[Messages]:
         try:
@@ -151,14 +148,14 @@ class Log:
             topic = self.topics.setdefault(name, Topic(name, schema, stream.encoding))
             topic.count += self.counts[stream.id]
             topic.channels += bool(self.counts[stream.id])
-        self.origin = section.arena.first_time or 0
+        self.origin = section.first_time or 0
         self._check_data_crc()
         self._check_appended_data()
         if self._strict and not self.count and section.losses:
             self._raise_nothing_left()
 
     def _check_data_crc(self) -> None:
-        stated = self.section.end.data_section_crc if self.section.end is not None else 0
+        stated = self.section.data_crc
         if not stated or (self.section.is_partly_read and not self.unverified):
             return
         if self._file.crc(0, self.section.end_at) == stated:
@@ -175,7 +172,7 @@ class Log:
 
     def _check_appended_data(self) -> None:
         """Add the bytes after the log's end as a loss: another file was appended, whose summary is not this log's."""
-        if not self.summary.problem or self.section.end is None:
+        if not self.summary.problem or not self.section.is_ended:
             return
         end = end_of_log(self._file, self.section.end_at)
         if end is not None and end < self._file.size:
@@ -242,10 +239,10 @@ def profile_of(file: FileBytes) -> str:
     """Return the profile that the file's header states, such as `ros2`; empty if there is no header."""
     head = file.read(len(MAGIC), PREFIX)
     length = int.from_bytes(head[1:], "little")
-    if len(head) < PREFIX or head[0] != Header.opcode or length > _LONGEST_HEADER:
+    if len(head) < PREFIX or head[0] != Opcode.HEADER or length > _LONGEST_HEADER:
         return ""
     try:
-        return Header.read(file.read(len(MAGIC) + PREFIX, length)).profile
+        return str(parse(Opcode.HEADER, file.read(len(MAGIC) + PREFIX, length)).profile)
     except DamageError:
         return ""
 
@@ -258,5 +255,5 @@ def end_of_log(file: FileBytes, at: int) -> int | None:
         if len(head) < PREFIX or not head[0] or length > file.size - at:
             return None
         at += length
-        if head[0] == Footer.opcode:
+        if head[0] == Opcode.FOOTER:
             return at + len(MAGIC) if bytes(file.read(at, len(MAGIC))) == MAGIC else None

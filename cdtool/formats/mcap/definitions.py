@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cdtool.formats.mcap.container.damage import DamageError
-from cdtool.formats.mcap.container.records import Channel, Schema
-from cdtool.formats.mcap.container.summary import Summary
+from mcap.records import Channel, Schema
+
+from cdtool.formats.mcap.records import DamageError, Opcode, parse
+from cdtool.formats.mcap.summary import Summary
 from cdtool.messages.batch import Stream
 
 
@@ -39,15 +40,16 @@ class Definitions:
 
         Writers repeat definitions, and half a million of them can be compressed to 8 kB.
         """
-        if opcode == Channel.opcode and len(body) > 1 and int.from_bytes(body[:2], "little") in self.ambiguous:
+        if opcode == Opcode.CHANNEL and len(body) > 1 and int.from_bytes(body[:2], "little") in self.ambiguous:
             return True
         return self._latest.get((opcode, body[:2], covered)) == body
 
-    def add(self, opcode: int, body: memoryview, covered: bool) -> None:
+    def add(self, opcode: int, body: bytes, covered: bool) -> None:
         """Add a definition of the data section; raises DamageError if its bytes are not a definition."""
-        self._latest[opcode, bytes(body[:2]), covered] = bytes(body)
-        if opcode == Schema.opcode:
-            schema = Schema.read(body)
+        self._latest[opcode, body[:2], covered] = body
+        record = parse(opcode, body)
+        if opcode == Opcode.SCHEMA:
+            schema: Schema = record
             if schema.id == 0:  # invalid by the specification, and ignored
                 return
             if self._schemas.setdefault(schema.id, schema) != schema:
@@ -58,7 +60,7 @@ class Definitions:
             elif covered:
                 self._covered_schemas.add(schema.id)
         else:
-            channel = Channel.read(body)
+            channel: Channel = record
             if self._channels.setdefault(channel.id, channel) != channel:
                 self.ambiguous[channel.id] = f"channel {channel.id} '{channel.topic}' is defined twice, differently"
             elif covered:

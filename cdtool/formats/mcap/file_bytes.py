@@ -13,9 +13,8 @@ from typing import Self
 
 import numpy as np
 
-from cdtool.formats.mcap.container.checksums import crc32
-from cdtool.formats.mcap.container.damage import DamageError
-from cdtool.formats.mcap.container.walk_kernel import Bytes
+from cdtool.formats.mcap.chunks import Bytes
+from cdtool.formats.mcap.records import DamageError, crc32
 from cdtool.remote.ranges import RangedBytes
 from cdtool.remote.remote_path import RemotePath
 
@@ -32,7 +31,6 @@ class FileBytes:
         self.remote = RangedBytes(str(path)) if isinstance(path, RemotePath) and path.is_read_by_ranges() else None
         self._file = path.open("rb", buffering=0) if self.remote is None else None
         self.size = self._file.seek(0, 2) if self._file is not None else self._ranges.size
-        self._scratch = np.empty(0, np.uint8)
 
     def __enter__(self) -> Self:
         return self
@@ -76,13 +74,6 @@ class FileBytes:
         target = np.empty(max(0, min(length, self.size - at)), np.uint8)
         self.read_into(at, target)
         return target
-
-    def read_scratch(self, at: int, length: int) -> Bytes:
-        """Return the same in memory that the next call overwrites; raises DamageError if the file ends before."""
-        if length > len(self._scratch):
-            self._scratch = np.empty(max(length, _PIECE), np.uint8)
-        self.read_into(at, self._scratch[:length])
-        return self._scratch[:length]
 
     def read_into(self, at: int, target: Bytes) -> None:
         """Fill `target` with the bytes from `at`; raises DamageError if the file ends before."""

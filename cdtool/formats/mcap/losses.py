@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from cdtool.findings import Finding
 from cdtool.findings.containers import ChunksRefused, DamagedAt, LostBytes, MessagesLost, MoreDamage
-from cdtool.formats.mcap.container.chunks import ChunkHeader
-from cdtool.formats.mcap.container.summary import Summary
+from cdtool.formats.mcap.chunks import ChunkHeader
+from cdtool.formats.mcap.summary import Summary
 
 _LISTED = 10
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from cdtool.formats.mcap.container.damage import DamageError
-from cdtool.formats.mcap.container.file_bytes import FileBytes
-from cdtool.formats.mcap.container.records import PREFIX, AttachmentIndex
-from cdtool.formats.mcap.container.serialisation import string, uint64
+import struct
+
+from mcap.records import AttachmentIndex
+
+from cdtool.formats.mcap.file_bytes import FileBytes
+from cdtool.formats.mcap.records import PREFIX, DamageError
 
 _LONGEST_TEXT = 1 << 16
 
@@ -16,9 +18,7 @@ def check_attachment(file: FileBytes, at: int, length: int, *, with_crc: bool = 
     end += index.data_size
     if end + 4 > at + length:
         raise DamageError("the declared data size of an attachment exceeds its record")
-    if not with_crc:
-        return
-    stated = int.from_bytes(file.read(end, 4), "little")
+    stated = int.from_bytes(file.read(end, 4), "little") if with_crc else 0
     if stated and stated != file.crc(at + PREFIX, end):
         raise DamageError("the checksum of an attachment does not match")
 
@@ -31,9 +31,14 @@ def attachment_index(file: FileBytes, at: int, length: int) -> AttachmentIndex:
 def _read(file: FileBytes, at: int, length: int) -> tuple[AttachmentIndex, int]:
     """Return all fields except the data, and the byte where the data start."""
     head = file.read(at + PREFIX, min(length - PREFIX, 2 * _LONGEST_TEXT))
-    log_time, offset = uint64(head, 0)
-    create_time, offset = uint64(head, offset)
-    name, offset = string(head, offset)
-    media_type, offset = string(head, offset)
-    size, offset = uint64(head, offset)
-    return AttachmentIndex(at, length, log_time, create_time, size, name, media_type), at + PREFIX + offset
+    try:
+        log_time, create_time = struct.unpack_from("<QQ", head)
+        offset, texts = 16, []
+        for _ in range(2):
+            (size,) = struct.unpack_from("<I", head, offset)
+            texts.append(struct.unpack_from(f"<{size}s", head, offset + 4)[0].decode())
+            offset += 4 + size
+        (size,) = struct.unpack_from("<Q", head, offset)
+    except (struct.error, UnicodeDecodeError) as fault:
+        raise DamageError(f"an attachment of {length} bytes ends within its name, or it is not UTF-8") from fault
+    return AttachmentIndex(at, length, log_time, create_time, size, *texts), at + PREFIX + offset + 8
