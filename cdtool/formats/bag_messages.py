@@ -16,8 +16,7 @@ from cdtool.findings import Finding
 from cdtool.findings.containers import BagDamaged, MessagesUnreadable
 from cdtool.formats.container_checks import check_size
 from cdtool.formats.source import Source, TopicDetails
-from cdtool.messages.batch import Batch
-from cdtool.messages.stream import Stream
+from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.topic import wanted_columns, wanted_topics
 from cdtool.messages.topic_columns import TopicColumns
 from cdtool.messages.topic_survey import TopicSurvey

@@ -14,7 +14,7 @@ from cdtool.formats.bag_messages import Bag, IsWanted, one_line
 from cdtool.formats.container_checks import library, one_line_errors
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
-from cdtool.messages.stream import Stream
+from cdtool.messages.batch import Stream
 
 _BAG = b"#ROSBAG V2.0"
 

@@ -29,10 +29,9 @@ from cdtool.formats.bag_messages import Bag, IsWanted, one_line
 from cdtool.formats.container_checks import check_size, one_line_errors
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
-from cdtool.messages.columns import UndecodableError
+from cdtool.messages.batch import Stream
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.schemas import DEFINITIONS
-from cdtool.messages.stream import Stream
 from cdtool.remote.remote_path import location
 
 _SQLITE, _ZSTD = b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
@@ -88,10 +87,9 @@ class Rosbag2:
         batches = self._bag(path).batches(topic.__eq__)
         with closing(batches), suppress(RecordingError):  # the survey reports the problem
             for stream, batch in batches:
-                decoder = decoders.of(stream, batch)
-                if decoder is not None:
-                    with suppress(UndecodableError):
-                        return decoder.element_names(batch.first(1))
+                names = decoders.element_names(stream, batch)
+                if names is not None:
+                    return names
         return ()
 
     def _bag(self, path: Path) -> _Ros2Bag:

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from cdtool.messages.columns import decoder_for
-from cdtool.messages.columns.json_shape import JsonShape
+from cdtool.messages.encodings import decoder_for
 from cdtool.messages.fields import header_stamp, numeric_fields
 from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, same
 
@@ -102,7 +101,7 @@ def test_a_text_is_refused_exactly_if_python_refuses_it(text):
     st.sampled_from([b'{"a": 1.5, "b": {"c": -2e-3, "s": "up"}, "q": [1, 2.25]}', b'{"a":true,"q":[null,3]}']),
     st.data(),
 )
-def test_every_byte_that_differs_from_the_shape_is_noticed(payload, data):
+def test_every_byte_that_differs_from_the_other_messages_is_noticed(payload, data):
     at = data.draw(st.integers(0, len(payload) - 1))
     changed = bytearray(payload)
     changed[at] = data.draw(st.integers(0, 255))
@@ -127,19 +126,7 @@ def test_numbers_equal_pythons_floats_to_the_bit():
     assert same(values, expected)
 
 
-def test_messages_of_one_shape_are_not_decoded_by_python(monkeypatch):
-    payloads = [
-        b'{"t": "%d", "q": [%d, -1.5e%d], "on": %s}' % (i, i, i, b"true" if i % 2 else b"false") for i in range(50)
-    ]
-    batch, decoder, wanted = batch_of(payloads), new_decoder(), fields_of("q[:]", "on")
-    decoder.decode(batch, wanted)
-    monkeypatch.setattr(json, "loads", lambda *_: pytest.fail("a message was decoded by Python"))
-    table, on = (field_values.values for field_values in decoder.decode(batch, wanted).fields)
-    assert table.tolist() == [[i, float(f"-1.5e{i}")] for i in range(50)]
-    assert on.tolist() == [i % 2 for i in range(50)]
-
-
-def test_more_shapes_than_are_stored_decode_to_the_same_values():
+def test_messages_of_many_shapes_decode_to_the_same_values():
     payloads = [json.dumps({"q": list(range(i % 90)), f"k{i % 7}": {"c": i}, "a": i}).encode() for i in range(300)]
     decoder = new_decoder()
     for _ in range(2):
@@ -169,9 +156,3 @@ def test_a_damaged_message_has_a_reason():
     assert decoded.status.tolist() == [0, 1, 1]
     assert decoded.reason.startswith("JSONDecodeError: Expecting value")
     assert new_decoder().decode(batch_of([b"[1]"]), []).reason == "ValueError: the JSON is not an object"
-
-
-def test_decoders_do_not_share_shapes():
-    first, second = new_decoder(), new_decoder()
-    first.decode(batch_of([b'{"a":1}']), fields_of("a"))
-    assert first._shapes and isinstance(first._shapes[0], JsonShape) and not second._shapes

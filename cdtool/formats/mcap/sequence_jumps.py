@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from cdtool.findings import Finding
 from cdtool.findings.messages import MissingMessages
-from cdtool.formats.mcap.container.log import Messages
+from cdtool.formats.mcap.log import Messages
 
 Numbers = npt.NDArray[np.uint32]
 

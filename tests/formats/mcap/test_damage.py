@@ -9,7 +9,7 @@ import pytest
 
 from cdtool.findings import Finding
 from cdtool.findings.containers import LostBytes, MessageCountDiffers, Unverified
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.log import Log
 from tests.formats.mcap.small_files import COMPRESSIONS, read, read_or_refused, small_file
 
 

@@ -12,7 +12,7 @@ from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
 from cdtool.findings import Fact, Finding
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.log import Log
 from cdtool.formats.source import Source
 from tests.formats.mcap_damage.truth import FIELDS, Message
 
