@@ -1,4 +1,4 @@
-"""Rows of plain numbers, read eight digits at a time, have the bits of Python's float; so do rows of other cells."""
+"""Every number has the bits of Python's float, in rows of plain numbers and beside other cells."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.digits_kernel import digit_count, first_digits
-from cdtool.kernels import kernel
 
 DIGITS = st.text("0123456789", max_size=10)
 PLAIN = st.builds(
@@ -24,19 +22,6 @@ CELL = (
     | st.sampled_from(["1e5", "-1.5E-300", "nan", "inf", "-inf", " 1.5", "1.5 ", "123456789.123456789", ".5", "5."])
     | st.floats(allow_nan=False).map(repr)
 )
-
-
-@kernel("Tuple((uint64, int64))(uint64)")
-def begin_of(word):
-    count = digit_count(word)
-    return count, first_digits(word, count)
-
-
-@given(st.text("0123456789", max_size=8), st.binary(max_size=8))
-def test_the_digits_at_the_start_of_a_word_are_counted_and_read(digits, rest):
-    letters = (digits.encode() + rest.lstrip(b"0123456789") + b"\n" * 8)[:8]
-    word = int.from_bytes(letters, "little") ^ 0x3030303030303030
-    assert begin_of(word) == (len(digits), int(digits or "0"))
 
 
 @settings(max_examples=300)

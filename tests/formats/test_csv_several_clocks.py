@@ -203,7 +203,8 @@ def test_a_clock_of_the_same_rate_that_ends_early_is_that_of_its_channels(log):
         assert len(source.columns["torque"].values) == 30 and len(source.columns["force"].values) == 50
 
 
-def test_a_long_table_is_read_in_pieces_with_the_times_of_the_whole(log):
+def test_a_long_table_is_read_in_pieces_with_the_times_of_the_whole(log, monkeypatch):
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 1 << 18)
     first, second = 1.7e9 + np.arange(60_000) / 2000.0, 1.7e9 + 0.25 + np.arange(20_000) / 500.0
     path = log(table("time1 [s],force,time2 [s],torque,speed", first, second))
     pieces = list(Csv().pieces(path))

@@ -21,7 +21,7 @@ from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.head import Head
 from cdtool.formats.csv.lines import Line, begins_comment
 from cdtool.formats.csv.marks import Marks, find_marks
-from cdtool.formats.csv.row_kernel import Integers
+from cdtool.formats.csv.stamps import Integers
 from cdtool.formats.csv.text import Bytes
 
 _EXPONENT = r"[eE][+-]?[0-9]+"

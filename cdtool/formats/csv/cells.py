@@ -46,6 +46,15 @@ def split_line(line: str, separator: str) -> list[str]:
     return [cell.strip(" \t\r\n") for cell in cells]
 
 
+def has_open_quote(line: str, separator: str) -> bool:
+    """Return whether a cell starts with a quote that is not closed; a quote within a cell is a letter."""
+    try:
+        next(csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True))
+    except csv.Error:
+        return True
+    return False
+
+
 def _words(line: str) -> list[str]:
     """Return a line split at blanks and tabs; non-breaking spaces do not split, as they are parts of numbers."""
     return [word for word in line.strip(" \t\r\n").replace("\t", " ").split(" ") if word]

@@ -33,13 +33,12 @@ from cdtool.formats.csv.ambiguous_marks import (
 )
 from cdtool.formats.csv.blank_lines import are_missing_samples, strip_blank_end
 from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
-from cdtool.formats.csv.dialect import Dialect
+from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
 from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.head import Head, HeadFinder, refuse_table_above
 from cdtool.formats.csv.head_words import column_kinds
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.marks import Marks, SampleCell, find_marks
-from cdtool.formats.csv.row_kernel import count_lines
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
 from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
 
@@ -57,9 +56,6 @@ _LOOKED = 200
 _MOST = 12
 # Rows end early if so many lines, with the names and the first row, show it.
 _ENDING_EARLY = 6
-# Dialects of previous tables, for files with an equal head and rows of the same shape.
-_KNOWN: dict[tuple[object, ...], Dialect] = {}
-_MOST_KNOWN = 64
 _TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
 _LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
 _MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
@@ -95,7 +91,8 @@ def find_separator(path: Path, lines: Sequence[Line], pinned: str = "", decimal:
             )
         return split
     in_times = _is_part_of_times(lines)
-    splits = [_split(scored, separator) for separator in SEPARATORS if not (in_times and separator == ";")]
+    used = [mark for mark in SEPARATORS if mark == " " or any(mark in text for text in scored)]
+    splits = [_split(scored, separator) for separator in used if not (in_times and separator == ";")]
     possible = [split for split in splits if split.width > 1 and split.numeric > 0.0]
     if not possible:
         return _split(scored, ",")
@@ -242,7 +239,7 @@ def _full_width(rows: Sequence[tuple[Line, list[str]]], width: int) -> int:
     if len(rows) < _ENDING_EARLY or {len(cells) for _, cells in rows[2:]} != {width}:
         return width
     names, first = rows[0][1], rows[1][1]
-    if not len(names) == len(first) > width or not any(names[width:]):
+    if not len(names) == len(first) > width or not any(names[width:]) or len(names) * len(rows) > MOST_CELLS:
         return width
     named = all(kind(cell) in "XM" for cell in names)
     return len(names) if named and all(kind(cell) in "NTM" for cell in first) else width
@@ -272,7 +269,7 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | No
     findings: list[Finding] = []
     if footer is not None:
         dialect = _dialect(path, *footer.removed_from(text, stream), pins)
-        findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset, count_lines)))
+        findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset)))
     marks = dialect.marks if dialect.marks.sure else resolve_marks(dialect)
     if marks.doubt:
         findings.append(Finding(DoubtfulPoint(marks.doubt.text, marks.doubt.line)))
@@ -285,23 +282,13 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | No
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
     """Return the dialect, footer and ambiguous marks not considered, from a shortened sample if that is sufficient."""
     refuse_long_line(text, stream)
-    shorter = shorter_sample(text, stream, pins)
-    if shorter is None:
-        return _by_lines(path, text, stream, pins)
-    known = (text.encoding, pins, shorter.above, shorter.shape)
-    dialect = _KNOWN.get(known)
-    if dialect is None:
+    if (shorter := shorter_sample(text, stream, pins)) is not None:
         try:
-            dialect = shorter.whole(_by_lines(path, text, shorter.stream, pins))
+            if (dialect := shorter.whole(_by_lines(path, text, shorter.stream, pins))) is not None:
+                return dialect
         except RecordingError:  # the number of a line in the message may be wrong: read the whole sample
-            dialect = None
-        if dialect is None:
-            return _by_lines(path, text, stream, pins)
-        if len(_KNOWN) >= _MOST_KNOWN:
-            _KNOWN.clear()
-        kept = replace(text, content=None)
-        _KNOWN[known] = dialect = replace(dialect, text=kept, sampled=dialect.sampled - shorter.rows)
-    return replace(dialect, text=text, sampled=dialect.sampled + shorter.rows)
+            pass
+    return _by_lines(path, text, stream, pins)
 
 
 def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:

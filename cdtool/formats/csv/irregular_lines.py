@@ -23,11 +23,11 @@ from cdtool.findings.tables import (
     UnreadCells,
     WordsBelowRows,
 )
-from cdtool.formats.csv.cells import NULLS, STAMP_LIKE, has_numbers, kind, number, split_line
+from cdtool.formats.csv.cells import NULLS, STAMP_LIKE, has_numbers, has_open_quote, kind, number, split_line
 from cdtool.formats.csv.dialect import Dialect, quoted
 from cdtool.formats.csv.lines import begins_comment, is_ruler
-from cdtool.formats.csv.row_arrays import Rows
-from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers
+from cdtool.formats.csv.row_arrays import EMPTY, LEFT, STAMP, Rows
+from cdtool.formats.csv.stamps import MISSING_STAMP, Integers
 from cdtool.plain_text import counted
 
 # A survey reads a column of numbers with up to this many unreadable cells, or up to this share of the rows.
@@ -140,9 +140,12 @@ class IrregularLines:
                 f"{self.path}: line {line} contains a carriage return: line ends are mixed",
                 "save the file again with one kind of line end",
             )
-        if text.count('"') % 2:
-            raise RecordingError(f"{self.path}: line {line} has a quote that is not closed", "write quotes in pairs")
         cells = split_line(text, self.dialect.separator)
+        other_width = len(cells) != self.dialect.width
+        if text.count('"') % 2 and (other_width or has_open_quote(text, self.dialect.separator)):
+            raise RecordingError(f"{self.path}: line {line} has a quote that is not closed", "write quotes in pairs")
+        if self.dialect.may_end_after(len(cells)) and not irregular.unfinished:
+            cells += [""] * (self.dialect.width - len(cells))
         if len(cells) != self.dialect.width or self.words is not None:
             self._skip_footer(irregular, line, cells, text)
             return
@@ -200,7 +203,7 @@ class IrregularLines:
                 rows.stamps[STAMP - target, row] = stamp
                 return
         else:
-            value = self._category(column, cell) if column in self.categories else self._number(cell)
+            value = self.value(column, cell)
             if value is not None:
                 rows.numbers[target, row] = value
                 return
@@ -242,10 +245,17 @@ class IrregularLines:
             return float("nan")
         return number(cell, self.dialect.marks.decimal, self.dialect.marks.thousands)
 
-    def _category(self, column: int, cell: str) -> float:
-        """Return a number as it is, NaN for an empty cell or a pinned mark of a missing value, else the text's code."""
+    def value(self, column: int, cell: str) -> float | None:
+        """Return a number, or the code of a text in a column of categories; NaN if missing, None if unreadable.
+
+        There a text such as `None` is a category, unless it is pinned as a missing value: a kind of contact.
+        """
+        if column not in self.categories:
+            return self._number(cell)
         value = None if cell in NULLS and cell not in self.dialect.pins.missing else self._number(cell)
-        return self.categories[column].code(cell) if value is None else value
+        if value is None and cell != self.dialect.names[column].strip():
+            return self.categories[column].code(cell)
+        return value
 
     def _stamp(self, column: int, cell: str) -> int | None:
         return self.dialect.stamped[column].layouts[0].read(cell)

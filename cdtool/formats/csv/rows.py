@@ -1,59 +1,47 @@
-"""Read the rows of a text table, all at once or block by block, with a compiled loop.
+"""Read the rows of a text table block by block: pandas reads the numbers of regular lines.
 
-The loop reads regular lines. Any other line is a row with unusual notation, a line that is skipped and reported
-(comment, blank line, repeated header, NUL bytes, incomplete last line), or an error with its line number.
+`block_lines.py` finds the lines that are regular: the others, and those with a cell that is not a number, are listed
+for `irregular_lines.py`. pandas therefore never sees a line that is too short or too long.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
-from itertools import chain, islice, starmap
+import csv
+import io
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from cdtool.cores import usable_cores
-from cdtool.formats.csv.blank_lines import fill_blank_lines
-from cdtool.formats.csv.cells import NARROW_BLANKS
-from cdtool.formats.csv.dialect import Dialect
+from cdtool.errors import RecordingError
+from cdtool.formats.container_checks import check_size
+from cdtool.formats.csv.block_lines import BlockLines
+from cdtool.formats.csv.cells import MISSING
+from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLine, IrregularLines
-from cdtool.formats.csv.marks import thousands_byte
-from cdtool.formats.csv.number_clock import read_whole_numbers
-from cdtool.formats.csv.number_kernel import powers
-from cdtool.formats.csv.row_arrays import Rows
-from cdtool.formats.csv.row_kernel import EMPTY, LEFT, MISSING_STAMP, STAMP, Integers, count_lines, read_rows
-from cdtool.formats.csv.short_rows import complete_blocks
-from cdtool.formats.csv.stamp_kernel import STEPS
-from cdtool.formats.csv.text import AFTER, Bytes
-from cdtool.formats.csv.word_cells import WordCells
+from cdtool.formats.csv.row_arrays import EMPTY, LEFT, STAMP, Rows
+from cdtool.formats.csv.stamps import MISSING_STAMP, Integers, as_integers, by_shape
+from cdtool.recording import BoolArray, FloatArray
 
-_THREADS = 4
-
-
-@dataclass(frozen=True)
-class _Block:
-    """The result of one block: `rows` rows of `arrays` from row `first`, the number of lines, and irregular lines.
-
-    `blank` are the blank lines; `empty` are blank lines that are rows; `unfinished`: the last line has no end.
-    """
-
-    arrays: Rows
-    first: int
-    rows: int
-    lines: int
-    blank: Integers
-    empty: Integers
-    irregular: list[IrregularLine]
-    unfinished: bool
+# Blank lines, comments and repeated headers, of which there may be more only beside as many rows.
+_MOST_SKIPPED = 20_000
+# pandas reads the nearest float64 by itself since 3.1; before that it must be asked.
+_VERSION = tuple(map(int, pd.__version__.split(".")[:2]))
+_EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _VERSION < (3, 1) else {}
+# An integer with so many digits fits into 64 bits if the first of them is not a nine.
+_MOST_DIGITS = 19
+_DECIMAL = re.compile(r"(?P<whole>[0-9]*)(?:[.,](?P<decimals>[0-9]*))?")
 
 
 class RowReader:
     """Reads the rows of one file. `numeric` and `stamped` are the requested columns, by number, in order.
 
-    `whole` are columns of integers with more digits than float64 can represent; they follow the stamps.
+    `whole` are columns of decimal numbers with more digits than float64 can represent, which follow the stamps as
+    integers: multiples of 1 / 10^`decimals`.
     """
 
     def __init__(
@@ -63,173 +51,180 @@ class RowReader:
         numeric: Sequence[int],
         stamped: Sequence[int],
         whole: Sequence[int] = (),
+        decimals: int = 0,
     ) -> None:
-        self.path = path
-        self.dialect = dialect
+        self.path, self.dialect = path, dialect
         self.targets = np.full(dialect.width, LEFT, dtype=np.int64)
         self.targets[list(numeric)] = np.arange(len(numeric))
         self.targets[list(stamped)] = STAMP - np.arange(len(stamped))
         if dialect.trailing:
             self.targets[-1] = EMPTY
-        self.programs = np.zeros((len(stamped), STEPS), dtype=np.int64)
-        for k, column in enumerate(stamped):
-            self.programs[k] = dialect.stamped[column].layouts[0].program
-        self.whole = tuple(whole)
+        self.whole, self.decimals = tuple(whole), decimals
         self.shape = (len(numeric), len(stamped) + len(whole))
         self.ended = True
-        self.words: WordCells | None = None  # the columns of categories
+        encoding = dialect.text.stream_encoding
+        self._missing = [text.encode(encoding, "replace").decode("latin-1") for text in dialect.missing]
 
     def read(self, irregular: IrregularLines) -> Rows:
-        """Return all rows in one pair of arrays, into which several threads write; raises RecordingError."""
-        if self.dialect.text.content is not None:
-            return _joined(list(self.pieces(irregular)), self.allocate(0))
-        whole = self.allocate(self.dialect.text.count_lines(self.dialect.offset, count_lines))
+        """Return all rows in one pair of arrays; raises RecordingError."""
+        if self.dialect.text.content is not None and not (self.dialect.text.recoded or self.dialect.short_rows):
+            return next(self.pieces(irregular), self.allocate(0))  # of a single block
+        lines = self.dialect.text.count_lines(self.dialect.offset)
+        check_size(self.path, lines * sum(self.shape))
+        whole = self.allocate(lines)
         parts = list(self.pieces(irregular, whole))
         count = sum(part.count for part in parts)
         not_rows = np.concatenate([whole.not_rows, *(part.not_rows for part in parts)])
         return Rows(whole.numbers[:, :count], whole.stamps[:, :count], count, whole.first_line, not_rows)
 
     def pieces(self, irregular: IrregularLines, whole: Rows | None = None) -> Iterator[Rows]:
-        """Yield the rows block by block, in arrays of their own or consecutively in `whole`.
+        """Yield the rows block by block, in arrays of their own or one after another in `whole`.
 
         Irregular lines are passed to `irregular`. Raises RecordingError with the first line that cannot be read.
         """
-        line, end = self.dialect.first_line, 0
-        for block in self._read_ahead(whole):
-            self.ended = not block.unfinished
-            for each in block.irregular:
-                irregular.read(each, line, block.arrays)
-            irregular.blank += (block.blank + line).tolist()
-            irregular.empty += (block.empty + line).tolist()
-            dropped = irregular.end_block(range(block.first, block.first + block.rows))
-            not_rows = np.sort(np.concatenate([block.blank + line, np.array([*dropped.values()], dtype=np.int64)]))
-            begin = 0 if whole is None else end
-            end = _compact(block, sorted(dropped), begin)
-            numbers, stamps = block.arrays.numbers[:, begin:end], block.arrays.stamps[:, begin:end]
-            yield Rows(numbers, stamps, end - begin, line, not_rows)
-            line += block.lines
+        line, first, skipped = self.dialect.first_line, 0, 0
+        for block in self._blocks():
+            lines = BlockLines.of(block, self.dialect)
+            self.ended = block.endswith((b"\n", b"\r"))
+            is_row = lines.blank | True if self.dialect.blank_is_missing else ~lines.blank
+            row = np.cumsum(is_row) - 1
+            rows = self.allocate(int(row[-1]) + 1) if whole is None else whole.part(first, first + int(row[-1]) + 1)
+            rows.first_line = line
+            skipped += int(np.count_nonzero(lines.blank))
+            self._check(skipped, first + int(np.count_nonzero(lines.regular)))
+            readable = self._read(lines, row, rows, irregular)
+            for at in map(int, np.flatnonzero(~readable & ~lines.blank)):
+                final = not self.ended and at == len(row) - 1
+                irregular.read(IrregularLine(at, int(row[at]), lines.line(at), final), line, rows)
+                self._check(skipped + len(irregular.dropped), first + int(row[at]) - len(irregular.dropped))
+            blank = np.flatnonzero(lines.blank) + line
+            (irregular.empty if self.dialect.blank_is_missing else irregular.blank).extend(blank.tolist())
+            rows.not_rows = blank[:0] if self.dialect.blank_is_missing else blank
+            skipped += len(irregular.dropped)
+            rows.drop(irregular.end_block(range(rows.count)))
+            yield rows
+            line, first = line + len(row), first + rows.count
+            check_size(self.path, first * sum(self.shape))
+
+    def _check(self, skipped: int, rows: int) -> None:
+        """Raise RecordingError if a file has many more lines of other kinds than rows."""
+        if skipped > max(_MOST_SKIPPED, 2 * rows):
+            raise RecordingError(f"{self.path}: more than {_MOST_SKIPPED} lines are no rows", "is it a table?")
 
     def allocate(self, count: int) -> Rows:
         """Return uninitialised arrays for `count` rows."""
         numbers, stamps = np.empty((self.shape[0], count)), np.empty((self.shape[1], count), dtype=np.int64)
-        return Rows(numbers, stamps, 0, self.dialect.first_line)
+        return Rows(numbers, stamps, count, self.dialect.first_line)
 
-    def _raw_blocks(self, whole: Rows | None) -> Iterator[tuple[bytearray, int, int, int, Rows]]:
-        """Yield per block the bytes, the size of its lines, the first row, the number of rows, and their arrays."""
-        dialect = self.dialect
-        end, first, blocks = dialect.text.line_end[0], 0, dialect.text.blocks(dialect.offset)
-        if dialect.short_rows:
-            blocks = complete_blocks(blocks, dialect)
-        for block, size in blocks:
-            count = int(count_lines(np.frombuffer(block, dtype=np.uint8, count=size), end)) + (block[size - 1] != end)
-            yield block, size, first, count, self.allocate(count) if whole is None else whole
-            first += 0 if whole is None else count
+    def _blocks(self) -> Iterator[bytes]:
+        """Yield blocks of complete lines; if rows end early, with at most MOST_CELLS cells."""
+        most, end = max(1, MOST_CELLS // self.dialect.width), self.dialect.text.line_end
+        for block, size in self.dialect.text.blocks(self.dialect.offset):
+            if self.dialect.short_rows and block.count(end) > most:
+                ends = np.flatnonzero(np.frombuffer(block, dtype=np.uint8) == end[0])[most - 1 :: most] + 1
+                yield from (block[a:b] for a, b in pairwise([0, *ends.tolist(), size]) if b > a)
+            else:
+                yield block
 
-    def _read_ahead(self, whole: Rows | None) -> Iterator[_Block]:
-        """Yield blocks in the file's order, read ahead by threads (the loop runs without the interpreter lock)."""
-        workers = min(_THREADS, usable_cores())
-        blocks = self._raw_blocks(whole)
-        begin = list(islice(blocks, 2))
-        if len(begin) < 2 or workers == 1:
-            yield from starmap(self._block, chain(begin, blocks))
-            return
-        pending: deque[Future[_Block]] = deque()
-        with ThreadPoolExecutor(workers) as pool:
-            try:
-                for block in chain(begin, blocks):
-                    pending.append(pool.submit(self._block, *block))
-                    if len(pending) > workers:
-                        yield pending.popleft().result()
-                while pending:
-                    yield pending.popleft().result()
-            finally:
-                pool.shutdown(cancel_futures=True)
+    def _read(self, lines: BlockLines, row: Integers, rows: Rows, irregular: IrregularLines) -> BoolArray:
+        """Read the regular lines, line `i` as row `row[i]`; return the lines that have been read."""
+        readable = lines.regular.copy()
+        if lines.widest < self.dialect.width or not lines.regular.all():
+            rows.numbers[:], rows.stamps[:] = np.nan, MISSING_STAMP
+        if not lines.widest:
+            return readable
+        at = np.flatnonzero(lines.regular)
+        to = slice(None) if len(at) == rows.count else row[at]
+        content = lines.joined(lines.regular)
+        targets = self.targets[: lines.widest]
+        numeric = [column for column in np.flatnonzero(targets >= 0).tolist() if column not in irregular.categories]
+        parsed = self._numbers(content, lines.widest, numeric)
+        for column, numbers in parsed.items():
+            rows.numbers[targets[column], to] = numbers
+        worded = [column for column in np.flatnonzero(targets >= 0).tolist() if column not in parsed]
+        stamped = np.flatnonzero(targets <= STAMP).tolist()
+        texts = self._texts(content, lines.widest, [*worded, *stamped, *self.whole])
+        for column in worded:
+            values = _known(texts[column], lambda cell: irregular.value(column, cell))  # noqa: B023
+            rows.numbers[targets[column], to] = np.array(values, dtype=np.float64)
+            readable[at[[value is None for value in values]]] = False
+        for column in stamped:
+            stamps = self.dialect.stamped[column].layouts[0].read_all(texts[column])
+            rows.stamps[STAMP - targets[column], to] = stamps
+            missing = ("", *self.dialect.missing)
+            doubtful = np.flatnonzero(stamps == MISSING_STAMP).tolist()
+            readable[at[[i for i in doubtful if texts[column][i] not in missing]]] = False
+        for k, column in enumerate(self.whole, len(rows.stamps) - len(self.whole)):
+            rows.stamps[k, to] = _multiples(texts[column], self.decimals)
+        return readable
 
-    def _block(self, block: bytearray, size: int, first: int, count: int, arrays: Rows) -> _Block:
-        end = self.dialect.text.line_end
-        unfinished = block[size - 1] not in b"\r\n"
-        if block[size - 1 : size] != end:  # the line ends after the block replace the missing one
-            size += 1
-        if self.dialect.marks.thousands in NARROW_BLANKS:
-            encoding = "utf-8" if self.dialect.text.recoded else self.dialect.text.encoding
-            lines = block[:size].replace(self.dialect.marks.thousands.encode(encoding), b"'")
-            block, size = lines + end * AFTER, len(lines)
-        empty = np.empty(0, dtype=np.int64)
-        if self.dialect.blank_is_missing:
-            block, size, empty = fill_blank_lines(block, size, end)
-        if self.words is not None:
-            content = self.words.coded(bytes(memoryview(block)[:size]))
-            block, size = bytearray(content + end * AFTER), len(content)
-        data = np.frombuffer(block, dtype=np.uint8)
-        blank = np.empty(count, dtype=np.int64)
-        irregular = np.empty((count, 4), dtype=np.int64)
-        counts = np.zeros(4, dtype=np.int64)
-        read_rows(
-            data,
-            size,
-            self._marks(),
-            self.targets,
-            self.programs,
-            arrays.numbers,
-            arrays.stamps,
-            first,
-            blank,
-            irregular,
-            counts,
-            *powers(),
+    def _numbers(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, FloatArray]:
+        """Return the columns in which each cell is a number in plain notation, or missing."""
+        try:
+            frame = self._parsed(content, width, columns, np.float64)
+        except ValueError:  # of one of the columns
+            kinds = {column: cells.dtype.kind for column, cells in self._parsed(content, width, columns, None).items()}
+            numeric = [column for column in columns if kinds[column] in "biuf"]
+            frame = self._parsed(content, width, numeric, np.float64)  # not from integers, which have no -0.0
+        return {column: cells.to_numpy() for column, cells in frame.items()}
+
+    def _texts(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, list[str]]:
+        """Return the cells of columns."""
+        frame = self._parsed(content, width, columns, np.object_)
+        if content.isascii():
+            return {column: [cell.strip(" \t") for cell in cells] for column, cells in frame.items()}
+        encoding = self.dialect.text.stream_encoding
+        return {
+            column: [cell.encode("latin-1").decode(encoding, "replace").strip(" \t") for cell in cells]
+            for column, cells in frame.items()
+        }
+
+    def _parsed(self, content: bytes, width: int, columns: Sequence[int], dtype: Any) -> Mapping[int, Any]:
+        """Return columns as parsed by pandas; the bytes are decoded as Latin-1, one letter each."""
+        if not columns:
+            return {}
+        dialect, is_text = self.dialect, dtype is np.object_
+        frame = pd.read_csv(
+            io.BytesIO(content),
+            sep=r"\s+" if dialect.separator == " " else dialect.separator,
+            header=None,
+            names=range(width),
+            usecols=None if len(columns) == width else list(columns),
+            index_col=False,
+            dtype=dtype,
+            engine="c",
+            encoding="latin-1",
+            skip_blank_lines=False,
+            keep_default_na=False,
+            na_filter=not is_text,
+            na_values=[] if is_text else [*MISSING, *self._missing],
+            quoting=csv.QUOTE_MINIMAL if b'"' in content else csv.QUOTE_NONE,
+            skipinitialspace=dialect.separator != " " and b" " in content,
+            decimal=dialect.marks.decimal,
+            low_memory=False,
+            **_EXACT,
         )
-        if self.whole:
-            self._read_whole(data[:size], arrays.stamps[:, first : first + int(counts[0])], blank[: counts[2]])
-        final = count - 1 if unfinished else -1
-        listed = [
-            IrregularLine(line, row, bytes(block[begin:stop]), line == final)
-            for line, row, begin, stop in irregular[: counts[3]].tolist()
-        ]
-        return _Block(
-            arrays, first, int(counts[0]), int(counts[1]), blank[: counts[2]].copy(), empty, listed, unfinished
-        )
-
-    def _read_whole(self, data: Bytes, stamps: Integers, blank: Integers) -> None:
-        """Fill the last of `stamps` (m, n) with the columns of integers; `blank` are the lines that are not rows."""
-        for row, column in zip(stamps[-len(self.whole) :], self.whole, strict=True):
-            numbers, is_read = read_whole_numbers(data, self.dialect, column, blank)
-            row[:] = np.where(is_read, numbers, MISSING_STAMP)
-
-    def _marks(self) -> Integers:
-        dialect = self.dialect
-        comment = ord(dialect.comment[0]) if dialect.comment and ord(dialect.comment[0]) < 128 else -1
-        return np.array(
-            [
-                dialect.text.line_end[0],
-                ord(dialect.separator),
-                ord(dialect.marks.decimal),
-                thousands_byte(dialect.marks.thousands),
-                ord('"'),
-                comment,
-            ],
-            dtype=np.int64,
-        )
+        return dict(frame.items())
 
 
-def _joined(parts: Sequence[Rows], none: Rows) -> Rows:
-    """Return the rows of a short file in one pair of arrays; `none` are no rows."""
-    if len(parts) == 1:  # the usual case, without a copy
-        return parts[0]
-    parts = [none, *parts]
-    numbers, stamps = (
-        np.concatenate(tables, axis=1) for tables in zip(*((it.numbers, it.stamps) for it in parts), strict=True)
-    )
-    not_rows = np.concatenate([part.not_rows for part in parts])
-    return Rows(numbers, stamps, sum(part.count for part in parts), none.first_line, not_rows)
+def _known(cells: Sequence[str], value: Callable[[str], float | None]) -> list[float | None]:
+    """Return the values of cells, of which many may be equal."""
+    known = {cell: value(cell) for cell in set(cells)}
+    return [known[cell] for cell in cells]
 
 
-def _compact(block: _Block, dropped: Sequence[int], to: int) -> int:
-    """Move a block's rows, without the dropped ones, to consecutive rows from row `to`; return their end."""
-    start = block.first
-    for stop in (*dropped, block.first + block.rows):
-        if to != start and stop > start:
-            for table in (block.arrays.numbers, block.arrays.stamps):
-                table[:, to : to + stop - start] = table[:, start:stop]
-        to += stop - start
-        start = stop + 1
-    return to
+def _multiples(cells: Sequence[str], decimals: int) -> Integers:
+    """Return numbers without a sign or an exponent as multiples of 1 / 10^decimals; MISSING_STAMP for other cells."""
+    multiples = np.full(len(cells), MISSING_STAMP, dtype=np.int64)
+    for rows, example, digits in by_shape(cells):
+        match = _DECIMAL.fullmatch(example)
+        if match is None or not 0 < len(match["whole"]) + decimals <= _MOST_DIGITS:
+            continue
+        (first, whole_end), (begin, end) = match.span("whole"), match.span("decimals")
+        end = min(end, begin + decimals)
+        places = end - begin
+        fraction = as_integers(digits, begin, end) if places else 0
+        values = (as_integers(digits, first, whole_end) * 10**places + fraction) * 10 ** (decimals - places)
+        fits = len(match["whole"]) + decimals < _MOST_DIGITS or digits[:, 0] < 9
+        multiples[rows] = np.where(fits, values, MISSING_STAMP)
+    return multiples

@@ -25,11 +25,9 @@ from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
 from cdtool.formats.csv.number_clock import DAY_S, exact_differences, since_1970, two_readings
 from cdtool.formats.csv.row_arrays import Rows
-from cdtool.formats.csv.row_kernel import MISSING_STAMP, Integers
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.several_clocks import Clocks, clock_findings
-from cdtool.formats.csv.stamps import NS, Layout, seconds_since, unwrap
-from cdtool.formats.csv.word_cells import WordCells
+from cdtool.formats.csv.stamps import MISSING_STAMP, NS, Integers, Layout, seconds_since, unwrap
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
 
@@ -72,7 +70,7 @@ class StampColumns:
             times = np.concatenate((self._last.get(column, stamps[known][:1]), stamps[known]))
             self._last[column] = times[-1:].copy()
             period, _ = self._layout(column).wraps
-            passed = unwrap(times, np.ones(len(times), dtype=bool), period)
+            passed = unwrap(times, period)
             stamps[known] = times[1:] + self._passed[column] * period
             self._passed[column] += passed
         if dated and self.origin is None and known.any():
@@ -161,8 +159,6 @@ class _TableReader:
         self.reader = RowReader(path, dialect, self.requested.numeric, self.requested.stamps)
         self.irregular = IrregularLines(path, dialect, survey, self.reader.targets, left_out=self.requested.left_out)
         self.irregular.categories = {dialect.names.index(key): Categories() for key in worded}
-        if worded:
-            self.reader.words = WordCells(dialect, self.irregular.categories)
         self.stamped = StampColumns(dialect, self.requested.stamps, self.requested.dates)
 
     def columns(self, rows: Rows) -> dict[str, FloatArray]:
@@ -209,7 +205,7 @@ def read_table(
     table = reading.table(reading.columns(rows), findings, not len(rows.not_rows))
     if clock is not None and wanted is not None:
         _set_clock(path, table, clock, wanted)
-        _set_exact(dialect, rows, table, clock, wanted.time.factor)
+        _set_exact(dialect, table, clock, wanted.time.factor)
     for key, column in table.values.items():
         table.findings += rounding_finding(key, rounded_integers(column))
     return table
@@ -332,11 +328,11 @@ def _set_clock(path: Path, table: TextTable, clock: str, wanted: ChannelMap) -> 
         )
 
 
-def _set_exact(dialect: Dialect, rows: Rows, table: TextTable, clock: str, factor: float) -> None:
+def _set_exact(dialect: Dialect, table: TextTable, clock: str, factor: float) -> None:
     """Read the clock again if its stamps have more digits than float64 can represent."""
     if clock in table.stamped or table.origin:
         return
-    exact = exact_differences(dialect, rows, dialect.names.index(clock), table.values[clock], factor)
+    exact = exact_differences(dialect, dialect.names.index(clock), table.values[clock], factor)
     if exact is not None:
         table.values[clock], table.origin = exact
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import codecs
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from io import BytesIO, RawIOBase
-from itertools import count
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +25,8 @@ Bytes = npt.NDArray[np.uint8]
 
 SAMPLE_BYTES = 1 << 17
 BLOCK_BYTES = 1 << 20
-# Number of line ends after a block, which end any number, word or time stamp.
-AFTER = 64
-RING = 8
+# So many of them are read at once: pandas takes as long to start as to read some ten kilobytes.
+_BLOCKS = 4
 TAIL_BYTES = 1 << 16
 UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 
@@ -55,9 +53,14 @@ class Text:
         """Return whether the stream is UTF-8 that was recoded from UTF-16 or UTF-32."""
         return self.encoding in UNIT_BYTES
 
+    @property
+    def stream_encoding(self) -> str:
+        """Return the encoding of the stream."""
+        return "utf-8" if self.recoded else self.encoding
+
     def decode(self, line: bytes) -> str:
         """Return a line of the stream as text."""
-        return line.decode("utf-8" if self.recoded else self.encoding, errors="replace")
+        return line.decode(self.stream_encoding, errors="replace")
 
     def between(self, start: int, end: int) -> bytes:
         """Return bytes of the file."""
@@ -69,24 +72,30 @@ class Text:
             file.seek(start)
             return file.read(end - start) or b""
 
-    def chunks(self) -> Iterator[bytes]:
-        """Yield the stream in pieces that may end within a line; raises RecordingError if it cannot be decoded."""
+    def chunks(self, offset: int = 0) -> Iterator[bytes]:
+        """Yield the stream from byte `offset` in pieces that may end within a line.
+
+        Raises RecordingError if it cannot be decoded.
+        """
         decoder = codecs.getincrementaldecoder(self.encoding)() if self.recoded else None
-        with self._open() as file:
-            file.seek(self.mark)
-            left = self.size - self.mark
-            while left > 0 and (piece := file.read(min(BLOCK_BYTES, left))):
+        start = self.mark if decoder else self.mark + offset
+        with open_text(self.path) if self.content is None else BytesIO(self.content) as file:
+            file.seek(start)
+            left = self.size - start
+            while left > 0 and (piece := file.read(min(_BLOCKS * BLOCK_BYTES, left))):
                 left -= len(piece)
                 if decoder is None:
                     yield piece
                     continue
                 try:
-                    yield decoder.decode(piece, final=left == 0).encode()
+                    text = decoder.decode(piece, final=left == 0).encode()
                 except UnicodeError as fault:
                     raise RecordingError(
                         f"{self.path}: damaged: not valid {self.encoding.upper()} near byte {self.size - left}",
                         "save it again as UTF-8",
                     ) from fault
+                yield text[offset:]
+                offset = max(0, offset - len(text))
 
     def tail(self) -> list[bytes]:
         """Return the last lines of the stream, including an unfinished last line; the first may be part of a line."""
@@ -99,72 +108,35 @@ class Text:
             end = self.between(max(self.mark, self.size - TAIL_BYTES), self.size)
         return end.split(self.line_end)
 
-    def count_lines(self, offset: int, counted: Callable[[Bytes, int], int]) -> int:
-        """Return the number of lines after byte `offset` of the stream, including an unfinished last line.
-
-        `counted` counts the occurrences of one byte.
-        """
-        end = self.line_end[0]
-        if self.content is not None and not self.recoded:
-            data = np.frombuffer(self.content, dtype=np.uint8)[self.mark + offset : self.size]
-            return counted(data, end) + (len(data) > 0 and bool(data[-1] != end))
-        total, last = 0, end
-        for buffer, size in self._filled(offset, BLOCK_BYTES):
-            total += counted(np.frombuffer(buffer, dtype=np.uint8, count=size), end)
-            last = buffer[size - 1]
+    def count_lines(self, offset: int) -> int:
+        """Return the number of lines after byte `offset` of the stream, including an unfinished last line."""
+        end, total, last = self.line_end, 0, self.line_end
+        for piece in self.chunks(offset):
+            total += piece.count(end)
+            last = piece[-1:] or last
         return total + (last != end)
 
-    def blocks(self, offset: int) -> Iterator[tuple[bytearray, int]]:
-        """Yield blocks of complete lines after byte `offset` of the stream: bytes, and the size of the lines in them.
+    def blocks(self, offset: int) -> Iterator[tuple[bytes, int]]:
+        """Yield blocks of complete lines after byte `offset` of the stream, and their size.
 
-        The lines of a block are followed by AFTER line ends. Only the last line of the last block may be without a line
-        end. A block's buffer is reused RING blocks later.
+        Only the last line of the last block may be without a line end.
         """
-        left = [b""]
-        for buffer, size in self._filled(offset, BLOCK_BYTES, lambda: left[0]):
-            cut = buffer.rfind(self.line_end, 0, size) + 1
-            rest = left[0] = bytes(memoryview(buffer)[cut:size])
+        if self.content is not None and not self.recoded:
+            if rows := self.content[self.mark + offset : self.size]:
+                yield rows, len(rows)
+            return
+        rest = b""
+        for piece in self.chunks(offset):
+            cut = piece.rfind(self.line_end) + 1
+            whole = not rest and cut == len(piece)
+            block = piece if whole else b"".join((rest, memoryview(piece)[:cut]))
+            rest = piece[cut:] if cut else rest + piece
             if len(rest) > BLOCK_BYTES // 2:
                 raise RecordingError(f"{self.path}: has a line of more than {BLOCK_BYTES >> 11} KB", "is it a table?")
             if cut:
-                buffer[cut : cut + AFTER] = self.line_end * AFTER
-                yield buffer, cut
-        if left[0]:
-            yield bytearray(left[0] + self.line_end * AFTER), len(left[0])
-
-    def _open(self) -> RawIOBase | BytesIO:
-        return open_text(self.path) if self.content is None else BytesIO(self.content)
-
-    def _filled(self, offset: int, most: int, before: Callable[[], bytes] = bytes) -> Iterator[tuple[bytearray, int]]:
-        """Yield the stream from `offset` in buffers, with the size of their content; each starts with `before()`."""
-        if self.recoded:
-            for piece in self.chunks():
-                content = piece[offset:]
-                offset = max(0, offset - len(piece))
-                if content:
-                    content = before() + content
-                    yield bytearray(content), len(content)
-            return
-        left = self.size - self.mark - offset
-        if self.content is not None:
-            if left > 0:
-                yield bytearray(memoryview(self.content)[self.mark + offset : self.size]), left
-            return
-        ring = [bytearray(2 * most + AFTER) for _ in range(RING if left > most else 1)]
-        with open_text(self.path) as file:
-            file.seek(self.mark + offset)
-            for turn in count():
-                if left <= 0:
-                    return
-                buffer, first = ring[turn % len(ring)], before()
-                buffer[: len(first)] = first
-                free = memoryview(buffer)[len(first) : len(first) + min(most, left)]
-                size = file.readinto(free)
-                free.release()
-                if not size:
-                    return
-                left -= size
-                yield buffer, len(first) + size
+                yield block, len(block)
+        if rest:
+            yield rest, len(rest)
 
 
 def read_sample(path: Path, most: int = SAMPLE_BYTES) -> bytes:

@@ -19,12 +19,11 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import RepeatedRows, StatedPeriodDiffers, ValuesWithoutTime
 from cdtool.findings.tables import LastLineCut, NulBytesAtEnd
-from cdtool.formats.container_checks import check_size
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
-from cdtool.formats.csv.row_arrays import Rows
-from cdtool.formats.csv.row_kernel import LEFT, MISSING_STAMP, Integers
+from cdtool.formats.csv.row_arrays import LEFT, Rows
 from cdtool.formats.csv.rows import RowReader
+from cdtool.formats.csv.stamps import MISSING_STAMP, Integers
 from cdtool.formats.csv.table import RequestedColumns, check_last_line
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import BoolArray, FloatArray
@@ -207,7 +206,6 @@ class _TimedReader:
         self.whole = sorted({column for group in wanted if group.columns for column in group.clock.whole})
         self.reader = RowReader(path, dialect, self.numeric, (), self.whole)
         self.irregular = IrregularLines(path, dialect, survey, self.reader.targets, left_out=left_out)
-        self.values = 0
 
     def pieces(self, rows: Rows, first: int) -> list[Piece]:
         """Return the next rows of each group, from row `first` of the table."""
@@ -218,10 +216,7 @@ class _TimedReader:
             dict(zip(self.whole, rows.stamps, strict=True)),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of damaged stamps, which are then no times
-            pieces = [group.piece(cells) for group in self.groups]
-        self.values += sum(len(piece.values) * piece.rows for piece in pieces)
-        check_size(self.path, self.values)
-        return pieces
+            return [group.piece(cells) for group in self.groups]
 
     def end(self, rows: Rows, before: int) -> list[Finding]:
         """Return the findings on skipped lines and the end of the file, whose last row may be removed from `rows`."""
