@@ -1,8 +1,8 @@
 """Read and check the elements of a .mat file of version 5 to 7.
 
 SciPy's reader is not used. Of 400 files with one damaged place, 15 crash the process in it (an unknown kind of numbers
-is enough, tests/formats/test_mat.py), and of 4 it returns a part without a word: it does not compare the size of an
-element with the element that contains it, nor the numbers of an array with its dimensions.
+is enough, tests/formats/test_mat.py), and of 4 it returns a part without reporting the rest: it compares neither the
+size of an element with the element that contains it, nor the numbers of an array with its dimensions.
 https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf
 """
 
@@ -108,7 +108,7 @@ class _Reader:
             return name, Opaque(what or "object")
         shape = tuple(parts.integers((5, 6), _MOST_DIMENSION_BYTES))
         if len(shape) < 2 or min(shape) < 0:
-            raise ValueError(f"an array of the dimensions {' x '.join(map(str, shape)) or 'none'}")
+            raise ValueError("an array without its dimensions")
         name = parts.name()
         if matlab_class in _NUMERIC_CLASSES:
             is_complex = bool(flags[0] & _COMPLEX)
@@ -131,7 +131,7 @@ class _Reader:
             raise ValueError(f"the numbers of an array are of an unknown kind ({kind})")
         dtype = np.dtype(self.order + _NUMBER_TYPES[kind])
         if len(part) != math.prod(shape) * dtype.itemsize:
-            raise ValueError(f"an array of {math.prod(shape)} numbers has {len(part)} bytes")
+            raise ValueError(f"an array of {math.prod(shape):g} numbers has {len(part)} bytes")
         return partial(np.ndarray, shape, dtype, part, order="F")
 
     def _characters(self, parts: _Parts, shape: tuple[int, ...]) -> str:
