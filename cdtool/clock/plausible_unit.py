@@ -72,5 +72,5 @@ def contradicted_by_steps(stamps: FloatArray, factor: float) -> tuple[str, float
     step = float(np.median(steps))
     if _SHORTEST_STEP <= step * factor <= _LONGEST_STEP:
         return "", 0.0
-    fitting = [name for name, one in SECONDS.items() if _SLOWEST <= 1.0 / (step * one) <= _FASTEST]
+    fitting = [name for name, one in SECONDS.items() if _SLOWEST * (step * one) <= 1.0 <= _FASTEST * (step * one)]
     return min(fitting, key=lambda name: abs(np.log(step * SECONDS[name] / 1e-3)), default=""), step * factor

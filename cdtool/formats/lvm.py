@@ -241,7 +241,7 @@ def _style(path: Path, lines: Sequence[str], pins: TablePins) -> _Style:
 
 
 def _heads(path: Path, text: Text, style: _Style) -> tuple[list[_Head], int | None]:
-    """Return the heads of the segments, and the byte of one that the file's end cuts off (None: there is none).
+    """Return the heads of the segments, and the byte of one that the file's end cuts off (None: no head is).
 
     Other words between and below the rows are left to the reader of the rows.
     """

@@ -83,7 +83,7 @@ def dialect_of_rows(
 ) -> Dialect:
     """Return the dialect of rows: `marks` are separator and decimal mark, `place` line and byte of the first row.
 
-    `names` are those of the columns, empty for a column that is no channel; `rows` are the cells of the first rows.
+    `names` are those of the columns, empty for columns of other cells; `rows` are the cells of the first rows.
     """
     separator, decimal = marks
     width = max([len(names), *(len(row) for row in rows if not row[-1])])

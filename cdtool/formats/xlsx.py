@@ -13,7 +13,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from datetime import date, datetime, time, timedelta
+from datetime import datetime, time, timedelta
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -217,9 +217,7 @@ def _moment(value: Any) -> str:
     """Return a date or time that the library has already converted."""
     if isinstance(value, timedelta):
         return repr(value.total_seconds())
-    if isinstance(value, datetime | time):
-        return value.isoformat(timespec="microseconds")
-    return value.isoformat() if isinstance(value, date) else " ".join(str(value).split())
+    return value.isoformat(timespec="microseconds") if isinstance(value, datetime | time) else str(value)
 
 
 def _read_sheets(path: Path, openpyxl: Any, folder: Path) -> list[_Sheet]:
@@ -263,12 +261,10 @@ def _opened(openpyxl: Any, path: Path) -> Iterator[Any]:
 
 
 def _check_archive(path: Path, archive: zipfile.ZipFile) -> None:
-    """Raise RecordingError if the parts of a workbook are damaged, encrypted, or far larger than the file."""
+    """Raise RecordingError if the parts of a workbook are far larger than the file."""
     parts = archive.infolist()
     check_size(path, sum(part.file_size for part in parts) // 8)
     for part in parts:
-        if part.flag_bits & 1:
-            raise RecordingError(f"{path}: is encrypted", "save it without a password")
         if part.filename.endswith("sharedStrings.xml") and part.file_size > _MOST_TEXT:
             raise RecordingError(f"{path}: contains {part.file_size >> 20} MiB of texts: refused", "save it as CSV")
 

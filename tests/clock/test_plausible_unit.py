@@ -143,3 +143,8 @@ def test_a_container_clock_that_contradicts_its_attribute_is_read_in_the_only_po
     assert recording.duration == pytest.approx(0.049)
     (fact,) = [item.fact for item in recording.findings if isinstance(item.fact, WRONG_UNIT)]
     assert fact == FileUnitImplausible(TwoReadings(1.6e12, "s", pytest.approx(50702.0, abs=0.5), "ms", "2020-09-13"))
+
+
+def test_steps_near_the_smallest_float_are_in_no_unit():
+    """Of damaged bytes; the rate of such a step is beyond every float."""
+    assert contradicted_by_steps(np.arange(9.0) * 5e-324, 1.0) == ("", 5e-324)

@@ -55,6 +55,7 @@ def plain_files(folder: Path) -> list[Path]:
 @pytest.mark.parametrize(
     ("make", "name"),
     [
+        (bombs.mat_of_small_integers, "a.mat"),
         (bombs.hdf5_never_written, "a.h5"),
         (bombs.hdf5_never_written, "a.mat"),
         (bombs.hdf5_one_chunk, "a.h5"),

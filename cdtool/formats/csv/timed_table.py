@@ -104,20 +104,6 @@ class TickClock:
 
 
 @dataclass(frozen=True)
-class CountClock:
-    """Rows are counted: the first is at `start` [s], and `step` [s] is their period."""
-
-    start: float
-    step: float
-    numbers: tuple[int, ...] = ()
-    whole: tuple[int, ...] = ()
-
-    def times(self, rows: RowCells) -> FloatArray:
-        """Return the times of the rows by their numbers."""
-        return self.start + np.arange(rows.first, rows.first + rows.count, dtype=np.float64) * self.step
-
-
-@dataclass(frozen=True)
 class ClockGroup:
     """Columns that share a clock. `columns`: their names, with the number of the column in the table.
 

@@ -25,11 +25,14 @@ _WIDEST = 64
 class Layout:
     """The columns of a file in its order; `hidden` ones are read only where a machine file names them.
 
-    `numbers` are the single numbers, `texts` the texts of a file by name; `own_clocks`: several clocks are logged.
+    `leaves` are the arrays of numbers, `numbers` the single numbers, `texts` the texts by name. `with_runs`: arrays of
+    structs may be runs.
     """
 
+    with_runs: bool = True
     columns: dict[str, MatColumn] = field(default_factory=dict)
     hidden: dict[str, MatColumn] = field(default_factory=dict)
+    leaves: list[Leaf] = field(default_factory=list)
     numbers: dict[str, Numbers] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
@@ -40,50 +43,12 @@ class Layout:
         return tuple(dict.fromkeys((*self.columns, *self.hidden)))
 
     @property
-    def clocks(self) -> dict[str, MatColumn]:
-        """The clocks of columns by name."""
-        return {column.clock: self.columns[column.clock] for column in self.columns.values() if column.clock}
-
-    @property
     def own_clocks(self) -> bool:
         """Whether there are several clocks, so that each column needs the one beside it."""
-        alone = [name for name, column in self.columns.items() if not column.clock and is_clock_name(name)]
-        return len(self.clocks) + bool(alone) > 1
+        alone = any(not column.clock and is_clock_name(name) for name, column in self.columns.items())
+        return len({column.clock for column in self.columns.values() if column.clock}) + alone > 1
 
-
-def arrange_columns(variables: Variables) -> Layout:
-    """Return the layout of the variables of a file."""
-    layout, walk = Layout(), _Walk(runs=True)
-    for name, value in variables.items():
-        walk.value(value, name, name, ())
-    layout.findings += walk.findings
-    layout.numbers, layout.texts = walk.numbers, walk.texts
-    layout.columns.update(walk.runs)
-    layout.hidden.update(walk.single_runs)
-    clocks = _clocks(walk.leaves)
-    for leaf in walk.leaves:
-        clock, is_alone = _clock_of(leaf, clocks)
-        into = layout.hidden if is_alone else layout.columns
-        if is_alone:
-            layout.findings.append(Finding(WithoutClock(leaf.name, leaf.rows), severity="note"))
-        into.update({name: MatColumn((section,), clock) for name, section in leaf.columns()})
-    layout.columns = {name: layout.columns[name] for name in _in_file_order(layout.columns, variables)}
-    return layout
-
-
-class _Walk:
-    """Collects what is in values: arrays of numbers, single numbers, texts, runs, and what is left out."""
-
-    def __init__(self, runs: bool) -> None:
-        self._with_runs = runs
-        self.leaves: list[Leaf] = []
-        self.numbers: dict[str, Numbers] = {}
-        self.texts: dict[str, str] = {}
-        self.runs: dict[str, MatColumn] = {}
-        self.single_runs: dict[str, MatColumn] = {}
-        self.findings: list[Finding] = []
-
-    def value(self, value: Value, name: str, last: str, structs: tuple[str, ...]) -> None:
+    def add(self, value: Value, name: str, last: str, structs: tuple[str, ...]) -> None:
         """Add a value, or what is inside of it."""
         if isinstance(value, Numbers):
             self._array(value, name, last, structs)
@@ -106,7 +71,9 @@ class _Walk:
         elif structs and min(shape) > _WIDEST:
             self.findings.append(left_out(name, f"{shape[0]} x {shape[1]} matrix, too wide for a log"))
         else:
-            self.leaves.append(Leaf(name, last, structs, value))
+            leaf = Leaf(name, last, structs, value)
+            self.leaves.append(leaf)
+            self.columns |= {key: MatColumn((section,)) for key, section in leaf.columns()}
 
     def _cells(self, value: tuple[Value, ...], name: str, last: str, structs: tuple[str, ...]) -> None:
         if not any(_has_array(element) for element in value):
@@ -114,42 +81,56 @@ class _Walk:
             self.findings.append(left_out(name, "cell of texts" if texts else "cell"))
             return
         for number, element in enumerate(value, 1):
-            self.value(element, f"{name}{{{number}}}", last, structs)
+            self.add(element, f"{name}{{{number}}}", last, structs)
 
     def _structs(self, value: list[dict[str, Value]], name: str, structs: tuple[str, ...]) -> None:
         if not value:
             self.findings.append(left_out(name, "empty array of structs"))
         elif len(value) == 1:
             self._fields(value[0], name, structs)
-        elif not (self._with_runs and self._runs(value, name)):
+        elif not (self.with_runs and self._runs(value, name)):
             for number, element in enumerate(value, 1):
                 self._fields(element, f"{name}({number})", structs)
 
     def _fields(self, element: Mapping[str, Value], name: str, structs: tuple[str, ...]) -> None:
         for key, part in element.items():
-            self.value(part, f"{name}.{key}", key, (*structs, name))
+            self.add(part, f"{name}.{key}", key, (*structs, name))
 
     def _runs(self, value: list[dict[str, Value]], name: str) -> bool:
         """Add the elements of an array of structs as runs; False if they are not runs."""
-        walks = []
-        for number, element in enumerate(value, 1):
-            walk = _Walk(runs=False)
-            walk._fields(element, f"{name}({number})", ())
-            walks.append(walk)
-        runs = StructRuns(name, [walk.leaves for walk in walks], [walk.numbers for walk in walks])
+        inside = [Layout(with_runs=False) for _ in value]
+        for number, (layout, element) in enumerate(zip(inside, value, strict=True), 1):
+            layout._fields(element, f"{name}({number})", ())
+        runs = StructRuns(name, [each.leaves for each in inside], [each.numbers for each in inside])
         if not runs.are_runs:
             return False
-        self.runs |= runs.columns()
-        self.single_runs |= runs.single_columns()
+        self.columns |= runs.columns()
+        self.hidden |= runs.single_columns()
         self.findings += runs.findings()
-        for walk in walks:
-            self.texts |= walk.texts
-        left = (finding.fact for number in runs.used for finding in walks[number].findings)
+        self.texts |= {key: text for each in inside for key, text in each.texts.items()}
+        left = (finding.fact for number in runs.used for finding in inside[number].findings)
         kinds = {
             f"{name}(:).{short_name(fact.variable, name)}": fact for fact in left if isinstance(fact, VariableLeftOut)
         }
         self.findings += [Finding(replace(fact, variable=key), severity="note") for key, fact in kinds.items()]
         return True
+
+
+def arrange_columns(variables: Variables) -> Layout:
+    """Return the layout of the variables of a file."""
+    layout = Layout()
+    for name, value in variables.items():
+        layout.add(value, name, name, ())
+    clocks = _clocks(layout.leaves)
+    for leaf in layout.leaves:
+        clock, is_alone = _clock_of(leaf, clocks)
+        names = [key for key, _ in leaf.columns()]
+        if is_alone:
+            layout.findings.append(Finding(WithoutClock(leaf.name, leaf.rows), severity="note"))
+            layout.hidden |= {key: layout.columns.pop(key) for key in names}
+        else:
+            layout.columns |= {key: replace(layout.columns[key], clock=clock) for key in names}
+    return layout
 
 
 def _has_array(value: Value) -> bool:
@@ -184,13 +165,3 @@ def _clock_of(leaf: Leaf, clocks: Mapping[str, Mapping[int, str]]) -> tuple[str,
             own = of_struct[leaf.rows]
             return ("" if of_struct is clocks.get("") else own), False
     return "", bool(around)
-
-
-def _in_file_order(columns: Mapping[str, MatColumn], variables: Variables) -> list[str]:
-    """Return the names of the columns in the order of the variables that they are from."""
-    order = {name: number for number, name in enumerate(variables)}
-    return sorted(columns, key=lambda name: order[_variable(name, order)])
-
-
-def _variable(name: str, variables: Mapping[str, int]) -> str:
-    return next(name[:end] for end in range(len(name), 0, -1) if name[:end] in variables)
