@@ -138,8 +138,9 @@ def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
     if len(time) < 2:
         return speed
     # The first step is unknown: the second replaces it, so that the first sample counts too.
-    ends = np.concatenate(([time[0] - (time[1] - time[0])], time))
-    travel = np.concatenate(([0.0], np.cumsum(np.diff(ends) * speed)))
+    steps = np.diff(time)
+    ends = np.concatenate(([time[0] - steps[0]], time))
+    travel = np.concatenate(([0.0], np.cumsum(np.concatenate((steps[:1], steps)) * speed)))
     before, after = np.maximum(time - 0.5 * seconds, ends[0]), np.minimum(time + 0.5 * seconds, ends[-1])
     return (np.interp(after, ends, travel) - np.interp(before, ends, travel)) / (after - before)
 

@@ -73,10 +73,12 @@ def _progress(
     elapsed = np.where(moves, clock - starts, np.nan)
     travel, running = np.full(len(clock), np.nan), clock >= runs
     if moves.any():  # otherwise no position is needed
-        along = direction * previous_value(recording["position"], clock)[moves, joint]
+        with np.errstate(invalid="ignore"):
+            along = direction * previous_value(recording["position"], clock)[moves, joint]
         furthest = np.maximum.accumulate(np.where(np.isnan(along), -np.inf, along))
         first = along[np.isfinite(along).argmax()]
-        travel[moves] = np.where(np.isfinite(furthest), furthest - first, np.nan)
+        reached = np.isfinite(furthest)
+        travel[np.flatnonzero(moves)[reached]] = furthest[reached] - first
     for part in (elapsed, travel, running):
         part.flags.writeable = False
     return Progress(elapsed, travel, running)
@@ -86,7 +88,8 @@ def _begin(
     time: FloatArray, speed: FloatArray, direction: int, start_speed: float, running_speed: float
 ) -> tuple[float, float]:
     """Return when the motion is confirmed to have begun, and when it first runs from there on [s]; NaN: never."""
-    forward = direction * speed
+    with np.errstate(invalid="ignore"):  # 0 times infinity
+        forward = direction * speed
     moving = np.cumsum(np.concatenate(([0], forward >= start_speed)))
     confirmed = np.flatnonzero(moving[CONFIRM:] - moving[:-CONFIRM] == CONFIRM)
     if not len(confirmed):
