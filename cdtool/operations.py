@@ -172,4 +172,4 @@ def _directions(speed: FloatArray) -> npt.NDArray[np.int8]:
     """
     size = np.minimum(np.abs(np.where(np.isnan(speed), 0.0, speed)), _LARGEST)
     rest = _REST_SHARE * np.quantile(size, 0.99)
-    return (speed > rest).astype(np.int8) - (-speed > rest).astype(np.int8)
+    return np.asarray((speed > rest).astype(np.int8) - (-speed > rest).astype(np.int8))

@@ -60,7 +60,7 @@ def _lost_in_channel(series: Series, clock: FloatArray) -> BoolArray:
     due = (shared[_SHARED_WINDOW:-1] - shared[: -_SHARED_WINDOW - 1] >= _SHARED_SAMPLES) & (age > 0.0)
     longest = _longest_recent_steps(time)
     late = due | ((at > 0) & (age > _LATE * np.minimum(longest, _USUAL * usual)[at]))
-    return (at >= 0)[:, np.newaxis] & (late[:, np.newaxis] | missing[at])
+    return np.asarray((at >= 0)[:, np.newaxis] & (late[:, np.newaxis] | missing[at]))
 
 
 def _longest_recent_steps(time: FloatArray) -> FloatArray:

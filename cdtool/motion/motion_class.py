@@ -142,7 +142,7 @@ def averaged(time: FloatArray, speed: FloatArray, seconds: float) -> FloatArray:
     ends = np.concatenate(([time[0] - steps[0]], time))
     travel = np.concatenate(([0.0], np.cumsum(np.concatenate((steps[:1], steps)) * speed)))
     before, after = np.maximum(time - 0.5 * seconds, ends[0]), np.minimum(time + 0.5 * seconds, ends[-1])
-    return (np.interp(after, ends, travel) - np.interp(before, ends, travel)) / (after - before)
+    return np.asarray((np.interp(after, ends, travel) - np.interp(before, ends, travel)) / (after - before))
 
 
 def _class_of(time: FloatArray, speed: FloatArray, joint: int, period: float) -> MotionClass:
