@@ -36,7 +36,7 @@ class Kernel:
         update_wrapper(self, function)
         self.function, self.signature = function, signature
         self.compiled: Any = None  # until the first call
-        self._options = {"nogil": True, "error_model": "numpy", "fastmath": not exact and {"contract"}}
+        self._options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": not exact and {"contract"}}
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function."""
@@ -49,7 +49,7 @@ class Kernel:
         """Return the function as a part of other kernels, compiled with them."""
         import numba
 
-        return numba.njit(no_cpython_wrapper=True, **self._options)(self._linked(""))
+        return numba.njit(**self._options | {"no_cpython_wrapper": True})(self._linked(""))
 
     @property
     def named(self) -> dict[str, Any]:

@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.clock import GAP_PERIODS, HOLD_PERIODS
-from cdtool.clock.held_samples import READ_MARKS, READ_TABLE
 from cdtool.clock.recent_steps import usual_steps
 from cdtool.detectors.base import BRIDGED
 from cdtool.kernels import READ_ONLY, kernel
@@ -237,8 +236,8 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
 
 
 @kernel(
-    f"void({READ_ONLY}, {READ_TABLE}, {READ_MARKS}, {READ_ONLY}, {READ_ONLY}, {READ_ONLY}, int64[::1], "
-    "float64[:, ::1], float64[:, ::1])",
+    f"void({READ_ONLY}, Array(float64, 2, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), {READ_ONLY}, "
+    f"{READ_ONLY}, {READ_ONLY}, int64[::1], float64[:, ::1], float64[:, ::1])",
 )
 def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
     time: FloatArray,

@@ -65,7 +65,8 @@ def pair_of(slots: FloatArray, before: int) -> FloatArray:
 @kernel(f"{READ_ONLY}({READ_TABLE}, int64)")
 def body_of(bodies: FloatArray, joint: int) -> FloatArray:
     """The constants of a joint."""
-    return bodies[joint]
+    body: FloatArray = bodies[joint]
+    return body
 
 
 @kernel(f"{VECTOR}({ROW}, int64)")

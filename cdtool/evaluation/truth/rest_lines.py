@@ -42,7 +42,7 @@ def medians_of(values: FloatArray, first: IntArray) -> FloatArray:
     """Return the median of the values (n,) in each interval (m,)."""
     size = np.diff(first, append=len(values))
     ordered = values[np.lexsort((values, np.repeat(np.arange(len(first)), size)))]
-    return 0.5 * (ordered[first + (size - 1) // 2] + ordered[first + size // 2])
+    return np.asarray(0.5 * (ordered[first + (size - 1) // 2] + ordered[first + size // 2]))
 
 
 def line_of_start(time: FloatArray, force: FloatArray) -> FloatArray:
@@ -109,4 +109,4 @@ def _medians(values: FloatArray, inside: BoolArray) -> FloatArray:
     """Return the median of those values of each row (k, w) that are `inside`, at least one."""
     ordered, size = np.sort(np.where(inside, values, np.inf), axis=1), inside.sum(axis=1)
     rows = np.arange(len(size))
-    return 0.5 * (ordered[rows, (size - 1) // 2] + ordered[rows, size // 2])
+    return np.asarray(0.5 * (ordered[rows, (size - 1) // 2] + ordered[rows, size // 2]))
