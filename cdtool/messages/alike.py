@@ -82,25 +82,18 @@ class Example:
         return self._found[key]
 
     def alike(self, table: ByteArray) -> npt.NDArray[np.bool_]:
-        """Return which messages of this length (n, length) have the same layout."""
+        """Return which messages of this length (n, length in whole words) have the same layout."""
         if not self._words:
             words = self._mask.view(np.uint64)
             used = np.flatnonzero(words)
             pattern = np.frombuffer(self.payload.ljust(len(self._mask), b"\0"), np.uint64)
             self._words = used, words[used], pattern[used] & words[used]
         used, mask, pattern = self._words
-        whole = table.shape[1] // 8
-        same = (table[:, : 8 * whole].view(np.uint64)[:, used[used < whole]] & mask[used < whole]) == (
-            pattern[used < whole]
-        )
-        alike: npt.NDArray[np.bool_] = same.all(axis=1)
-        if len(used) and used[-1] == whole:  # a word that the message ends within
-            rest, few = table[:, 8 * whole :], self._mask[8 * whole : table.shape[1]]
-            alike &= ((rest & few) == (np.frombuffer(self.payload, np.uint8)[8 * whole :] & few)).all(axis=1)
+        alike: npt.NDArray[np.bool_] = ((table.view(np.uint64)[:, used] & mask) == pattern).all(axis=1)
         return alike
 
     def read(self, table: ByteArray, found: Sequence[float]) -> FloatArray:
-        """Return the numbers with these indices (n, k) of messages alike (n, length)."""
+        """Return the numbers with these indices (n, k) of messages alike (n, length in whole words)."""
         values = np.full((len(table), len(found)), np.nan)
         for column, index, count in _consecutive(found):
             while count:
@@ -225,8 +218,12 @@ def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[_Ali
     rows = remaining if fits.all() else remaining[fits]
     if not len(rows):
         return remaining
-    windows = np.lib.stride_tricks.sliding_window_view(batch.data, size) if size else np.empty((0, 0), np.uint8)
-    table = windows[batch.start[rows]] if size else np.empty((len(rows), 0), np.uint8)
+    data, start, width = batch.data, batch.start[rows], -(-size // 8) * 8
+    if int(start.max()) + width > len(data):
+        data = np.append(data, np.zeros(8, np.uint8))
+    table = (
+        np.lib.stride_tricks.sliding_window_view(data, width)[start] if width else np.empty((len(rows), 0), np.uint8)
+    )
     alike = example.alike(table)
     if alike.all():
         groups.append(_Alike(rows, example, table))

@@ -91,22 +91,8 @@ def walk_by_indexes(content: Bytes, records: Positions) -> Walk:
     return Walk(records, definitions, size)
 
 
-class Piece(NamedTuple):
-    """Messages in one memory block in the order of the file, by channel, with the bytes of their records."""
-
-    data: Bytes
-    batches: tuple[tuple[int, Batch], ...]
-
-
-def piece_of(parts: list[tuple[Bytes, Positions]]) -> Piece:
-    """Return the messages of some chunks, given by their records, as one piece."""
-    data = parts[0][0] if len(parts) == 1 else np.concatenate([content for content, _ in parts])
-    starts = np.cumsum([0, *(len(content) for content, _ in parts[:-1])])
-    records = np.concatenate([own + start for (_, own), start in zip(parts, starts, strict=True)])
-    return Piece(data, tuple(_by_channel(data, records)))
-
-
-def _by_channel(data: Bytes, records: Positions) -> Iterator[tuple[int, Batch]]:
+def by_channel(data: Bytes, records: Positions) -> Iterator[tuple[int, Batch]]:
+    """Yield the messages with these records channel by channel, in the file's order."""
     channels = numbers_at(data, records + PREFIX, "<u2")
     order = np.argsort(channels, kind="stable")
     records, channels = records[order], channels[order]
