@@ -18,12 +18,19 @@ import numpy.typing as npt
 
 from cdtool.columns import as_float64
 from cdtool.messages.batch import Batch
-from cdtool.messages.decoded_batch import ByteArray, DecodedBatch, IntArray, absent_field, decoded_batch, field_values
+from cdtool.messages.decoded_batch import (
+    MOST_FIELDS,
+    ByteArray,
+    DecodedBatch,
+    IntArray,
+    absent_field,
+    decoded_batch,
+    field_values,
+)
 from cdtool.messages.fields import Field, FieldMissingError
 from cdtool.messages.layout import Schema
 from cdtool.recording import FloatArray
 
-_MOST_FIELDS = 4096
 # Layouts that are kept for the next batch: writers have a few, such as one for each length of a varint.
 _MOST_LAYOUTS = 32
 Found = float | list[float] | FieldMissingError | None
@@ -167,7 +174,7 @@ class SchemaDecoder:
 
     def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema defines them, not the messages)
         """Return every numeric field except the header's stamp, in schema order; arrays only if they may be short."""
-        return list(islice(self.schema.numeric_names(), _MOST_FIELDS))
+        return list(islice(self.schema.numeric_names(), MOST_FIELDS))
 
     def contents(self, batch: Batch) -> list[dict[str, Any]]:
         """Return the messages of a batch that can be decoded, as objects of the field language."""

@@ -21,6 +21,8 @@ ByteArray = npt.NDArray[np.uint8]
 DECODED, DAMAGED = 0, 1
 # `FieldValues.state` of a field in a message.
 PRESENT, OTHER_JOINTS, ABSENT = 0, 1, 2
+# The most fields of a topic in a survey: no recorder writes as many, but each is a column.
+MOST_FIELDS = 4096
 _LATEST = 9_223_372_035  # s: the largest time stamp in ns that fits an int64
 
 

@@ -7,6 +7,7 @@ another, and between them are only definitions. Otherwise the records are walked
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -42,7 +43,7 @@ class Walk(NamedTuple):
 def walk(content: Bytes, at: int = 0, top_level: bool = False) -> Walk:
     """Walk over records; at the top level, one of another kind ends the walk, in a chunk it is skipped."""
     data, size, unpack = content.data, len(content), _PREFIX.unpack_from
-    records: list[int] = []
+    records = array("q")  # of numbers, not of objects: a chunk may have millions of short messages
     definitions: list[Definition] = []
     reason = ""
     while at < size:
@@ -64,7 +65,7 @@ def walk(content: Bytes, at: int = 0, top_level: bool = False) -> Walk:
             if is_definition:
                 definitions.append((opcode, at + PREFIX, length))
         at += PREFIX + length
-    return Walk(np.array(records, np.int64), definitions, at, reason)
+    return Walk(np.array(records, dtype=np.int64), definitions, at, reason)
 
 
 def walk_by_indexes(content: Bytes, records: Positions) -> Walk:
