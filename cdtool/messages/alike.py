@@ -32,7 +32,7 @@ from cdtool.messages.layout import Schema
 from cdtool.recording import FloatArray
 
 # Layouts that are kept for the next batch: writers have a few, such as one for each length of a varint.
-_MOST_LAYOUTS = 32
+_MOST_LAYOUTS = 64
 Found = float | list[float] | FieldMissingError | None
 
 
@@ -47,7 +47,7 @@ class _Run(NamedTuple):
     """
 
     first: int
-    count: int
+    numbers: int
     at: int
     size: int
     code: str
@@ -63,20 +63,20 @@ class Example:
         self.payload = payload
         self.content: dict[str, Any] = {}
         self._runs = [_Run(0, 1, 0, 0, "zero")]
-        self._mask = np.zeros(-(-len(payload) // 8) * 8, np.uint8)
+        self._shared: list[tuple[int, int, int]] = []
         self._words: tuple[npt.NDArray[Any], ...] = ()
         self._found: dict[tuple[Field, tuple[str, ...]], Found] = {}
 
     def numbers(self, at: int, count: int, code: str, size: int) -> range:
         """Add numbers, and return their indices."""
         last = self._runs[-1]
-        first = last.first + last.count
+        first = last.first + last.numbers
         self._runs.append(_Run(first, count, at, size, code))
         return range(first, first + count)
 
     def share(self, at: int, size: int, bits: int = 0xFF) -> None:
         """Let all messages have the same bits in these bytes."""
-        self._mask[at : at + size] |= bits
+        self._shared.append((at, size, bits))
 
     def find(self, field: Field, joints: tuple[str, ...]) -> Found:
         """Return the indices of a field's numbers, as the field language finds them in the content."""
@@ -91,9 +91,12 @@ class Example:
     def alike(self, table: ByteArray) -> npt.NDArray[np.bool_]:
         """Return which messages of this length (n, length in whole words) have the same layout."""
         if not self._words:
-            words = self._mask.view(np.uint64)
+            shared = np.zeros(table.shape[1], np.uint8)
+            for at, size, bits in self._shared:
+                shared[at : at + size] |= bits
+            words = shared.view(np.uint64)
             used = np.flatnonzero(words)
-            pattern = np.frombuffer(self.payload.ljust(len(self._mask), b"\0"), np.uint64)
+            pattern = np.frombuffer(self.payload.ljust(len(shared), b"\0"), np.uint64)
             self._words = used, words[used], pattern[used] & words[used]
         used, mask, pattern = self._words
         alike: npt.NDArray[np.bool_] = ((table.view(np.uint64)[:, used] & mask) == pattern).all(axis=1)
@@ -105,7 +108,7 @@ class Example:
         for column, index, count in _consecutive(found):
             while count:
                 run = self._runs[bisect_right(self._runs, index, key=lambda run: run.first) - 1]
-                some = min(count, run.first + run.count - index)
+                some = min(count, run.first + run.numbers - index)
                 at = run.at + (index - run.first) * run.size
                 values[:, column : column + some] = _numbers(table[:, at : at + some * run.size], run)
                 column, index, count = column + some, index + some, count - some
@@ -205,7 +208,7 @@ class SchemaDecoder:
         remaining = np.arange(len(batch))
         for example in self._known:
             remaining = _take(batch, example, remaining, groups)
-        while len(remaining):
+        while len(remaining) and len(groups) <= _MOST_LAYOUTS:
             row = int(remaining[0])
             try:
                 example = self.walk(self.schema, batch.payload(row))
@@ -215,13 +218,21 @@ class SchemaDecoder:
             remaining = _take(batch, example, remaining, groups)
         used = [group.example for group in groups]
         self._known = (used + [each for each in self._known if each not in used])[:_MOST_LAYOUTS]
+        for k, row in enumerate(remaining.tolist()):  # so many layouts that comparing takes longer than walking
+            payload = batch.payload(row)
+            try:
+                example = self.walk(self.schema, payload)
+            except DamagedMessageError as fault:
+                reasons[row] = str(fault)
+            else:
+                groups.append(_Alike(remaining[k : k + 1], example, np.frombuffer(payload, np.uint8)[None]))
         return groups, reasons
 
 
 def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[_Alike]) -> IntArray:
     """Add the messages that are like the example to the groups, and return the others."""
     size = len(example.payload)
-    fits = batch.length[remaining] == size
+    fits: npt.NDArray[np.bool_] = batch.length[remaining] == size
     rows = remaining if fits.all() else remaining[fits]
     if not len(rows):
         return remaining

@@ -108,7 +108,7 @@ def _load(batch: Batch) -> tuple[Messages, dict[int, str]]:
     """Return the objects, and the reasons of messages that are none, by row."""
     messages: Messages = {}
     reasons: dict[int, str] = {}
-    content, load = memoryview(batch.data), json.loads
+    content, load = batch.data.data, json.loads
     for row, (start, length) in enumerate(zip(batch.start.tolist(), batch.length.tolist(), strict=True)):
         try:
             if length > _LONGEST:

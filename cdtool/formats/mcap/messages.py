@@ -100,7 +100,7 @@ def by_channel(data: Bytes, records: Positions) -> Iterator[tuple[int, Batch]]:
     times = numbers_at(data, records + PREFIX + 6, "<u8")
     lengths = numbers_at(data, records + 1, "<u8").astype(np.int64) - _HEADER
     starts = records + PREFIX + _HEADER
-    borders = np.flatnonzero(np.append(True, channels[1:] != channels[:-1])) if len(channels) else []
+    borders = np.flatnonzero(np.append(len(channels) > 0, channels[1:] != channels[:-1]))
     for begin, end in zip(borders, np.append(borders[1:], len(channels)), strict=True):
         rows = slice(begin, end)
         yield int(channels[begin]), Batch(data, starts[rows], lengths[rows], times[rows])

@@ -211,7 +211,7 @@ def _filled(store: Any, schema: str, content: Mapping[str, Any]) -> Any:
     from rosbags.interfaces import Nodetype
 
     if schema == "geometry_msgs/msg/Quaternion":
-        content = {"w": 1.0} | content  # the default of its definition
+        content = {"w": 1.0, **content}  # the default of its definition
     values: dict[str, Any] = {}
     for name, (kind, detail) in store.fielddefs[schema][1]:
         if kind == Nodetype.NAME:
