@@ -30,7 +30,6 @@ from cdtool.formats.container_checks import check_size, one_line_errors
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.messages.batch import Stream
-from cdtool.messages.decoders import Decoders
 from cdtool.messages.schemas import DEFINITIONS
 from cdtool.remote.remote_path import location
 
@@ -82,15 +81,8 @@ class Rosbag2:
         return bag.source(*(yield from bag.pieces()))
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
-        """Return the `name` list of a topic's first decodable message; empty if the message has no such list."""
-        decoders = Decoders()
-        batches = self._bag(path).batches(topic.__eq__)
-        with closing(batches), suppress(RecordingError):  # the survey reports the problem
-            for stream, batch in batches:
-                names = decoders.element_names(stream, batch)
-                if names is not None:
-                    return names
-        return ()
+        """Return the names of array elements in a topic's first decodable message; () if it has none."""
+        return self._bag(path).element_names(topic)
 
     def _bag(self, path: Path) -> _Ros2Bag:
         if not self.sniff(path):
@@ -249,11 +241,11 @@ def _standard_definition(kind: str) -> str:
     name = kind if rest.startswith("msg/") else f"{package}/msg/{rest}"
     if name in DEFINITIONS:
         return DEFINITIONS[name].text
-    try:
-        from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys import Stores, get_typestore
 
+    try:
         text, _ = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(name, ros_version=2)
-    except Exception:  # rosbags is not installed, or does not know the type
+    except Exception:  # the package does not know the type
         return ""
     return str(text)
 

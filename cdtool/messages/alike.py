@@ -18,14 +18,21 @@ import numpy.typing as npt
 
 from cdtool.columns import as_float64
 from cdtool.messages.batch import Batch
-from cdtool.messages.decoded_batch import ByteArray, DecodedBatch, IntArray, absent_field, decoded_batch, field_values
+from cdtool.messages.decoded_batch import (
+    MOST_FIELDS,
+    ByteArray,
+    DecodedBatch,
+    IntArray,
+    absent_field,
+    decoded_batch,
+    field_values,
+)
 from cdtool.messages.fields import Field, FieldMissingError
 from cdtool.messages.layout import Schema
 from cdtool.recording import FloatArray
 
-_MOST_FIELDS = 4096
 # Layouts that are kept for the next batch: writers have a few, such as one for each length of a varint.
-_MOST_LAYOUTS = 32
+_MOST_LAYOUTS = 64
 Found = float | list[float] | FieldMissingError | None
 
 
@@ -40,7 +47,7 @@ class _Run(NamedTuple):
     """
 
     first: int
-    count: int
+    numbers: int
     at: int
     size: int
     code: str
@@ -56,20 +63,20 @@ class Example:
         self.payload = payload
         self.content: dict[str, Any] = {}
         self._runs = [_Run(0, 1, 0, 0, "zero")]
-        self._mask = np.zeros(-(-len(payload) // 8) * 8, np.uint8)
+        self._shared: list[tuple[int, int, int]] = []
         self._words: tuple[npt.NDArray[Any], ...] = ()
         self._found: dict[tuple[Field, tuple[str, ...]], Found] = {}
 
     def numbers(self, at: int, count: int, code: str, size: int) -> range:
         """Add numbers, and return their indices."""
         last = self._runs[-1]
-        first = last.first + last.count
+        first = last.first + last.numbers
         self._runs.append(_Run(first, count, at, size, code))
         return range(first, first + count)
 
     def share(self, at: int, size: int, bits: int = 0xFF) -> None:
         """Let all messages have the same bits in these bytes."""
-        self._mask[at : at + size] |= bits
+        self._shared.append((at, size, bits))
 
     def find(self, field: Field, joints: tuple[str, ...]) -> Found:
         """Return the indices of a field's numbers, as the field language finds them in the content."""
@@ -82,30 +89,26 @@ class Example:
         return self._found[key]
 
     def alike(self, table: ByteArray) -> npt.NDArray[np.bool_]:
-        """Return which messages of this length (n, length) have the same layout."""
+        """Return which messages of this length (n, length in whole words) have the same layout."""
         if not self._words:
-            words = self._mask.view(np.uint64)
+            shared = np.zeros(table.shape[1], np.uint8)
+            for at, size, bits in self._shared:
+                shared[at : at + size] |= bits
+            words = shared.view(np.uint64)
             used = np.flatnonzero(words)
-            pattern = np.frombuffer(self.payload.ljust(len(self._mask), b"\0"), np.uint64)
+            pattern = np.frombuffer(self.payload.ljust(len(shared), b"\0"), np.uint64)
             self._words = used, words[used], pattern[used] & words[used]
         used, mask, pattern = self._words
-        whole = table.shape[1] // 8
-        same = (table[:, : 8 * whole].view(np.uint64)[:, used[used < whole]] & mask[used < whole]) == (
-            pattern[used < whole]
-        )
-        alike: npt.NDArray[np.bool_] = same.all(axis=1)
-        if len(used) and used[-1] == whole:  # a word that the message ends within
-            rest, few = table[:, 8 * whole :], self._mask[8 * whole : table.shape[1]]
-            alike &= ((rest & few) == (np.frombuffer(self.payload, np.uint8)[8 * whole :] & few)).all(axis=1)
+        alike: npt.NDArray[np.bool_] = ((table.view(np.uint64)[:, used] & mask) == pattern).all(axis=1)
         return alike
 
     def read(self, table: ByteArray, found: Sequence[float]) -> FloatArray:
-        """Return the numbers with these indices (n, k) of messages alike (n, length)."""
+        """Return the numbers with these indices (n, k) of messages alike (n, length in whole words)."""
         values = np.full((len(table), len(found)), np.nan)
         for column, index, count in _consecutive(found):
             while count:
                 run = self._runs[bisect_right(self._runs, index, key=lambda run: run.first) - 1]
-                some = min(count, run.first + run.count - index)
+                some = min(count, run.first + run.numbers - index)
                 at = run.at + (index - run.first) * run.size
                 values[:, column : column + some] = _numbers(table[:, at : at + some * run.size], run)
                 column, index, count = column + some, index + some, count - some
@@ -174,7 +177,7 @@ class SchemaDecoder:
 
     def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema defines them, not the messages)
         """Return every numeric field except the header's stamp, in schema order; arrays only if they may be short."""
-        return list(islice(self.schema.numeric_names(), _MOST_FIELDS))
+        return list(islice(self.schema.numeric_names(), MOST_FIELDS))
 
     def contents(self, batch: Batch) -> list[dict[str, Any]]:
         """Return the messages of a batch that can be decoded, as objects of the field language."""
@@ -205,7 +208,7 @@ class SchemaDecoder:
         remaining = np.arange(len(batch))
         for example in self._known:
             remaining = _take(batch, example, remaining, groups)
-        while len(remaining):
+        while len(remaining) and len(groups) <= _MOST_LAYOUTS:
             row = int(remaining[0])
             try:
                 example = self.walk(self.schema, batch.payload(row))
@@ -215,18 +218,30 @@ class SchemaDecoder:
             remaining = _take(batch, example, remaining, groups)
         used = [group.example for group in groups]
         self._known = (used + [each for each in self._known if each not in used])[:_MOST_LAYOUTS]
+        for k, row in enumerate(remaining.tolist()):  # so many layouts that comparing takes longer than walking
+            payload = batch.payload(row)
+            try:
+                example = self.walk(self.schema, payload)
+            except DamagedMessageError as fault:
+                reasons[row] = str(fault)
+            else:
+                groups.append(_Alike(remaining[k : k + 1], example, np.frombuffer(payload, np.uint8)[None]))
         return groups, reasons
 
 
 def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[_Alike]) -> IntArray:
     """Add the messages that are like the example to the groups, and return the others."""
     size = len(example.payload)
-    fits = batch.length[remaining] == size
+    fits: npt.NDArray[np.bool_] = batch.length[remaining] == size
     rows = remaining if fits.all() else remaining[fits]
     if not len(rows):
         return remaining
-    windows = np.lib.stride_tricks.sliding_window_view(batch.data, size) if size else np.empty((0, 0), np.uint8)
-    table = windows[batch.start[rows]] if size else np.empty((len(rows), 0), np.uint8)
+    data, start, width = batch.data, batch.start[rows], -(-size // 8) * 8
+    if int(start.max()) + width > len(data):
+        data = np.append(data, np.zeros(8, np.uint8))
+    table = (
+        np.lib.stride_tricks.sliding_window_view(data, width)[start] if width else np.empty((len(rows), 0), np.uint8)
+    )
     alike = example.alike(table)
     if alike.all():
         groups.append(_Alike(rows, example, table))

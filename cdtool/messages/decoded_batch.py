@@ -21,6 +21,8 @@ ByteArray = npt.NDArray[np.uint8]
 DECODED, DAMAGED = 0, 1
 # `FieldValues.state` of a field in a message.
 PRESENT, OTHER_JOINTS, ABSENT = 0, 1, 2
+# The most fields of a topic in a survey: no recorder writes as many, but each is a column.
+MOST_FIELDS = 4096
 _LATEST = 9_223_372_035  # s: the largest time stamp in ns that fits an int64
 
 
@@ -83,7 +85,10 @@ class Group(Protocol):
     It has a number, or in place of each number what `read` needs to return those of all messages.
     """
 
-    rows: IntArray
+    @property
+    def rows(self) -> IntArray:
+        """The messages, by their numbers in the batch."""
+        ...
 
     def find(self, field: Field, joints: Sequence[str]) -> float | list[float] | FieldMissingError | None:
         """Return what the field language finds in the object."""
@@ -118,6 +123,7 @@ def field_values(n: int, groups: Sequence[Group], field: Field, joints: Sequence
     """Return one field of n messages."""
     state, count = np.zeros(n, np.uint8), np.full(n, -1)
     parts: list[tuple[IntArray, FloatArray]] = []
+    singles: dict[int, list[tuple[IntArray, FloatArray]]] = {}  # messages that are alone in their group, by width
     faults: dict[int, FieldMissingError] = {}
     for group in groups:
         found = group.find(field, joints)
@@ -127,8 +133,12 @@ def field_values(n: int, groups: Sequence[Group], field: Field, joints: Sequence
             state[group.rows] = OTHER_JOINTS
         else:
             found = found if isinstance(found, list) else [] if field.whole else [found]
-            count[group.rows] = len(found)
-            parts.append((group.rows, group.read(found)))
+            values = group.read(found)
+            (parts if len(group.rows) > 1 else singles.setdefault(len(found), [])).append((group.rows, values))
+    for same in singles.values():
+        parts.append((np.concatenate([rows for rows, _ in same]), np.concatenate([values for _, values in same])))
+    for rows, values in parts:
+        count[rows] = values.shape[1]
     fault = faults[min(faults)] if faults else None
     wide = np.flatnonzero(count > 0)
     table = _joined(n, int(count[wide[0]]) if len(wide) else 1, parts)
@@ -136,7 +146,7 @@ def field_values(n: int, groups: Sequence[Group], field: Field, joints: Sequence
 
 
 def _joined(n: int, width: int, parts: Sequence[tuple[IntArray, FloatArray]]) -> FloatArray:
-    if len(parts) == 1 and parts[0][1].shape == (n, width):
+    if len(parts) == 1 and parts[0][1].shape == (n, width) and (np.diff(parts[0][0]) > 0).all():
         return parts[0][1]
     table = np.full((n, width), math.nan)
     for rows, values in parts:

@@ -51,9 +51,23 @@ class Decoders:
         try:
             return decoder.decode(batch, wanted, joints, stamps)
         except UndecodableError as fault:  # for a reason that only its messages reveal
-            self._by_channel[stream.id] = fault
-            self._fail(len(batch), str(fault))
+            self._give_up(stream, batch, fault)
             return None
+
+    def fields(self, stream: Stream, batch: Batch) -> list[str]:
+        """Return the fields of a channel whose `decoder` exists; if they are too many, it can no more be decoded."""
+        decoder = self._by_channel[stream.id]
+        if isinstance(decoder, UndecodableError):
+            return []
+        try:
+            return decoder.fields(batch)
+        except UndecodableError as fault:
+            self._give_up(stream, batch, fault)
+            return []
+
+    def _give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
+        self._by_channel[stream.id] = fault
+        self._fail(len(batch), str(fault))
 
     def element_names(self, stream: Stream, batch: Batch) -> tuple[str, ...] | None:
         """Return the texts of the array `name` of the first decodable message; None if no message is decodable."""

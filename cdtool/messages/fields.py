@@ -75,7 +75,7 @@ class Field:
 
     def names_in(self, message: Any) -> list[str]:
         """Return the names of the elements of the field's array in one message."""
-        value = message
+        value: Any = message
         for name, index in self.steps:
             parent = value if isinstance(value, dict) else {}
             value = parent.get(name)

@@ -15,7 +15,14 @@ from typing import Any
 import numpy as np
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.decoded_batch import DecodedBatch, IntArray, decoded_batch, field_values
+from cdtool.messages.decoded_batch import (
+    MOST_FIELDS,
+    DecodedBatch,
+    IntArray,
+    UndecodableError,
+    decoded_batch,
+    field_values,
+)
 from cdtool.messages.fields import (
     Field,
     FieldMissingError,
@@ -26,6 +33,8 @@ from cdtool.messages.fields import (
 )
 from cdtool.recording import FloatArray
 
+# The longest message that is read [bytes]: its objects may take twenty times as much memory.
+_LONGEST = 16 << 20
 Messages = dict[int, dict[str, Any]]  # by row
 
 
@@ -39,6 +48,8 @@ class JsonDecoder:
         """Return every numeric field of the messages so far, in order of first appearance."""
         for message in self.contents(batch):
             self._fields.update(dict.fromkeys(numeric_fields(message)))
+            if len(self._fields) > MOST_FIELDS:
+                raise UndecodableError(f"its messages have more than {MOST_FIELDS} different fields")
         return list(self._fields)
 
     def contents(self, batch: Batch) -> list[dict[str, Any]]:
@@ -97,9 +108,11 @@ def _load(batch: Batch) -> tuple[Messages, dict[int, str]]:
     """Return the objects, and the reasons of messages that are none, by row."""
     messages: Messages = {}
     reasons: dict[int, str] = {}
-    content, load = memoryview(batch.data), json.loads
+    content, load = batch.data.data, json.loads
     for row, (start, length) in enumerate(zip(batch.start.tolist(), batch.length.tolist(), strict=True)):
         try:
+            if length > _LONGEST:
+                raise ValueError(f"{length} bytes, more than {_LONGEST >> 20} MiB")
             value = load(bytes(content[start : start + length]))
         except Exception as fault:  # RecursionError too
             reasons[row] = " ".join(f"{type(fault).__name__}: {fault}".split())[:200]

@@ -19,7 +19,7 @@ from cdtool.messages.layout import Array, Layout, Member, Message, Number, Schem
 
 # FieldDescriptor.TYPE_*: the names of the types by number, and numpy's code of those with a fixed size.
 _TYPES = ("double", "float", "int64", "uint64", "int32", "fixed64", "fixed32", "bool", "string", "group", "message")
-_TYPES += ("bytes", "uint32", "enum", "sfixed32", "sfixed64", "sint32", "sint64")
+_MORE_TYPES = ("bytes", "uint32", "enum", "sfixed32", "sfixed64", "sint32", "sint64")
 _FIXED = {"double": "<f8", "fixed64": "<u8", "sfixed64": "<i8", "float": "<f4", "fixed32": "<u4", "sfixed32": "<i4"}
 # Wire types.
 _VARINT, _EIGHT, _BLOCK, _GROUP, _END, _FOUR = range(6)
@@ -67,7 +67,7 @@ def _add_layout(message: Any, layouts: dict[str, Layout]) -> None:
 
 
 def _member(field: Any) -> Member:
-    wire = _TYPES[field.type - 1]
+    wire = (*_TYPES, *_MORE_TYPES)[field.type - 1]
     kind: Number | Text | Message = Number(_FIXED.get(wire, "<i8")[1:])
     if field.message_type is not None:
         kind = Message(field.message_type.full_name)
@@ -119,7 +119,7 @@ class _Walk:
             if not number or wire in (_END, 6, 7):
                 raise self._not_protobuf()
             member = layout.by_number.get(number) if layout is not None else None
-            if member is None or member.tag is None:
+            if layout is None or member is None or member.tag is None:
                 self._skip(wire, number, end, depth)
                 continue
             for other in member.tag.oneof:

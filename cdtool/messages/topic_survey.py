@@ -53,11 +53,10 @@ class TopicSurvey:
                 yield piece
 
     def _piece(self, stream: Stream, batch: Batch, origin: int) -> Piece | None:
-        decoder = self.decoders.of(stream, batch)
-        if decoder is None:
+        if self.decoders.of(stream, batch) is None:
             return None
         fields = dict(self._fields)
-        for name in decoder.fields(batch):
+        for name in self.decoders.fields(stream, batch):
             if name not in fields and (parsed := _parsed(name)) is not None:
                 fields[name] = parsed
         decoded = self.decoders.decode(stream, batch, list(fields.values()), stamps=True)

@@ -122,6 +122,17 @@ def test_messages_alike_are_read_together_and_names_may_change_between_them():
         assert len(walks) == len({json.dumps(each) for each in messages})
 
 
+def test_messages_of_more_layouts_than_are_compared_are_read_one_by_one():
+    text = "string frame_id\nstring[] name\nfloat64[] position"
+    messages = [{"frame_id": "x" * k, "name": [f"{k}", "b"], "position": [k, -k]} for k in range(300)] * 2
+    payloads = [encode(text, message) for message in messages] + [b"\0\1\0\0"]
+    decoder, wanted = decoder_of(text), fields_of("position[:]", "position[b]", "position[7]")
+    for step in (1, -1):
+        order = slice(None, None, step)
+        decoded = decoder.decode(batch_of(payloads[order]), wanted, ())
+        assert_equals_package(decoded, [*(oracle(text, payload) for payload in payloads[:-1]), None][order], wanted, ())
+
+
 def test_an_integer_beyond_two_to_the_53_is_rounded_to_the_nearest_float():
     text = "int64 a\nuint64 b"
     message = {"a": -(2**63) + 1, "b": 2**64 - 1}

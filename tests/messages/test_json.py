@@ -9,8 +9,10 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from cdtool.formats.mcap import Mcap
 from cdtool.messages.encodings import decoder_for
 from cdtool.messages.fields import header_stamp, numeric_fields
+from tests.formats.mcap_files import by_hand  # noqa: F401
 from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, same
 
 WANTED = ("a", "b.c", "q[:]", "q[1]", "q[x]", "b.q[:]", "l[0].c", "l[1].q[0]", "l[x].c", "name[0]", "b", "b[0]", "a.c")
@@ -156,3 +158,17 @@ def test_a_damaged_message_has_a_reason():
     assert decoded.status.tolist() == [0, 1, 1]
     assert decoded.reason.startswith("JSONDecodeError: Expecting value")
     assert new_decoder().decode(batch_of([b"[1]"]), []).reason == "ValueError: the JSON is not an object"
+
+
+def test_more_fields_than_any_recorder_writes_are_refused_with_the_reason(by_hand):  # noqa: F811
+    rows = [(k, k, b'{"field%d": 1.0}' % k) for k in range(5000)]
+    source = Mcap().columns(by_hand(rows, "json", "jsonschema", b"{}", "Thing"))
+    assert [str(finding) for finding in source.findings if finding.severity == "loss"] == [
+        "/a: 5000 of 5000 messages cannot be decoded: its messages have more than 4096 different fields"
+    ]
+
+
+def test_a_message_larger_than_any_recorder_writes_is_damaged():
+    payload = b'{"a": [' + b"1," * (8 << 20) + b"1]}"
+    decoded = new_decoder().decode(batch_of([payload, b'{"a": [2]}']), fields_of("a[0]"))
+    assert decoded.status.tolist() == [1, 0] and "more than 16 MiB" in decoded.reason

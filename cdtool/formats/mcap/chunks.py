@@ -93,28 +93,28 @@ class ClaimedSizes:
         self.packed, self.unpacked = packed, unpacked
 
 
-def unpack(header: ChunkHeader, packed: Bytes) -> Bytes:
-    """Return the content of a complete chunk, checked; raises DamageError."""
-    content = unpack_available(header, packed)
-    if len(content) != header.uncompressed_size:
-        raise DamageError(f"a chunk of {len(content)} bytes declares {header.uncompressed_size}")
-    if header.uncompressed_crc and crc32(content) != header.uncompressed_crc:
+def unpack(header: ChunkHeader, packed: Bytes, target: Bytes) -> None:
+    """Write the content of a complete chunk to `target` (uncompressed_size,), and check it; raises DamageError."""
+    size = unpack_available(header, packed, target)
+    if size != len(target):
+        raise DamageError(f"a chunk of {size} bytes declares {len(target)}")
+    if header.uncompressed_crc and crc32(target) != header.uncompressed_crc:
         raise DamageError("the checksum of a chunk does not match")
-    return content
 
 
-def unpack_available(header: ChunkHeader, packed: Bytes) -> Bytes:
-    """Return the available part of a chunk that is cut off, without a check."""
+def unpack_available(header: ChunkHeader, packed: Bytes, target: Bytes) -> int:
+    """Write the available part of a chunk that is cut off, without a check, and return its number of bytes."""
     if not header.compression:
-        return packed
-    return (_zstd if header.compression == "zstd" else _lz4)(packed, header.uncompressed_size)
+        target[: len(packed)] = packed
+        return len(packed)
+    return (_zstd if header.compression == "zstd" else _lz4)(packed, target)
 
 
-def _zstd(packed: Bytes, size: int) -> Bytes:
+def _zstd(packed: Bytes, target: Bytes) -> int:
     import zstandard
 
     # Into memory of the declared size: zstd then needs no window of its own, and cannot exceed the size.
-    target, filled, more = np.empty(size, np.uint8), 0, b""
+    size, filled, more = len(target), 0, b""
     decompressor = zstandard.ZstdDecompressor(max_window_size=LARGEST)
     with decompressor.stream_reader(packed.data, read_size=max(1, len(packed)), read_across_frames=True) as stream:
         try:
@@ -125,13 +125,13 @@ def _zstd(packed: Bytes, size: int) -> Bytes:
             raise DamageError(f"zstd: {fault}") from fault
     if more:
         raise DamageError(f"a chunk has more than the {size} bytes that it declares")
-    return target[:filled]
+    return filled
 
 
-def _lz4(packed: Bytes, size: int) -> Bytes:
+def _lz4(packed: Bytes, target: Bytes) -> int:
     import lz4.frame  # type: ignore[import-untyped]
 
-    target, filled, left = np.empty(size, np.uint8), 0, packed.data
+    size, filled, left = len(target), 0, packed.data
     try:
         for _ in range(_LZ4_FRAMES):  # consecutive frames, as in a file
             frame = lz4.frame.LZ4FrameDecompressor()
@@ -149,4 +149,4 @@ def _lz4(packed: Bytes, size: int) -> Bytes:
             left = memoryview(frame.unused_data)
     except RuntimeError as fault:
         raise DamageError(f"lz4: {fault}") from fault
-    return target[:filled]
+    return filled

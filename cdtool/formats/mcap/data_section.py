@@ -12,6 +12,7 @@ from collections.abc import Container, Generator, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.formats.mcap import messages
 from cdtool.formats.mcap.attachments import check_attachment
@@ -28,12 +29,14 @@ from cdtool.formats.mcap.chunks import (
 from cdtool.formats.mcap.definitions import Definitions
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss, Losses
-from cdtool.formats.mcap.messages import Piece, Positions, Walk
+from cdtool.formats.mcap.messages import Positions, Walk
 from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
 from cdtool.formats.mcap.summary import Summary
+from cdtool.messages.batch import Batch
 
 # Chunks are joined up to this size [bytes]: messages of many small ones are then decoded together.
-JOINED = 8 << 20
+JOINED = 1 << 23
+_SPARE = 8  # bytes after the last message in memory, so that all messages can be gathered in whole words
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
 _SEARCHED = 1 << 20  # bytes that are searched at once for the next chunk
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
@@ -42,9 +45,12 @@ _INDEX_HEAD = PREFIX + 6  # before the entries of a message index: prefix, chann
 
 @dataclass(frozen=True)
 class Block:
-    """A piece; `covered`: a CRC covers its bytes. `cuts` maps channels to the byte where their definition changes."""
+    """Messages in one memory block, by channel, in the order of the file.
 
-    piece: Piece
+    `covered`: a CRC covers their bytes. `cuts` maps channels to the byte where their definition changes.
+    """
+
+    batches: tuple[tuple[int, Batch], ...]
     covered: bool
     cuts: Mapping[int, int]
 
@@ -64,9 +70,10 @@ class DataSection:
         self.end_at, self.is_ended, self.other_times = 0, False, 0
         self.first_time: int | None = None
         self._file, self._summary, self._definitions, self._skip = file, summary, definitions, skip
-        self._parts: list[tuple[Bytes, Positions]] = []
+        self._memory = np.empty(0, np.uint8)
+        self._size, self._covered = 0, False  # of what is in memory
+        self._found: list[Positions] = []
         self._cuts: dict[int, int] = {}
-        self._size, self._covered = 0, False
         self._window = _SMALLEST_WINDOW
         self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
@@ -139,7 +146,9 @@ class DataSection:
         try:
             header.check()
             self._claims.add(header)
-            content = unpack(header, self._file.array(header.data, header.size))
+            yield from self._make_room(header.uncompressed_size, header.uncompressed_crc != 0)
+            content = self._memory[self._size : self._size + header.uncompressed_size]
+            unpack(header, self._file.array(header.data, header.size), content)
         except DamageError as fault:
             loss = Loss.of_chunk(header, self._summary, str(fault), refused=isinstance(fault, RefusedError))
             self._lost = self.losses.add(loss)
@@ -147,7 +156,7 @@ class DataSection:
         self._resync.verified_to = end
         indexed, end = self._indexed(end, header.uncompressed_size)
         walked = messages.walk_by_indexes(content, indexed)
-        yield from self._add(content, walked, header.uncompressed_crc != 0, header.at)
+        self._add(content, walked, header.at)
         if walked.reason:
             self.losses.add(Loss(header.at, len(content) - walked.end, f"in a chunk: {walked.reason}"))
         elif len(walked.records):
@@ -185,60 +194,66 @@ class DataSection:
         header.check()
         self.losses.stopped = True
         self.losses.add(loss)
+        yield from self._make_room(header.uncompressed_size, covered=False)
+        content = self._memory[self._size : self._size + header.uncompressed_size]
         try:
-            content = unpack_available(header, self._file.array(header.data, left))
+            content = content[: unpack_available(header, self._file.array(header.data, left), content)]
         except DamageError as fault:
             loss.reason = str(fault)
             return
-        yield from self._add(content, messages.walk(content), False, header.at)
+        self._add(content, messages.walk(content), header.at)
 
     def _outside_chunks(self, at: int, length: int) -> Generator[Block, None, int]:
         """Yield the records outside of chunks that fit into a window, and return the byte after them."""
         if length > LARGEST:
             raise DamageError(f"a record declares {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
-        window = self._file.array(at, max(self._window, length))
+        size = min(max(self._window, length), self._file.size - at)
+        yield from self._make_room(size, covered=False)
+        window = self._memory[self._size : self._size + size]
+        self._file.read_into(at, window)
         walked = messages.walk(window, top_level=True)
-        yield from self._add(window[: walked.end], walked, False, at)
+        self._add(window[: walked.end], walked, at)
         self._resync.verified_to = at + walked.end
         self._window = min(4 * self._window, _LARGEST_WINDOW) if 2 * walked.end > len(window) else _SMALLEST_WINDOW
         if walked.reason == messages.SHORT_MESSAGE:
             return self._resume(at + walked.end, walked.reason)
         return at + walked.end
 
-    def _add(self, content: Bytes, walked: Walk, covered: bool, at: int) -> Iterator[Block]:
-        """Add the messages of a chunk or window at byte `at`; yield those before if they do not fit together."""
-        if covered != self._covered or self._size + len(content) > JOINED:
+    def _make_room(self, size: int, covered: bool) -> Iterator[Block]:
+        """Make room in memory for `size` bytes; yield what is in it if these do not fit, or only one has a CRC."""
+        if covered != self._covered or self._size + size + _SPARE > len(self._memory):
             yield from self._flush()
+            self._memory = np.empty(max(JOINED, size + _SPARE), np.uint8)
         self._covered = covered
+
+    def _add(self, content: Bytes, walked: Walk, at: int) -> None:
+        """Add the messages of a chunk or window at byte `at`, which is the next in memory."""
         for opcode, start, size in walked.definitions:
             body = content[start : start + size].tobytes()
-            if self._definitions.is_known(opcode, body, covered):
+            if self._definitions.is_known(opcode, body, self._covered):
                 continue
             before = set(self._definitions.ambiguous)
             try:
-                self._definitions.add(opcode, body, covered)
+                self._definitions.add(opcode, body, self._covered)
             except DamageError as fault:
                 self.losses.add(Loss(at, 0, f"a definition: {fault}"))
             self._cuts.update(dict.fromkeys(set(self._definitions.ambiguous) - before, self._size + start))
-        self._parts.append((content, walked.records))
+        if len(walked.records):
+            self._note_first_time(messages.log_times(content, walked.records))
+            self._found.append(walked.records + self._size)
         self._size += len(content)
 
     def _flush(self) -> Iterator[Block]:
         """Yield the messages in memory, and release the memory."""
-        parts, cuts = self._parts, {channel: self._cuts.get(channel, 0) for channel in self._definitions.ambiguous}
-        self._parts, self._size, self._cuts = [], 0, {}
-        parts = [part for part in parts if len(part[1])] if not cuts else parts
-        if not any(len(records) for _, records in parts):
-            return
-        for content, records in parts:
-            if self.first_time is None or self.first_time >= messages.NO_DATE:
-                self._note_first_time(content, records)
-        yield Block(messages.piece_of(parts), self._covered, cuts)
+        data, found, cuts = self._memory[: self._size + _SPARE], self._found, self._cuts
+        self._memory, self._size, self._found, self._cuts = np.empty(0, np.uint8), 0, [], {}
+        if found:
+            all_cuts = {channel: cuts.get(channel, 0) for channel in self._definitions.ambiguous}
+            yield Block(tuple(messages.by_channel(data, np.concatenate(found))), self._covered, all_cuts)
 
-    def _note_first_time(self, content: Bytes, records: Positions) -> None:
+    def _note_first_time(self, times: npt.NDArray[np.uint64]) -> None:
         """Set the first time; a valid one replaces an invalid one."""
-        if len(records):
-            times = messages.log_times(content, records)
+        if self.first_time is None or self.first_time >= messages.NO_DATE:
             first = int(times[np.argmax(times < messages.NO_DATE)])
             if self.first_time is None or first < messages.NO_DATE:
                 self.first_time = first

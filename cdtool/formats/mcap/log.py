@@ -115,7 +115,7 @@ class Log:
         return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
     def _usable(self, block: Block) -> Iterator[Messages]:
-        for channel, batch in block.piece.batches:
+        for channel, batch in block.batches:
             if channel in block.cuts:
                 unambiguous = int(np.searchsorted(batch.start, block.cuts[channel]))
                 if unambiguous < len(batch):

@@ -7,6 +7,7 @@ another, and between them are only definitions. Otherwise the records are walked
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -42,7 +43,7 @@ class Walk(NamedTuple):
 def walk(content: Bytes, at: int = 0, top_level: bool = False) -> Walk:
     """Walk over records; at the top level, one of another kind ends the walk, in a chunk it is skipped."""
     data, size, unpack = content.data, len(content), _PREFIX.unpack_from
-    records: list[int] = []
+    records = array("q")  # of numbers, not of objects: a chunk may have millions of short messages
     definitions: list[Definition] = []
     reason = ""
     while at < size:
@@ -64,7 +65,7 @@ def walk(content: Bytes, at: int = 0, top_level: bool = False) -> Walk:
             if is_definition:
                 definitions.append((opcode, at + PREFIX, length))
         at += PREFIX + length
-    return Walk(np.array(records, np.int64), definitions, at, reason)
+    return Walk(np.array(records, dtype=np.int64), definitions, at, reason)
 
 
 def walk_by_indexes(content: Bytes, records: Positions) -> Walk:
@@ -91,29 +92,15 @@ def walk_by_indexes(content: Bytes, records: Positions) -> Walk:
     return Walk(records, definitions, size)
 
 
-class Piece(NamedTuple):
-    """Messages in one memory block in the order of the file, by channel, with the bytes of their records."""
-
-    data: Bytes
-    batches: tuple[tuple[int, Batch], ...]
-
-
-def piece_of(parts: list[tuple[Bytes, Positions]]) -> Piece:
-    """Return the messages of some chunks, given by their records, as one piece."""
-    data = parts[0][0] if len(parts) == 1 else np.concatenate([content for content, _ in parts])
-    starts = np.cumsum([0, *(len(content) for content, _ in parts[:-1])])
-    records = np.concatenate([own + start for (_, own), start in zip(parts, starts, strict=True)])
-    return Piece(data, tuple(_by_channel(data, records)))
-
-
-def _by_channel(data: Bytes, records: Positions) -> Iterator[tuple[int, Batch]]:
+def by_channel(data: Bytes, records: Positions) -> Iterator[tuple[int, Batch]]:
+    """Yield the messages with these records channel by channel, in the file's order."""
     channels = numbers_at(data, records + PREFIX, "<u2")
     order = np.argsort(channels, kind="stable")
     records, channels = records[order], channels[order]
     times = numbers_at(data, records + PREFIX + 6, "<u8")
     lengths = numbers_at(data, records + 1, "<u8").astype(np.int64) - _HEADER
     starts = records + PREFIX + _HEADER
-    borders = np.flatnonzero(np.append(True, channels[1:] != channels[:-1])) if len(channels) else []
+    borders = np.flatnonzero(np.append(len(channels) > 0, channels[1:] != channels[:-1]))
     for begin, end in zip(borders, np.append(borders[1:], len(channels)), strict=True):
         rows = slice(begin, end)
         yield int(channels[begin]), Batch(data, starts[rows], lengths[rows], times[rows])

@@ -52,9 +52,12 @@ def test_chunks_without_a_wanted_topic_are_not_read(tmp_path, monkeypatch):
     alternating_chunks(path)
     checked = []
     unpack = chunks.unpack
-    monkeypatch.setattr(
-        data_section, "unpack", lambda header, *rest: checked.append(header.at) or unpack(header, *rest)
-    )
+
+    def counting(header, packed, target):
+        checked.append(header.at)
+        unpack(header, packed, target)
+
+    monkeypatch.setattr(data_section, "unpack", counting)
     for topic in ("/a", "/b"):
         checked.clear()
         messages, findings, log = read(path, wanted=topic.__eq__)
