@@ -280,7 +280,7 @@ class NulBytesAtEnd(TemplateFact):
 
 @frozen
 class TotalRow(TemplateFact):
-    """The last row has the sums of the rows above it, without a word that says so."""
+    """The last row has the sums of the rows above it, and no label."""
 
     line: int
 

@@ -124,7 +124,7 @@ class RowReader:
             return None
         try:
             with catch_warnings(action="error", category=pd.errors.ParserWarning):
-                numbers = self._parsed(block, width, np.flatnonzero(self.targets >= 0).tolist(), np.float64)
+                numbers = _by_column(self._parsed(block, width, np.flatnonzero(self.targets >= 0).tolist(), np.float64))
         except (ValueError, pd.errors.ParserWarning):  # a cell that is not a number, a first row that is too long
             return None
         last = numbers.get(width - 1, np.array([np.nan]))
@@ -204,16 +204,19 @@ class RowReader:
 
     def _numbers(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Return the columns in which each cell is a number in plain notation, or missing."""
+        if not columns:
+            return {}
         try:
-            frame = self._parsed(content, width, columns, np.float64)
+            return _by_column(self._parsed(content, width, columns, np.float64))
         except ValueError:  # of one of the columns
-            inferred = self._parsed(content, width, columns, None)
-            numeric = [column for column in columns if inferred[column].dtype.kind in "biuf"]
-            frame = self._parsed(content, width, numeric, np.float64)  # not from integers, which have no -0.0
-        return dict(frame)
+            kinds = self._parsed(content, width, columns, None).dtypes
+        numeric = [column for column in columns if kinds[column].kind in "biuf"]
+        return self._numbers(content, width, numeric)  # again, as integers have no -0.0
 
     def _texts(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, list[str]]:
         """Return the cells of columns."""
+        if not columns:
+            return {}
         frame = self._parsed(content, width, columns, np.object_)
         if content.isascii():
             return {column: [cell.strip(" \t") for cell in cells] for column, cells in frame.items()}
@@ -223,12 +226,10 @@ class RowReader:
             for column, cells in frame.items()
         }
 
-    def _parsed(self, content: bytes, width: int, columns: Sequence[int], dtype: Any) -> Mapping[int, Any]:
+    def _parsed(self, content: bytes, width: int, columns: Sequence[int], dtype: Any) -> Any:
         """Return columns as parsed by pandas; the bytes are decoded as Latin-1, one letter each."""
-        if not columns:
-            return {}
         dialect, is_text = self.dialect, dtype is np.object_
-        frame = pd.read_csv(
+        return pd.read_csv(
             io.BytesIO(content),
             sep=r"\s+" if dialect.separator == " " else dialect.separator,
             header=None,
@@ -248,7 +249,10 @@ class RowReader:
             low_memory=False,
             **_EXACT,
         )
-        return {column: frame[column].to_numpy() for column in columns}
+
+
+def _by_column(frame: Any) -> dict[int, FloatArray]:
+    return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True))
 
 
 def _known(cells: Sequence[str], value: Callable[[str], float | None]) -> list[float | None]:
