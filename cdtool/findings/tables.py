@@ -279,6 +279,15 @@ class NulBytesAtEnd(TemplateFact):
 
 
 @frozen
+class TotalRow(TemplateFact):
+    """The last row has the sums of the rows above it, and no label."""
+
+    line: int
+
+    words = "the last row (line {line}) has the sums of the rows above: if it is a total and no sample, remove it"
+
+
+@frozen
 class LastLineKept(TemplateFact):
     """The last line has no line end, and its last cell looks whole."""
 

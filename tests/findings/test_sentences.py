@@ -317,6 +317,10 @@ SENTENCES: list[tuple[Fact, str]] = [
     (tables.NulLines((31,)), "line 31 skipped: damaged, with NUL bytes"),
     (tables.LastLineCut(99), "the last line (99) is cut off, dropped"),
     (tables.NulBytesAtEnd(512), "the file ends in 512 NUL bytes: was the power lost?"),
+    (
+        tables.TotalRow(12),
+        "the last row (line 12) has the sums of the rows above: if it is a total and no sample, remove it",
+    ),
     (tables.LastLineKept(99, "0.5"), "the last line (99) has no line end: its last cell '0.5' is taken to be whole"),
     (tables.LastLineDropped(99, "0."), "the last line (99) has no line end, and '0.' may be cut off, dropped"),
     # containers

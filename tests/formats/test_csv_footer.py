@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.tables import FooterSkipped, HeaderLines, NulBytesAtEnd
+from cdtool.findings.tables import FooterSkipped, HeaderLines, NulBytesAtEnd, TotalRow
 from cdtool.formats.csv import Csv
 from cdtool.ingest.reading import read_recording
 
@@ -179,3 +179,22 @@ def test_a_row_that_is_cut_off_below_a_blank_line_is_not_a_footer(log, machine):
     channels = '[channels]\ntime = { column = "t", unit = "s" }\nspeed = { column = "x", unit = "rad/s" }\n'
     with pytest.raises(RecordingError, match="line 33 has 2 cells"):
         read_recording(log(table), machine(channels))
+
+
+@pytest.mark.parametrize(
+    ("last", "said"),
+    {
+        ",112.5,-11.0": True,
+        "45,112.5,-11.0": True,
+        "10,112.5,-11.0": True,
+        "10,112.5,": True,
+        "10,112.5,-1.0": False,
+        "10,12.0,-2.0": False,
+        ",,": False,
+    }.items(),
+)
+def test_a_last_row_with_the_sums_of_the_rows_above_is_said(log, last, said):
+    lines = [f"{i},{2.5 * i},{-0.5 * i if i < 7 else -0.25 * (i < 9)}" for i in range(10)]
+    source = Csv().columns(log("\n".join(["t,a,b", *lines, last, ""])))
+    assert [finding.fact for finding in source.findings if isinstance(finding.fact, TotalRow)] == [TotalRow(12)] * said
+    assert len(source.columns["a"].values) == 11

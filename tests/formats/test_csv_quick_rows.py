@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
+from cdtool.formats.csv.rows import RowReader
 
 DIGITS = st.text("0123456789", max_size=10)
 PLAIN = st.builds(
@@ -60,3 +63,31 @@ def test_a_file_of_one_block_has_the_columns_of_a_larger_file(tmp_path):
         count = len(of_small[name].values)
         assert count > 10_000
         assert of_small[name].values.tobytes() == of_large[name].values[:count].tobytes()
+
+
+ODD = st.sampled_from(
+    [
+        *("1,2", "1,2,3,4", "1,2,3,4,5", "1,2,", ",2,3", "1,2,nan", "", "# 1,2,3", "t,a,b", "1,x,3", '1,"2",3'),
+        *("1,2,3\r", "1,2,3\0"),
+    ]
+)
+
+
+@settings(max_examples=200)
+@given(st.lists(st.just("0.5,1.5,2.5") | ODD, max_size=12), st.sampled_from(["", "\n"]))
+def test_rows_are_the_same_whether_or_not_their_lines_are_found(tmp_path_factory, rows, end):
+    path = tmp_path_factory.getbasetemp() / "plain.csv"
+    path.write_text("\n".join(["t,a,b", *["0.25,1.5,7.5"] * 20, *rows]) + end)
+
+    def outcome():
+        try:
+            source = Csv().columns(path)
+        except RecordingError as fault:
+            return str(fault)
+        values = {name: column.values.tobytes() for name, column in source.columns.items()}
+        return values, [str(finding) for finding in source.findings], source.first_row
+
+    with pytest.MonkeyPatch.context() as patch:
+        found = outcome()
+        patch.setattr(RowReader, "_plain", lambda *_: None)
+        assert outcome() == found

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Generator, Mapping
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from cdtool.channels import ChannelMap, TablePins, TimeSource
-from cdtool.columns import Column
+from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError, UsageError
 from cdtool.formats.column_names import OWN_CLOCK, column_key, wanted_keys
 from cdtool.formats.csv.gzipped import open_text
 from cdtool.formats.groups import PREFIX
-from cdtool.formats.pieces import Pieces
+from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.recording import FloatArray
 
@@ -76,7 +76,8 @@ class Csv:
         if len(clocks.groups) < 2:
             table = yield from table_pieces(path, dialect, clocks, read)
             return _source(path, dialect, table)
-        return (yield from _pieces_of_clocks(path, dialect, clocks, keys, read))
+        pieces = table_pieces(path, dialect, clocks, {*read, *(dialect.names[i] for i in clocks.columns)})
+        return (yield from _pieces_of_clocks(path, dialect, clocks, keys, pieces))
 
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
@@ -91,32 +92,36 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
 
 
 def _read_all(path: Path, dialect: Dialect) -> Source:
-    from cdtool.formats.csv.several_clocks import Clocks, clock_findings, have_other_rates, survey_by_own_clock
+    from cdtool.formats.csv.several_clocks import Clocks, clock_findings, have_other_rates
     from cdtool.formats.csv.table import read_table
 
     table = read_table(path, dialect, dialect.names)
     clocks = Clocks.by_names(dialect)
     if have_other_rates(dialect, clocks, table.values):
-        columns, origin, findings = survey_by_own_clock(path, dialect, clocks, table.values)
-        table.values, table.findings = {}, [*table.findings, *findings]
-        return replace(
-            _source(path, dialect, table), columns=columns, origin=origin or written_origin(path), first_row=0
-        )
+        return join_pieces(_pieces_of_clocks(path, dialect, clocks, None, _as_piece(table)), sort=False)
     table.findings += clock_findings(dialect, clocks, table.values)
     return _source(path, dialect, table)
 
 
+def _as_piece(table: TextTable) -> Generator[Piece, None, TextTable]:
+    """Yield the columns of a table, and return it."""
+    yield Piece("", None, table.values, len(next(iter(table.values.values()))))
+    return table
+
+
 def _pieces_of_clocks(
-    path: Path, dialect: Dialect, clocks: Clocks, keys: Collection[str] | None, read: Collection[str]
+    path: Path,
+    dialect: Dialect,
+    clocks: Clocks,
+    keys: Collection[str] | None,
+    pieces: Generator[Piece, None, TextTable],
 ) -> Pieces:
     """Yield the columns of a table with several clocks, by clock if their rates differ."""
     from cdtool.findings.clocks import OtherClock
     from cdtool.formats.csv.several_clocks import pieces_by_own_clock, unit_from_header
-    from cdtool.formats.csv.table import table_pieces
 
     names = dialect.names
-    table_of_all = table_pieces(path, dialect, clocks, {*read, *(names[column] for column in clocks.columns)})
-    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, table_of_all, keys)
+    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys)
     if findings is None:
         return _source(path, dialect, table)
     empty = np.empty(0)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import math
 import re
+from functools import lru_cache
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", "|": "pipe", ",": "comma", " ": "blanks"}
 MISSING = ("", "nan", "NaN", "NAN")
 # What programs write for a value that does not exist: JSON and SQL, Python, pandas.
 NULLS = ("null", "NULL", "None", "<NA>")
 MINUS_SIGN = "\u2212"
-# Non-breaking spaces, which French and Swiss tables use as thousands separators.
-NARROW_BLANKS = ("\u00a0", "\u202f")
 
 _TAIL = r"(?:[eE][+-]?[0-9]+)?"
 _WORDS = re.compile(r"[+-]?(?:nan|inf|infinity|true|false)", re.IGNORECASE)
@@ -60,6 +59,7 @@ def _words(line: str) -> list[str]:
     return [word for word in line.strip(" \t\r\n").replace("\t", " ").split(" ") if word]
 
 
+@lru_cache(maxsize=1 << 12)  # the cells of a sample are classified several times
 def kind(cell: str) -> str:
     """Return the kind of a cell: N number in any notation or NaN, T time stamp, M missing (empty), X words."""
     if _QUICK.fullmatch(cell):

@@ -1,4 +1,4 @@
-"""Lines of a table that the compiled loop cannot read: rows with unusual notation, lines to be skipped, errors."""
+"""Lines of a table that pandas cannot read: rows with unusual notation, lines to be skipped, errors."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ class IrregularLine:
 
 @dataclass
 class IrregularLines:
-    """Reader of the lines that the compiled loop cannot read.
+    """Reader of the lines that pandas cannot read.
 
-    `targets` (width,) is the destination of each column, shared with the compiled loop: a column that is left out here
-    is left out there, too. With `survey` an unreadable cell is a missing value and a loss, and a column with many
+    `targets` (width,) is the destination of each column, shared with `RowReader`: a column that is left out here is
+    left out there, too. With `survey` an unreadable cell is a missing value and a loss, and a column with many
     unreadable cells is left out; without it an unreadable cell is an error.
 
     `unread` are the unreadable cells by column, with their lines. `dropped` are the reserved rows of a block that are

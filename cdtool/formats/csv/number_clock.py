@@ -76,7 +76,8 @@ def exact_differences(
     whole = np.rint(stamps[known])
     exact = np.zeros(len(stamps), dtype=np.int64)
     exact[known] = whole.astype(np.int64) * scale + np.rint((stamps[known] - whole) * scale).astype(np.int64)
-    reader = RowReader(dialect.text.path, dialect, (), (), (column,), decimals)
+    # As numbers too: a header that is repeated is no row for its words.
+    reader = RowReader(dialect.text.path, dialect, (column,), (), (column,), decimals)
     ticks = reader.read(IrregularLines(dialect.text.path, dialect, True, reader.targets)).stamps[0, : len(stamps)]
     plain = ticks != MISSING_STAMP
     exact[plain] = ticks[plain]

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings
 
 import numpy as np
 import pandas as pd
@@ -61,8 +62,12 @@ class RowReader:
             self.targets[-1] = EMPTY
         self.whole, self.decimals = tuple(whole), decimals
         self.shape = (len(numeric), len(stamped) + len(whole))
-        self.ended = True
+        self.ended, self.line, self.skipped = True, dialect.first_line, 0
+        # Whether the blocks so far had only rows of numbers.
+        self.plain = dialect.text.line_end == b"\n" and dialect.separator != " " and dialect.width - 1 in numeric
+        self.plain &= not (dialect.short_rows or self.shape[1] or dialect.width == 1)
         encoding = dialect.text.stream_encoding
+        self.comment = dialect.comment.encode(encoding, "replace") if dialect.comment else b"\0"
         self._missing = [text.encode(encoding, "replace").decode("latin-1") for text in dialect.missing]
 
     def read(self, irregular: IrregularLines) -> Rows:
@@ -82,29 +87,68 @@ class RowReader:
 
         Irregular lines are passed to `irregular`. Raises RecordingError with the first line that cannot be read.
         """
-        line, first, skipped = self.dialect.first_line, 0, 0
+        first, self.line = 0, self.dialect.first_line
         for block in self._blocks():
-            lines = BlockLines.of(block, self.dialect)
             self.ended = block.endswith((b"\n", b"\r"))
-            is_row = lines.blank | True if self.dialect.blank_is_missing else ~lines.blank
-            row = np.cumsum(is_row) - 1
-            rows = self.allocate(int(row[-1]) + 1) if whole is None else whole.part(first, first + int(row[-1]) + 1)
-            rows.first_line = line
-            skipped += int(np.count_nonzero(lines.blank))
-            self._check(skipped, first + int(np.count_nonzero(lines.regular)))
-            readable = self._read(lines, row, rows, irregular)
-            for at in map(int, np.flatnonzero(~readable & ~lines.blank)):
-                final = not self.ended and at == len(row) - 1
-                irregular.read(IrregularLine(at, int(row[at]), lines.line(at), final), line, rows)
-                self._check(skipped + len(irregular.dropped), first + int(row[at]) - len(irregular.dropped))
-            blank = np.flatnonzero(lines.blank) + line
-            (irregular.empty if self.dialect.blank_is_missing else irregular.blank).extend(blank.tolist())
-            rows.not_rows = blank[:0] if self.dialect.blank_is_missing else blank
-            skipped += len(irregular.dropped)
+            numbers = self._plain(block) if self.plain and not irregular.categories else None
+            self.plain = numbers is not None
+            if numbers is None:
+                rows = self._by_lines(BlockLines.of(block, self.dialect), irregular, whole, first)
+            else:
+                rows = self._room(len(numbers[self.dialect.width - 1]), whole, first)
+                for column, values in numbers.items():
+                    rows.numbers[self.targets[column]] = values
+                self.line += rows.count
             rows.drop(irregular.end_block(range(rows.count)))
             yield rows
-            line, first = line + len(row), first + rows.count
+            first += rows.count
             check_size(self.path, first * sum(self.shape))
+
+    def _room(self, count: int, whole: Rows | None, first: int) -> Rows:
+        """Return arrays for the rows of the next block, which starts in line `self.line`."""
+        rows = self.allocate(count) if whole is None else whole.part(first, first + count)
+        rows.first_line = self.line
+        return rows
+
+    def _plain(self, block: bytes) -> Mapping[int, FloatArray] | None:
+        """Return the numbers of a block that has only rows of numbers; None if it may have anything else.
+
+        pandas fills a row that is too short with NaN, and drops the cells of one that is too long: if the last column
+        has no NaN and the block has as many separators as its rows need, there are no such rows.
+        """
+        if any(mark in block for mark in (b'"', b"\0", self.comment)):
+            return None
+        data, width = np.frombuffer(block, dtype=np.uint8), self.dialect.width
+        lines = np.count_nonzero(data == ord("\n")) + (not self.ended)
+        if np.count_nonzero(data == ord(self.dialect.separator)) != lines * (width - 1):
+            return None
+        try:
+            with catch_warnings(action="error", category=pd.errors.ParserWarning):
+                numbers = _by_column(self._parsed(block, width, np.flatnonzero(self.targets >= 0).tolist(), np.float64))
+        except (ValueError, pd.errors.ParserWarning):  # a cell that is not a number, a first row that is too long
+            return None
+        last = numbers.get(width - 1, np.array([np.nan]))
+        return numbers if len(last) == lines and not np.isnan(last).any() else None
+
+    def _by_lines(self, lines: BlockLines, irregular: IrregularLines, whole: Rows | None, first: int) -> Rows:
+        """Return the rows of a block of any lines; `first` is the number of rows before it."""
+        is_row = lines.blank | True if self.dialect.blank_is_missing else ~lines.blank
+        row = np.cumsum(is_row) - 1
+        rows = self._room(int(row[-1]) + 1, whole, first)
+        self.skipped += int(np.count_nonzero(lines.blank))
+        self._check(self.skipped, first + int(np.count_nonzero(lines.regular)))
+        readable = self._read(lines, row, rows, irregular)
+        for at in map(int, np.flatnonzero(~readable & ~lines.blank)):
+            final = not self.ended and at == len(row) - 1
+            irregular.read(IrregularLine(at, int(row[at]), lines.line(at), final), self.line, rows)
+            dropped = len(irregular.dropped)
+            self._check(self.skipped + dropped, first + int(row[at]) - dropped)
+        blank = np.flatnonzero(lines.blank) + self.line
+        (irregular.empty if self.dialect.blank_is_missing else irregular.blank).extend(blank.tolist())
+        rows.not_rows = blank[:0] if self.dialect.blank_is_missing else blank
+        self.skipped += len(irregular.dropped)
+        self.line += len(row)
+        return rows
 
     def _check(self, skipped: int, rows: int) -> None:
         """Raise RecordingError if a file has many more lines of other kinds than rows."""
@@ -160,16 +204,19 @@ class RowReader:
 
     def _numbers(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, FloatArray]:
         """Return the columns in which each cell is a number in plain notation, or missing."""
+        if not columns:
+            return {}
         try:
-            frame = self._parsed(content, width, columns, np.float64)
+            return _by_column(self._parsed(content, width, columns, np.float64))
         except ValueError:  # of one of the columns
-            kinds = {column: cells.dtype.kind for column, cells in self._parsed(content, width, columns, None).items()}
-            numeric = [column for column in columns if kinds[column] in "biuf"]
-            frame = self._parsed(content, width, numeric, np.float64)  # not from integers, which have no -0.0
-        return {column: cells.to_numpy() for column, cells in frame.items()}
+            kinds = self._parsed(content, width, columns, None).dtypes
+        numeric = [column for column in columns if kinds[column].kind in "biuf"]
+        return self._numbers(content, width, numeric)  # again, as integers have no -0.0
 
     def _texts(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, list[str]]:
         """Return the cells of columns."""
+        if not columns:
+            return {}
         frame = self._parsed(content, width, columns, np.object_)
         if content.isascii():
             return {column: [cell.strip(" \t") for cell in cells] for column, cells in frame.items()}
@@ -179,12 +226,10 @@ class RowReader:
             for column, cells in frame.items()
         }
 
-    def _parsed(self, content: bytes, width: int, columns: Sequence[int], dtype: Any) -> Mapping[int, Any]:
+    def _parsed(self, content: bytes, width: int, columns: Sequence[int], dtype: Any) -> Any:
         """Return columns as parsed by pandas; the bytes are decoded as Latin-1, one letter each."""
-        if not columns:
-            return {}
         dialect, is_text = self.dialect, dtype is np.object_
-        frame = pd.read_csv(
+        return pd.read_csv(
             io.BytesIO(content),
             sep=r"\s+" if dialect.separator == " " else dialect.separator,
             header=None,
@@ -204,7 +249,10 @@ class RowReader:
             low_memory=False,
             **_EXACT,
         )
-        return dict(frame.items())
+
+
+def _by_column(frame: Any) -> dict[int, FloatArray]:
+    return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True))
 
 
 def _known(cells: Sequence[str], value: Callable[[str], float | None]) -> list[float | None]:

@@ -198,17 +198,6 @@ def _own_clock_findings(dialect: Dialect, steps: Mapping[str, float], lost: Mapp
     return findings + [Finding(ValuesWithoutTime(count), key, "loss") for key, count in lost.items() if count]
 
 
-def survey_by_own_clock(
-    path: Path, dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]
-) -> tuple[dict[str, Column], float, list[Finding]]:
-    """Return all columns of a table whose clocks have other rates, as `columns_by_own_clock`."""
-    keys = [key for key in values if dialect.names.index(key) not in clocks.columns]
-    columns, origin, findings = columns_by_own_clock(path, dialect, clocks, keys, values)
-    used = {clocks.of[dialect.names.index(key)] for key in keys}
-    steps = {(name := dialect.names[clocks.groups[k][0]]): _step(values[name]) for k in sorted(used)}
-    return columns, origin, [*_own_clock_findings(dialect, steps, {}), *findings[1:]]
-
-
 def columns_by_own_clock(
     path: Path, dialect: Dialect, clocks: Clocks, keys: Sequence[str], values: Mapping[str, FloatArray]
 ) -> tuple[dict[str, Column], float, list[Finding]]:

@@ -5,6 +5,7 @@ A table is read at once, or block by block if it need not fit into memory.
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Collection, Generator, Mapping, Sequence
@@ -18,7 +19,7 @@ from cdtool.columns import Categories, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import WrittenTimes
-from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd
+from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd, TotalRow
 from cdtool.formats.column_names import column_key
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
@@ -32,6 +33,8 @@ from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
 
 RECENT = 20
+# A total is of so many rows, and as exact as the written numbers are.
+_FEWEST_SUMMED, _SAME_SUM = 3, 1e-6
 _SHAPE = re.compile(r"[+-]?(?P<whole>[0-9]*)(?:[.,](?P<decimals>[0-9]*))?(?:[eE][+-]?(?P<power>[0-9]*))?")
 
 
@@ -171,15 +174,10 @@ class _TableReader:
 
         `rows` are the last rows, after `before` other rows; the last one may be removed from them.
         """
-        irregular, text = self.irregular, self.dialect.text
-        findings = irregular.findings(rows.line(rows.count - 1))
-        if not self.reader.ended and not irregular.cut_line and not irregular.ends_skipped:
-            findings += check_last_line(self.dialect, rows, self.requested, before)
-        if irregular.cut_line or text.padding:
-            line = irregular.cut_line or rows.line(rows.count)
-            findings.insert(0, Finding(LastLineCut(line), severity="loss"))
-        if text.padding:
-            findings.append(Finding(NulBytesAtEnd(text.padding), severity="loss"))
+        findings = end_of_rows(self.reader, self.irregular, rows, self.requested, before)
+        clock = len(self.requested.numeric) > 0 and self.requested.numeric[0] == 0
+        if self.survey and not before and is_total(rows.numbers[int(clock) :]):
+            findings.append(Finding(TotalRow(rows.line(rows.count - 1))))
         return findings
 
     def table(self, columns: Mapping[str, FloatArray], findings: list[Finding], unbroken: bool) -> TextTable:
@@ -337,7 +335,23 @@ def _set_exact(dialect: Dialect, table: TextTable, clock: str, factor: float) ->
         table.values[clock], table.origin = exact
 
 
-def check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, before: int) -> list[Finding]:
+def end_of_rows(
+    reader: RowReader, irregular: IrregularLines, rows: Rows, requested: RequestedColumns, before: int
+) -> list[Finding]:
+    """Return the findings on skipped lines and on the end of the file, whose last row may be removed from `rows`."""
+    text = reader.dialect.text
+    findings = irregular.findings(rows.line(rows.count - 1))
+    if not reader.ended and not irregular.cut_line and not irregular.ends_skipped:
+        findings += _check_last_line(reader.dialect, rows, requested, before)
+    if irregular.cut_line or text.padding:
+        line = irregular.cut_line or rows.line(rows.count)
+        findings.insert(0, Finding(LastLineCut(line), severity="loss"))
+    if text.padding:
+        findings.append(Finding(NulBytesAtEnd(text.padding), severity="loss"))
+    return findings
+
+
+def _check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, before: int) -> list[Finding]:
     """Check a regular last line without line end: keep the row, keep it with a warning, or remove it with a loss."""
     last = dialect.width - 1
     if rows.count < 1 or dialect.trailing or last not in (*requested.numeric, *requested.stamps):
@@ -366,6 +380,20 @@ def check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, b
     if dialect.text.padding:
         return []
     return [Finding(LastLineDropped(line, cell), severity="loss")]
+
+
+def is_total(columns: FloatArray) -> bool:
+    """Return whether the last numbers of columns (k, n) are the sums of those above, more than each of them."""
+    found = False
+    for column in columns:
+        above, last = column[:-1], float(column[-1]) if column.size > _FEWEST_SUMMED else np.nan
+        if not np.isfinite(last):
+            continue
+        largest = max(np.fmax.reduce(above), -np.fmin.reduce(above))
+        if not largest < abs(last) or not math.isclose(np.nansum(above), last, rel_tol=_SAME_SUM):
+            return False
+        found = True
+    return found
 
 
 @dataclass(frozen=True)

@@ -16,17 +16,14 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
 
-Bytes = npt.NDArray[np.uint8]
-
 SAMPLE_BYTES = 1 << 17
 BLOCK_BYTES = 1 << 20
 # So many of them are read at once: pandas takes as long to start as to read some ten kilobytes.
-_BLOCKS = 4
+_BLOCKS = 2
 TAIL_BYTES = 1 << 16
 UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 
@@ -112,7 +109,7 @@ class Text:
         """Return the number of lines after byte `offset` of the stream, including an unfinished last line."""
         end, total, last = self.line_end, 0, self.line_end
         for piece in self.chunks(offset):
-            total += piece.count(end)
+            total += int(np.count_nonzero(np.frombuffer(piece, dtype=np.uint8) == end[0]))  # quicker than bytes.count
             last = piece[-1:] or last
         return total + (last != end)
 

@@ -18,13 +18,12 @@ from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.findings.clocks import RepeatedRows, StatedPeriodDiffers, ValuesWithoutTime
-from cdtool.findings.tables import LastLineCut, NulBytesAtEnd
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
 from cdtool.formats.csv.row_arrays import LEFT, Rows
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.stamps import MISSING_STAMP, Integers
-from cdtool.formats.csv.table import RequestedColumns, check_last_line
+from cdtool.formats.csv.table import RequestedColumns, end_of_rows
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import BoolArray, FloatArray
 
@@ -206,16 +205,8 @@ class _TimedReader:
 
     def end(self, rows: Rows, before: int) -> list[Finding]:
         """Return the findings on skipped lines and the end of the file, whose last row may be removed from `rows`."""
-        irregular, dialect = self.irregular, self.dialect
-        findings = irregular.findings(rows.line(rows.count - 1))
-        if not self.reader.ended and not irregular.cut_line and not irregular.ends_skipped:
-            findings += check_last_line(dialect, rows, RequestedColumns((dialect.width - 1,), (), {}, {}), before)
-        if irregular.cut_line or dialect.text.padding:
-            line = irregular.cut_line or rows.line(rows.count)
-            findings.insert(0, Finding(LastLineCut(line), severity="loss"))
-        if dialect.text.padding:
-            findings.append(Finding(NulBytesAtEnd(dialect.text.padding), severity="loss"))
-        return findings
+        last = RequestedColumns((self.dialect.width - 1,), (), {}, {})
+        return end_of_rows(self.reader, self.irregular, rows, last, before)
 
     def table(self, rows: int, findings: list[Finding]) -> TimedTable:
         """Return what is known after the last row; raises RecordingError if a clock has words."""
