@@ -31,8 +31,6 @@ import numpy as np
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import DerivedTimes, StartAssumed
-from cdtool.findings.containers import LastSegmentIncomplete, SegmentCutOff
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.container_checks import left_out_finding
 from cdtool.formats.csv import Csv
@@ -92,7 +90,11 @@ class Lvm(PiecewiseFormat):
             left_out |= table.left_out
             if table.rows < segment.stated:
                 findings.append(
-                    Finding(SegmentCutOff(segment.dialect.first_line, segment.stated, table.rows), "", "loss")
+                    Finding(
+                        "segment_cut_off",
+                        "",
+                        {"line": segment.dialect.first_line, "stated": segment.stated, "rows": table.rows},
+                    )
                 )
         read = [key for key in keys if key not in left_out]
         if not read:
@@ -237,7 +239,7 @@ def _read_measurement(path: Path, pins: TablePins) -> _Measurement:
         raise RecordingError(f"{path}: has several segments in {text.encoding.upper()}", "save it again as UTF-8")
     for head in heads:
         _check_head(path, head)
-    findings = [Finding(LastSegmentIncomplete(), severity="loss")] if is_cut else []
+    findings = [Finding("last_segment_incomplete")] if is_cut else []
     origin, absolute = _origin(heads, style, findings)
     units: dict[str, str | None] = {}
     empty: dict[str, None] = {}
@@ -425,7 +427,7 @@ def _origin(heads: Sequence[_Head], style: _Style, findings: list[Finding]) -> t
         dict.fromkeys(key for head in heads for at, key in head.channels.items() if head.started(at) is None)
     )
     if starts and unknown:
-        findings.append(Finding(StartAssumed(unknown)))
+        findings.append(Finding("start_assumed", "", {"channels": unknown}))
     return origin, 0.0
 
 
@@ -472,7 +474,7 @@ def _groups(
             yield ClockGroup(name, columns, StampClock(0, 1.0, offset), sparse=True)
         else:
             # The column of times is that of the first channel only.
-            findings.append(Finding(DerivedTimes(tuple(columns)), "", "note"))
+            findings.append(Finding("derived_times", "", {"channels": tuple(columns)}))
             later = offsets[at] - offsets[lead] - absolute if absolute else offsets[at]
             later += firsts[at] - firsts[lead]
             packets = _PacketClock(max(rows, 1), samples[at] or rows, steps[at], steps[lead], 0.0, later, 0)

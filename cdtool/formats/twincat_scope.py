@@ -24,7 +24,6 @@ import numpy as np
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.tables import NamesOfSymbols
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import SEPARATORS, kind, number, split_line
@@ -258,7 +257,7 @@ def _between_blanks(head: _Head) -> tuple[_Head, tuple[Finding, ...]]:
     units = _BETWEEN_BLANKS.findall(" ".join(of_channels.get(_UNIT, [])))
     is_clear = len(units) == len(layout) and all(units[at] == _UNIT for at in clocks)
     cells = {**whole, NAME: names, **({_UNIT: units} if is_clear else {})}
-    findings = (Finding(NamesOfSymbols(replaced), severity="note"),) if replaced else ()
+    findings = (Finding("names_of_symbols", "", {"count": replaced}),) if replaced else ()
     return replace(head, of_channels=cells), findings
 
 

@@ -17,8 +17,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import WrittenTimes
-from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd
 from cdtool.formats.column_names import column_key
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
@@ -94,14 +92,14 @@ class StampColumns:
         for column in self._columns:
             layout = self._layout(column)
             wraps = layout.wraps[1]
-            fact = WrittenTimes(
-                layout.pattern,
-                f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wraps,
-                days_column=self._dialect.names[self._dates[column]] if column in self._dates else "",
-                wraps=wraps,
-                wrapped=self._passed[column],
-            )
-            findings.append(Finding(fact, self._dialect.names[column], "note"))
+            fact = {
+                "pattern": layout.pattern,
+                "since": f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wraps,
+                "days_column": self._dialect.names[self._dates[column]] if column in self._dates else "",
+                "wraps": wraps,
+                "wrapped": self._passed[column],
+            }
+            findings.append(Finding("written_times", self._dialect.names[column], fact))
         return findings
 
 
@@ -181,9 +179,9 @@ class _TableReader:
             findings += check_last_line(self.dialect, rows, self.requested, before)
         if irregular.cut_line or text.padding:
             line = irregular.cut_line or rows.line(rows.count)
-            findings.insert(0, Finding(LastLineCut(line), severity="loss"))
+            findings.insert(0, Finding("last_line_cut", "", {"line": line}))
         if text.padding:
-            findings.append(Finding(NulBytesAtEnd(text.padding), severity="loss"))
+            findings.append(Finding("nul_bytes_at_end", "", {"count": text.padding}))
         return findings
 
     def table(self, columns: Mapping[str, FloatArray], findings: list[Finding], unbroken: bool) -> TextTable:
@@ -271,7 +269,7 @@ def _sort_columns(
                 raise RecordingError(
                     f"{path}: column '{name}': {stamped.readings}", "pin time_format in [csv] of the machine file"
                 )
-            left_out[column] = Finding(AmbiguousTimes(name, stamped.readings))
+            left_out[column] = Finding("ambiguous_times", "", {"column": name, "readings": stamped.readings})
         else:
             stamps.append(column)
     return numeric, stamps, left_out
@@ -363,13 +361,13 @@ def check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, b
     if complete and (certain or not dialect.text.padding):
         if certain:
             return []
-        return [Finding(LastLineKept(line, cell))]
+        return [Finding("last_line_kept", "", {"line": line, "cell": cell})]
     rows.count -= 1
     rows.numbers, rows.stamps = rows.numbers[:, :-1], rows.stamps[:, :-1]
     rows.not_rows = np.append(rows.not_rows, line)
     if dialect.text.padding:
         return []
-    return [Finding(LastLineDropped(line, cell), severity="loss")]
+    return [Finding("last_line_dropped", "", {"line": line, "cell": cell})]
 
 
 @dataclass(frozen=True)

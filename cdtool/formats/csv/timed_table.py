@@ -17,8 +17,6 @@ import numpy as np
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import RepeatedRows, StatedPeriodDiffers, ValuesWithoutTime
-from cdtool.findings.tables import LastLineCut, NulBytesAtEnd
 from cdtool.formats.container_checks import check_size
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
@@ -231,9 +229,9 @@ class _TimedReader:
             findings += check_last_line(dialect, rows, RequestedColumns((dialect.width - 1,), (), {}, {}), before)
         if irregular.cut_line or dialect.text.padding:
             line = irregular.cut_line or rows.line(rows.count)
-            findings.insert(0, Finding(LastLineCut(line), severity="loss"))
+            findings.insert(0, Finding("last_line_cut", "", {"line": line}))
         if dialect.text.padding:
-            findings.append(Finding(NulBytesAtEnd(dialect.text.padding), severity="loss"))
+            findings.append(Finding("nul_bytes_at_end", "", {"count": dialect.text.padding}))
         return findings
 
     def table(self, rows: int, findings: list[Finding]) -> TimedTable:
@@ -299,14 +297,16 @@ class _GroupRows:
     def findings(self, left_out: Collection[str]) -> list[Finding]:
         """Return what was found about the group's columns and their clock."""
         keys = [key for key in self.group.columns if key not in left_out]
-        findings = [Finding(ValuesWithoutTime(self.untimed[key]), key, "loss") for key in keys if self.untimed[key]]
+        findings = [
+            Finding("values_without_time", key, {"count": self.untimed[key]}) for key in keys if self.untimed[key]
+        ]
         for key in keys:
             findings += rounding_finding(key, self.rounded[key])
         if self.repeated and keys:
-            findings.append(Finding(RepeatedRows(self.repeated), keys[0], "note"))
+            findings.append(Finding("repeated_rows", keys[0], {"count": self.repeated}))
         stated = self.group.period
         if keys and stated and self.step and abs(self.step / stated - 1.0) > _SAME_PERIOD:
-            findings.append(Finding(StatedPeriodDiffers(stated, self.step), keys[0]))
+            findings.append(Finding("stated_period_differs", keys[0], {"stated": stated, "step": self.step}))
         return findings
 
 

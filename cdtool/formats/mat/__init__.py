@@ -17,8 +17,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import DaysOfMatlab
-from cdtool.findings.containers import VariableLeftOut
 from cdtool.formats.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.container_checks import check_size, library, one_line_errors
@@ -123,7 +121,7 @@ class _Reader:
         if not is_clock_name(key.rpartition(".")[2]) or not is_datenum(values):
             return Column(key, as_float64(values), time)
         seconds, start = since_first(values)
-        self.findings.append(Finding(DaysOfMatlab(str(np.datetime64(round(start * 1000), "ms"))), key, "note"))
+        self.findings.append(Finding("days_of_matlab", key, {"start": str(np.datetime64(round(start * 1000), "ms"))}))
         self.origin = self.origin or start
         return Column(key, seconds, time, "s")
 
@@ -160,7 +158,9 @@ class _Reader:
                 continue
             if section.numbers.is_complex:
                 self.complex.append(key)
-                self.findings.append(Finding(VariableLeftOut(section.name, "complex"), severity="note"))
+                self.findings.append(
+                    Finding("variable_left_out", "", {"variable": section.name, "what": "complex", "advice": ""})
+                )
                 return None
             if self._table[0] is not section.numbers:  # the columns of a matrix follow one another
                 self._table = (None, np.empty(0))

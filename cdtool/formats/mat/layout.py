@@ -7,13 +7,12 @@ The elements of an array of structs are runs if each has a clock of its own: `ru
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy.typing as npt
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RowsAsColumns, VariableLeftOut, WithoutClock
 from cdtool.formats.clock_beside import is_clock_name
 from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
 from cdtool.formats.mat.runs import StructRuns, short_name
@@ -68,7 +67,7 @@ def arrange_columns(variables: Variables) -> Layout:
         clock, is_alone = _clock_of(leaf, clocks)
         into = layout.hidden if is_alone else layout.columns
         if is_alone:
-            layout.findings.append(Finding(WithoutClock(leaf.name, leaf.rows), severity="note"))
+            layout.findings.append(Finding("without_clock", "", {"variable": leaf.name, "rows": leaf.rows}))
         into.update({name: MatColumn((section,), clock) for name, section in leaf.columns()})
     layout.columns = {name: layout.columns[name] for name in _in_file_order(layout.columns, variables)}
     return layout
@@ -79,7 +78,9 @@ def as_table(section: Section, whole: npt.NDArray[Any], findings: list[Finding])
     table = whole.reshape(-1, 1) if 1 in whole.shape else whole
     if table.shape[0] >= table.shape[1]:
         return table
-    findings.append(Finding(RowsAsColumns("variable", section.name, *whole.shape), severity="note"))
+    rows, columns = whole.shape
+    shape = {"thing": "variable", "name": section.name, "rows": rows, "columns": columns}
+    findings.append(Finding("rows_as_columns", "", shape))
     return table.T
 
 
@@ -156,11 +157,16 @@ class _Walk:
         self.findings += runs.findings()
         for walk in walks:
             self.texts |= walk.texts
-        left = (finding.fact for number in runs.used for finding in walks[number].findings)
-        kinds = {
-            f"{name}(:).{short_name(fact.variable, name)}": fact for fact in left if isinstance(fact, VariableLeftOut)
-        }
-        self.findings += [Finding(replace(fact, variable=key), severity="note") for key, fact in kinds.items()]
+        left = (
+            finding.numbers
+            for number in runs.used
+            for finding in walks[number].findings
+            if finding.kind == "variable_left_out"
+        )
+        kinds = {f"{name}(:).{short_name(numbers['variable'], name)}": numbers for numbers in left}
+        self.findings += [
+            Finding("variable_left_out", "", {**numbers, "variable": key}) for key, numbers in kinds.items()
+        ]
         return True
 
 

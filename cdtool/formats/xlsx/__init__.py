@@ -19,7 +19,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import ErrorCells, FormulasWithoutValue, NumbersAmongTexts, SheetLeftOut
 from cdtool.formats.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys, split_unit
 from cdtool.formats.container_checks import check_size, library, one_line_errors
@@ -67,7 +66,7 @@ class Xlsx:
         with one_line_errors(path, "an Excel workbook"), TemporaryDirectory(prefix="cdtool-") as folder:
             sheets = _read_sheets(path, openpyxl, Path(folder))
             left_out = tuple(
-                Finding(SheetLeftOut(sheet.name, _NO_TABLE), severity="note")
+                Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": _NO_TABLE})
                 for sheet in sheets
                 if sheet.text.rows_of_numbers < 2 and not sheet.text.is_empty
             )
@@ -107,12 +106,18 @@ class _Sheet:
         """Return what cells of the requested columns could not be read."""
         shown = {i: name for i, name in enumerate(source.names) if name in source.columns}
         errors = {i: found for i, found in self.text.errors.items() if i in shown}
-        findings = [Finding(ErrorCells(*found), shown[i], "warning") for i, found in errors.items()]
+        findings = [
+            Finding("error_cells", shown[i], {"count": count, "error": error, "row": row})
+            for i, (count, error, row) in errors.items()
+        ]
         for i in self.text.commas.keys() & self.text.integers.keys() & shown.keys():
-            findings.append(Finding(NumbersAmongTexts(*self.text.commas[i], self.text.integers[i]), shown[i]))
+            count, text, row = self.text.commas[i]
+            numbers = {"count": count, "text": text, "row": row, "integers": self.text.integers[i]}
+            findings.append(Finding("numbers_among_texts", shown[i], numbers))
         formulas = {i: found for i, found in self.formulas.items() if i in shown or i >= len(source.names)}
         return findings + [
-            Finding(FormulasWithoutValue(*found), shown.get(i, ""), "loss") for i, found in formulas.items()
+            Finding("formulas_without_value", shown.get(i, ""), {"count": count, "row": row})
+            for i, (count, row) in formulas.items()
         ]
 
 
@@ -191,7 +196,7 @@ def _join(path: Path, tables: list[_Sheet], wanted: ChannelMap | None) -> Source
             sources[sheet.name] = sheet.source()
         except RecordingError as fault:
             reason = fault.message.replace(f"{path}: sheet '{sheet.name}': ", "", 1)
-            findings.append(Finding(SheetLeftOut(sheet.name, reason), severity="loss"))
+            findings.append(Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": reason}, "loss"))
     if not sources:
         raise RecordingError(f"{path}: no sheet can be read: {findings[0]}", "save each sheet as CSV")
     names = tuple(f"{sheet}!{name}" for sheet, source in sources.items() for name in source.names)
