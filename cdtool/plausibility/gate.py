@@ -36,7 +36,7 @@ def check_channels(recordings: Sequence[Recording], machine: Machine) -> tuple[F
     --------
     >>> import cdtool
     >>> machine = cdtool.read_machine_file("sample_logs/gate/machine.toml")
-    >>> log = cdtool.read("sample_logs/gate/free/01.csv", machine)
+    >>> log = cdtool.read("sample_logs/gate/free/03.csv", machine)
     >>> [(item.channel, item.numbers["answer"]) for item in check_channels([log], machine.machine)][0]
     ('speed', 'agrees')
     """
