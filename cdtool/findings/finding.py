@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cdtool.findings.kinds import Severity, kind_of
-from cdtool.findings.words import Words
+from cdtool.findings.words import FindingWords
 from cdtool.short_repr import short_repr
 
 _SEVERITIES: tuple[Severity, ...] = ("loss", "warning", "note")
@@ -55,11 +55,11 @@ class Finding:
     @property
     def sentence(self) -> str:
         """What holds in words, without the channel and the file."""
-        return Words(kind_of(self.kind), self.numbers).sentence()
+        return FindingWords(kind_of(self.kind), self.numbers).sentence()
 
     def words_for(self, name: str) -> str:
         """Return the words that its kind has for the value of a number."""
-        return Words(kind_of(self.kind), self.numbers).words_for(name)
+        return FindingWords(kind_of(self.kind), self.numbers).words_for(name)
 
     @property
     def subject(self) -> str:

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 Severity = Literal["note", "warning", "loss"]
 
 
-class Kind(NamedTuple):
+class FindingKind(NamedTuple):
     """A kind of finding; the words for a number are by its value, or by "given" and "absent"."""
 
     sentence: str
@@ -24,12 +24,12 @@ class Kind(NamedTuple):
 
 
 @cache
-def kind_of(name: str) -> Kind:
+def kind_of(name: str) -> FindingKind:
     """Return a kind by its name; raises ValueError for an unknown one."""
     if name not in sections():
         raise ValueError(f"'{name}' is no kind of finding; a finding in words is remark('...')")
     table = tomllib.loads(sections()[name])
-    return Kind(
+    return FindingKind(
         table.pop("sentence"),
         table.pop("severity", "warning"),
         tuple(table.pop("numbers", ())),

@@ -7,17 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
-from cdtool.findings.kinds import Kind
+from cdtool.findings.kinds import FindingKind
 from cdtool.plain_text import counted, counted_lines, digits, first_of
 
 # Of a cell or a line so many characters are shown.
 _SHOWN = 40
 
 
-class Words(Formatter):
+class FindingWords(Formatter):
     """The words of a kind with the numbers of a finding."""
 
-    def __init__(self, kind: Kind, numbers: Mapping[str, Any]) -> None:
+    def __init__(self, kind: FindingKind, numbers: Mapping[str, Any]) -> None:
         self.kind = kind
         self.numbers = numbers
 

@@ -14,7 +14,7 @@ import pytest
 import cdtool.findings
 from cdtool.findings import Finding, lines_of, remark, worst_first
 from cdtool.findings.kinds import Severity, kind_of, sections
-from cdtool.findings.words import Words
+from cdtool.findings.words import FindingWords
 
 PACKAGE = Path(cdtool.__path__[0])
 KINDS = tomllib.loads((PACKAGE / "findings" / "kinds.toml").read_text(encoding="utf-8"))
@@ -54,7 +54,7 @@ def test_each_text_of_a_kind_is_part_of_a_sentence(kind):
 def _said(kind: str, numbers: dict[str, object]) -> list[str]:
     said: list[str] = []
 
-    class Recorded(Words):
+    class Recorded(FindingWords):
         def vformat(self, text, args, kwargs):
             said.append(text)
             return super().vformat(text, args, kwargs)
