@@ -14,7 +14,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import BagDamaged, MessagesUnreadable
 from cdtool.formats.container_checks import check_size
 from cdtool.formats.source import Source, TopicDetails
 from cdtool.messages.batch import Batch, Stream
@@ -111,11 +110,15 @@ class Bag(ABC):
 
     def _losses(self) -> list[Finding]:
         unreadable = [
-            Finding(MessagesUnreadable(self.topics[topic][1] - count, self.topics[topic][1], self.end), topic, "loss")
+            Finding(
+                "messages_unreadable",
+                topic,
+                {"count": self.topics[topic][1] - count, "messages": self.topics[topic][1], "reason": self.end},
+            )
             for topic, count in self.read.items()
             if count < self.topics[topic][1]
         ]
-        return unreadable or ([Finding(BagDamaged(self.end), severity="loss")] if self.end else [])
+        return unreadable or ([Finding("bag_damaged", "", {"reason": self.end})] if self.end else [])
 
 
 def one_line(fault: BaseException) -> str:

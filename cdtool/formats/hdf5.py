@@ -18,8 +18,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import ClocksWithoutUnit, UnusableClock
-from cdtool.findings.containers import PackedValues, RowsAsColumns
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.container_checks import (
     check_chunks,
@@ -89,7 +87,7 @@ class Packing:
         """Return the note on a packed column; empty if the column is not packed."""
         if (self.scale, self.offset) == (1.0, 0.0):
             return []
-        return [Finding(PackedValues(self.scale, self.offset), column, "note")]
+        return [Finding("packed_values", column, {"scale": self.scale, "offset": self.offset})]
 
 
 def times_since(unit: str, calendar: str) -> tuple[float, Fraction] | None:
@@ -215,7 +213,9 @@ class _Datasets:
         for i in range(min(node.shape)):
             self.locations[f"{name}[{i}]"] = (name, i)
         if node.shape[0] < node.shape[1]:
-            self.findings.append(Finding(RowsAsColumns("dataset", name, *node.shape), severity="note"))
+            rows, columns = node.shape
+            shape = {"thing": "dataset", "name": name, "rows": rows, "columns": columns}
+            self.findings.append(Finding("rows_as_columns", "", shape))
 
     def rows(self, key: str) -> int:
         """Return the number of values of a column."""
@@ -256,7 +256,7 @@ class _Datasets:
         paths = [path for path in named if self._clock_at(path) is None]
         if len({path.rpartition("/")[0] for path in paths}) < 2:
             return []
-        return [Finding(ClocksWithoutUnit(tuple(paths)))]
+        return [Finding("clocks_without_unit", "", {"datasets": tuple(paths)})]
 
     def _clock(self, key: str) -> tuple[str, EpochClock] | None:
         """Return path and clock of a column; the clock of a clock is itself. None if the column has no clock."""
@@ -281,7 +281,7 @@ class _Datasets:
         try:
             since = times_since(stated, _text(dataset.attrs.get("calendar")))
         except ValueError as fault:
-            self.findings.append(Finding(UnusableClock(str(fault)), path))
+            self.findings.append(Finding("unusable_clock", path, {"reason": str(fault)}))
             return None
         unit = find_unit(stated)
         if since is None and (unit is None or unit.si != "s"):

@@ -31,8 +31,6 @@ import numpy as np
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import DerivedTimes, StartAssumed
-from cdtool.findings.containers import LastSegmentIncomplete
 from cdtool.formats.column_names import OWN_CLOCK
 from cdtool.formats.container_checks import left_out_finding
 from cdtool.formats.csv import Csv
@@ -196,7 +194,7 @@ def _read_heads(path: Path, pins: TablePins) -> TimedText:
         raise RecordingError(f"{path}: has several segments in {text.encoding.upper()}", "save it again as UTF-8")
     for head in heads:
         _check_head(path, head)
-    findings = [] if end is None else [Finding(LastSegmentIncomplete(), severity="loss")]
+    findings = [] if end is None else [Finding("last_segment_incomplete")]
     origin, absolute = _origin(heads, style, findings)
     units: dict[str, str | None] = {}
     empty: dict[str, None] = {}
@@ -319,7 +317,7 @@ def _origin(heads: Sequence[_Head], style: _Style, findings: list[Finding]) -> t
     known = [start for _, start in starts if start is not None]
     unknown = tuple(dict.fromkeys(key for key, start in starts if start is None))
     if known and unknown:
-        findings.append(Finding(StartAssumed(unknown)))
+        findings.append(Finding("start_assumed", "", {"channels": unknown}))
     return min(known, default=style.started or Fraction(0)), 0.0
 
 
@@ -349,7 +347,7 @@ def _groups(
         if style.counted and len(clocks) < 2:
             clock = _PacketClock(rows or 1, samples[at] or rows or 1, step or 1.0, offset + first)
         elif len(clocks) < 2 and i and rows:  # the column of times is that of the first channel only
-            findings.append(Finding(DerivedTimes(tuple(columns)), "", "note"))
+            findings.append(Finding("derived_times", "", {"channels": tuple(columns)}))
             lead_step, lead_first = head.number("Delta_X", lead), head.number("X0", lead)
             start = (offset - offsets[lead] - absolute if absolute else offset) + first - lead_first
             clock = _PacketClock(rows, samples[at] or rows, step, start, 0, lead_step)

@@ -15,8 +15,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import StampsAsSeconds
-from cdtool.findings.containers import CutBehindRow
 from cdtool.formats.column_names import OWN_CLOCK, column_key, requested_keys, split_unit
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.pieces import VALUES_PER_PIECE, Pieces, PiecewiseFormat
@@ -153,7 +151,7 @@ class _ArrowTable:
         absent = np.isnat(stamps)
         if key not in self._starts and not absent.all():
             self._starts[key] = stamps[~absent][0]
-            self.findings.append(Finding(StampsAsSeconds(str(self._starts[key])), key, "note"))
+            self.findings.append(Finding("stamps_as_seconds", key, {"start": str(self._starts[key])}))
         seconds = (stamps - self._starts.get(key, np.datetime64(0, "ns"))).astype(np.int64) / 1e9
         seconds[absent] = np.nan
         return seconds, absent
@@ -199,7 +197,7 @@ class _Feather:
                 batch = reader.read_next_batch()
                 rows += batch.num_rows
                 yield batch
-        self._findings.append(Finding(CutBehindRow(rows), severity="loss"))
+        self._findings.append(Finding("cut_behind_row", "", {"row": rows}))
 
     def _stream(self, stream: Any) -> Any:
         stream.seek(8)  # after the magic bytes and their padding, an Arrow file is a stream

@@ -24,7 +24,6 @@ from typing import Any, ClassVar
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import BagNotClosed, DamagedRows, StandardDefinitions
 from cdtool.formats.bag_messages import Bag, IsWanted, one_line
 from cdtool.formats.container_checks import check_size, one_line_errors
 from cdtool.formats.pieces import Pieces, join_pieces
@@ -117,7 +116,7 @@ class _Ros2Bag(Bag):
                 else:
                     yield streams[topic], time, content
             if damaged:
-                self.findings.append(Finding(DamagedRows(damaged), severity="loss"))
+                self.findings.append(Finding("damaged_rows", "", {"count": damaged}))
             if not is_counted:
                 self.topics = {name: (kind, self.read.get(name, 0)) for name, (kind, _) in self.topics.items()}
 
@@ -150,7 +149,7 @@ class _Ros2Bag(Bag):
                 with closing(sqlite3.connect(copy)) as base:  # applies the journal
                     base.execute("SELECT count(*) FROM sqlite_master").fetchone()
                     base.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
-                self.findings.append(Finding(BagNotClosed(journals[0].name)))
+                self.findings.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
             yield copy
 
     def _count(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> bool:
@@ -188,7 +187,7 @@ class _Ros2Bag(Bag):
                     standard[kind] = None
             streams[topic] = Stream(number, name, encoding, (definition[0], kind, definition[1].encode()))
         if standard:
-            self.findings.append(Finding(StandardDefinitions(tuple(standard)), severity="note"))
+            self.findings.append(Finding("standard_definitions", "", {"types": tuple(standard)}))
         return streams
 
 

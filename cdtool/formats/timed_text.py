@@ -9,7 +9,6 @@ from pathlib import Path
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import SegmentCutOff
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.csv.cells import SEPARATORS, kind
 from cdtool.formats.csv.dialect import Dialect
@@ -54,7 +53,13 @@ class TimedText:
             findings += table.findings
             left_out |= table.left_out
             if table.rows < each.stated:
-                findings.append(Finding(SegmentCutOff(each.dialect.first_line, each.stated, table.rows), "", "loss"))
+                findings.append(
+                    Finding(
+                        "segment_cut_off",
+                        "",
+                        {"line": each.dialect.first_line, "stated": each.stated, "rows": table.rows},
+                    )
+                )
         read = [key for key in keys if key not in left_out]
         if not read:
             raise RecordingError(f"{path}: no channel has numbers", "see cdtool info")

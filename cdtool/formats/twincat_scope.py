@@ -24,7 +24,6 @@ import numpy as np
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.tables import NamesOfSymbols
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, number, split_line
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
@@ -219,7 +218,7 @@ def _between_blanks(head: _Head, findings: list[Finding]) -> _Head:
             words = symbols[at + 1 : end]
         names += [NAME, *words]
     if replaced:
-        findings.append(Finding(NamesOfSymbols(replaced), severity="note"))
+        findings.append(Finding("names_of_symbols", "", {"count": replaced}))
     units = _BETWEEN_BLANKS.findall(" ".join(head.of_channels.get(_UNIT, [])))
     is_clear = len(units) == usual and all(units[at] == _UNIT for at in clocks)
     return replace(head, of_channels={**whole, NAME: names, **({_UNIT: units} if is_clear else {})})

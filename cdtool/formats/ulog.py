@@ -17,7 +17,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import CutWithinMessage, LibraryMessage, LoggerDropouts, MessagesDamaged
 from cdtool.formats.column_names import requested_keys
 from cdtool.formats.container_checks import as_numbers, check_size, left_out_finding, library, one_line_errors
 from cdtool.formats.epoch_clock import EpochClock, common_origin
@@ -126,14 +125,18 @@ def _losses(log: Any, ends: _EndCheck, printed: str) -> list[Finding]:
     """Return what the log or its logger lost."""
     findings = []
     if log.file_corruption:
-        findings.append(Finding(MessagesDamaged(), severity="loss"))
+        findings.append(Finding("messages_damaged"))
     elif ends.left is not None:
-        findings.append(Finding(CutWithinMessage(ends.left), severity="loss"))
+        findings.append(Finding("cut_within_message", "", {"size": ends.left}))
     lines = dict.fromkeys(" ".join(line.split())[:200] for line in printed.splitlines() if line.strip())
-    findings += [Finding(LibraryMessage("pyulog", line)) for line in list(lines)[:_MOST_MESSAGES]]
+    findings += [
+        Finding("library_message", "", {"library": "pyulog", "text": line}) for line in list(lines)[:_MOST_MESSAGES]
+    ]
     if log.dropouts:
         lengths = [dropout.duration / 1000.0 for dropout in log.dropouts]
-        findings.append(Finding(LoggerDropouts(len(lengths), sum(lengths), max(lengths)), severity="loss"))
+        findings.append(
+            Finding("logger_dropouts", "", {"count": len(lengths), "total": sum(lengths), "longest": max(lengths)})
+        )
     return findings
 
 

@@ -25,7 +25,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import ErrorCells, FormulasWithoutValue, NumbersAmongTexts, SheetLeftOut
 from cdtool.formats.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys, split_unit
 from cdtool.formats.container_checks import check_size, library, one_line_errors
@@ -86,7 +85,7 @@ class Xlsx:
                 raise RecordingError(f"{path}: no sheet contains rows of numbers", "is it the right workbook?")
             source = tables[0].source(wanted) if len(tables) == 1 else _join(path, tables, wanted)
         left_out = tuple(
-            Finding(SheetLeftOut(sheet.name, "it contains no rows of numbers"), severity="note")
+            Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": "it contains no rows of numbers"})
             for sheet in sheets
             if sheet not in tables and sheet.width
         )
@@ -128,12 +127,18 @@ class _Sheet:
             message = fault.message.replace(f"{self.file}", f"{self.path}: sheet '{self.name}'", 1)
             raise RecordingError(message, fault.hint, channel=fault.channel) from fault
         shown = {i: name for i, name in enumerate(source.names) if name in source.columns}
-        findings = [Finding(ErrorCells(*found), shown[i], "warning") for i, found in self.errors.items() if i in shown]
+        findings = [
+            Finding("error_cells", shown[i], {"count": count, "error": error, "row": row})
+            for i, (count, error, row) in self.errors.items()
+            if i in shown
+        ]
         for i in self.commas.keys() & self.integers.keys() & shown.keys():
-            findings.append(Finding(NumbersAmongTexts(*(*self.commas[i], self.integers[i])), shown[i]))
-        for i, found in self.formulas.items():
+            count, text, row = self.commas[i]
+            numbers = {"count": count, "text": text, "row": row, "integers": self.integers[i]}
+            findings.append(Finding("numbers_among_texts", shown[i], numbers))
+        for i, (count, row) in self.formulas.items():
             if i in shown or i >= len(source.names):
-                findings.append(Finding(FormulasWithoutValue(*found), shown.get(i, ""), "loss"))
+                findings.append(Finding("formulas_without_value", shown.get(i, ""), {"count": count, "row": row}))
         return replace(source, findings=(*source.findings, *findings))
 
     def write(self, rows: Iterable[Any]) -> None:
@@ -278,7 +283,7 @@ def _join(path: Path, tables: list[_Sheet], wanted: ChannelMap | None) -> Source
             sources[sheet] = sheet.source()
         except RecordingError as fault:
             reason = fault.message.replace(f"{path}: sheet '{sheet.name}': ", "", 1)
-            findings.append(Finding(SheetLeftOut(sheet.name, reason), severity="loss"))
+            findings.append(Finding("sheet_left_out", "", {"sheet": sheet.name, "reason": reason}, "loss"))
     if not sources:
         raise RecordingError(f"{path}: no sheet can be read: {findings[0]}", "save each sheet as CSV")
     names = tuple(f"{sheet.name}!{name}" for sheet, source in sources.items() for name in source.names)

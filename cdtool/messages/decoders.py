@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.messages import UndecodableMessages
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoded_batch import DECODED, DecodedBatch, Decoder, UndecodableError
 from cdtool.messages.encodings import decoder_for
@@ -98,8 +97,8 @@ class Decoders:
 
     def failure(self, topic: str) -> list[Finding]:
         """Return the finding on messages that could not be decoded, if there are any."""
-        fact = UndecodableMessages(self.failed, self.failed + self.decoded, self.reason)
-        return [Finding(fact, topic, "loss")] if self.failed else []
+        fact = {"count": self.failed, "messages": self.failed + self.decoded, "reason": self.reason}
+        return [Finding("undecodable_messages", topic, fact)] if self.failed else []
 
     def checked_failure(self, path: str, topic: str) -> list[Finding]:
         """Return the same as `failure`; raises RecordingError if no message could be decoded."""

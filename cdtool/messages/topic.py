@@ -15,7 +15,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
-from cdtool.findings.messages import EmptyArrays, OtherJointsOnly
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch, FieldValues
 from cdtool.messages.decoders import Decoders
@@ -130,7 +129,7 @@ class Topic:
         if each.elsewhere:
             if not each.found:
                 raise missing_field(self.where, text, FieldMissingError("no message names this joint", each.names))
-            findings.append(Finding(OtherJointsOnly(each.elsewhere), name, "note"))
+            findings.append(Finding("other_joints_only", name, {"count": each.elsewhere}))
         widths = each.widths - Counter({0: each.widths[0]})
         if len(widths) > 1:
             lengths = ", ".join(f"{width} in {count}" for width, count in widths.most_common())
@@ -139,7 +138,7 @@ class Topic:
                 "select one element, e.g. position[0]",
             )
         if each.widths[0]:
-            findings.append(Finding(EmptyArrays(each.widths[0]), name))
+            findings.append(Finding("empty_arrays", name, {"count": each.widths[0]}))
         shape = (0, each.width or 1) if each.widths else (0,)
         return Column(name, np.empty(shape), np.empty(0)), findings
 

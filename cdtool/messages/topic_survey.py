@@ -12,8 +12,6 @@ from cdtool.columns import Column, Piece
 from cdtool.distribution import Distribution
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import HeaderDelay, HeaderUnset
-from cdtool.findings.messages import ArrayLengthsDiffer
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoded_batch import ABSENT, DecodedBatch, FieldValues
@@ -115,7 +113,7 @@ class TopicSurvey:
         for name in self._fields:
             widths, full = self._widths[name], f"{self.topic} {name}"
             if len(widths) > 1:
-                findings.append(Finding(ArrayLengthsDiffer(tuple(sorted(widths))), full, "note"))
+                findings.append(Finding("array_lengths_differ", full, {"lengths": tuple(sorted(widths))}))
             elif widths:
                 findings += rounding_finding(full, self._rounded[name], "note")
                 columns[full] = Column(full, np.empty((0, *self._shapes[name])), np.empty(0))
@@ -125,9 +123,9 @@ class TopicSurvey:
         if not self._is_late:
             return []
         if not self._stamped:
-            return [Finding(HeaderUnset(), self.topic, "note")]
+            return [Finding("header_unset", self.topic)]
         low, median, high = (self._late.percentile(percent) for percent in (5, 50, 95))
-        return [Finding(HeaderDelay(median, low, high), self.topic, "note")]
+        return [Finding("header_delay", self.topic, {"median": median, "low": low, "high": high})]
 
 
 def _parsed(name: str) -> Field | None:

@@ -9,7 +9,6 @@ import pytest
 from scipy.io import savemat
 
 from cdtool.errors import RecordingError
-from cdtool.findings.containers import RowsAsColumns
 from cdtool.formats.mat import Mat
 from cdtool.ingest.reading import read_recording, survey
 from tests.data_folder import data, needs_data
@@ -40,7 +39,7 @@ def test_each_column_of_a_matrix_is_a_column(saved):
 def test_a_matrix_with_more_columns_than_rows_is_transposed_with_a_note(saved):
     source = Mat().columns(saved({"q": np.arange(12.0).reshape(3, 4)}))
     assert source.columns["q[0]"].values.tolist() == [0, 1, 2, 3]
-    assert isinstance(source.findings[0].fact, RowsAsColumns)
+    assert source.findings[0].kind == "rows_as_columns"
 
 
 def test_scalars_are_details_and_integers_become_float64(saved):
@@ -52,7 +51,7 @@ def test_scalars_are_details_and_integers_become_float64(saved):
 def test_what_has_no_column_is_named_and_single_numbers_and_texts_are_details(saved):
     cells = np.array([["a"], [2.0]], dtype=object)
     source = Mat().columns(saved({"t": np.arange(3.0), "s": {"a": 1}, "c": cells, "w": "words", "z": np.ones(3) * 1j}))
-    left_out = {(finding.fact.variable, finding.fact.what) for finding in source.findings}
+    left_out = {(finding.numbers["variable"], finding.numbers["what"]) for finding in source.findings}
     assert left_out == {("c", "a cell"), ("z", "complex")}
     assert source.details == {"s.a": "1", "w": "words"}
     assert list(source.columns) == ["t"]

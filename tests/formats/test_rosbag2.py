@@ -307,7 +307,7 @@ def test_rows_that_are_no_messages_are_counted(tmp_path, row, count):
     path = write_bag(tmp_path / "log.db3", [*rows(), row], schema=schema)
     source = survey(path)
     assert len(source.columns["/speed data"].values) == 100
-    assert [item.fact.count for item in source.findings if item.kind == "damaged_rows"] == [count]
+    assert [item.numbers["count"] for item in source.findings if item.kind == "damaged_rows"] == [count]
 
 
 @pytest.mark.parametrize(
@@ -334,7 +334,7 @@ def test_a_hostile_schema_is_refused_in_one_line_without_being_evaluated(tmp_pat
 def test_decompression_bombs_are_refused(tmp_path):
     zeros = zstandard.compress(bytes(2**29))
     bomb = write_bag(tmp_path / "messages.db3", [(1, START + k, zeros) for k in range(3)])
-    assert [item.fact.count for item in survey(bomb).findings if item.kind == "damaged_rows"] == [3]
+    assert [item.numbers["count"] for item in survey(bomb).findings if item.kind == "damaged_rows"] == [3]
     plain = write_bag(tmp_path / "log.db3").read_bytes()
     packed = tmp_path / "packed.db3.zstd"
     packed.write_bytes(zstandard.compress(plain) + zeros)

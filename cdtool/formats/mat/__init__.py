@@ -18,8 +18,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, as_float64
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import DaysOfMatlab
-from cdtool.findings.containers import RowsAsColumns, VariableLeftOut
 from cdtool.formats.clock_beside import assumed_clock, is_clock_name
 from cdtool.formats.column_names import OWN_CLOCK, requested_keys
 from cdtool.formats.container_checks import check_size, library, one_line_errors
@@ -130,7 +128,7 @@ class _Reader:
         if not is_clock_name(key.rpartition(".")[2]) or not is_datenum(values):
             return Column(key, as_float64(values), time)
         seconds, start = since_first(values)
-        self.findings.append(Finding(DaysOfMatlab(str(np.datetime64(round(start * 1000), "ms"))), key, "note"))
+        self.findings.append(Finding("days_of_matlab", key, {"start": str(np.datetime64(round(start * 1000), "ms"))}))
         self.origin = self.origin or start
         return Column(key, seconds, time, "s")
 
@@ -153,11 +151,14 @@ class _Reader:
         for section in column.sections:
             if section.numbers is not None and section.numbers.is_complex:
                 self.complex.append(key)
-                self.findings.append(Finding(VariableLeftOut(section.name, "complex"), severity="note"))
+                self.findings.append(
+                    Finding("variable_left_out", "", {"variable": section.name, "what": "complex", "advice": ""})
+                )
                 return None
             if section.numbers is not None and section.numbers.is_across:
-                across = RowsAsColumns("variable", section.name, *section.numbers.shape)
-                self.findings.append(Finding(across, severity="note"))
+                rows, columns = section.numbers.shape
+                shape = {"thing": "variable", "name": section.name, "rows": rows, "columns": columns}
+                self.findings.append(Finding("rows_as_columns", "", shape))
         parts = [section.values() for section in column.sections]
         values = parts[0] if len(parts) == 1 else np.concatenate(parts)
         if values.dtype.kind in "iu":

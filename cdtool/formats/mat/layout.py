@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import VariableLeftOut, WithoutClock
 from cdtool.formats.clock_beside import is_clock_name
 from cdtool.formats.mat.leaves import Leaf, MatColumn
 from cdtool.formats.mat.runs import StructRuns, short_name
@@ -108,11 +107,16 @@ class Layout:
         self.hidden |= runs.single_columns()
         self.findings += runs.findings()
         self.texts |= {key: text for each in inside for key, text in each.texts.items()}
-        left = (finding.fact for number in runs.used for finding in inside[number].findings)
-        kinds = {
-            f"{name}(:).{short_name(fact.variable, name)}": fact for fact in left if isinstance(fact, VariableLeftOut)
-        }
-        self.findings += [Finding(replace(fact, variable=key), severity="note") for key, fact in kinds.items()]
+        left = (
+            finding.numbers
+            for number in runs.used
+            for finding in inside[number].findings
+            if finding.kind == "variable_left_out"
+        )
+        kinds = {f"{name}(:).{short_name(numbers['variable'], name)}": numbers for numbers in left}
+        self.findings += [
+            Finding("variable_left_out", "", {**numbers, "variable": key}) for key, numbers in kinds.items()
+        ]
         return True
 
 
@@ -126,7 +130,7 @@ def arrange_columns(variables: Variables) -> Layout:
         clock, is_alone = _clock_of(leaf, clocks)
         names = [key for key, _ in leaf.columns()]
         if is_alone:
-            layout.findings.append(Finding(WithoutClock(leaf.name, leaf.rows), severity="note"))
+            layout.findings.append(Finding("without_clock", "", {"variable": leaf.name, "rows": leaf.rows}))
             layout.hidden |= {key: layout.columns.pop(key) for key in names}
         else:
             layout.columns |= {key: replace(layout.columns[key], clock=clock) for key in names}

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RunsOfStructs, RunsWithoutRows, WithoutClock
 from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
 from cdtool.formats.mat.variables import Numbers
 
@@ -66,10 +65,10 @@ class StructRuns:
         """Return what the runs are, and which of their fields are left out."""
         if not self._clock:
             return []
-        found = [Finding(RunsOfStructs(self.name, len(self.used), sum(self._rows)), severity="note")]
+        found = [Finding("runs_of_structs", "", {"array": self.name, "runs": len(self.used), "rows": sum(self._rows)})]
         empty = tuple(number + 1 for number, rows in enumerate(self._rows) if not rows)
         if empty:
-            found.append(Finding(RunsWithoutRows(self.name, empty), severity="note"))
+            found.append(Finding("runs_without_rows", "", {"array": self.name, "runs": empty}))
         other = {
             key: leaf.rows
             for number in self.used
@@ -78,7 +77,10 @@ class StructRuns:
         }
         return [
             *found,
-            *(Finding(WithoutClock(f"{self.name}(:).{key}", rows), severity="note") for key, rows in other.items()),
+            *(
+                Finding("without_clock", "", {"variable": f"{self.name}(:).{key}", "rows": rows})
+                for key, rows in other.items()
+            ),
         ]
 
     def _fields(self, number: int) -> dict[str, Section]:

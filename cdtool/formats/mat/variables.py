@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import VariableLeftOut
 
 # A file with more values, fields and cells than this is refused: no log has as many.
 MOST_VALUES = 200_000
@@ -85,7 +84,9 @@ def left_out(name: str, what: str) -> Finding:
     advice = _ADVICE.get(what, "")
     is_object = (not advice and what[:1].isalpha() and "." in what) or what[:1].isupper()
     advice = advice or ("save its properties as a struct of numbers" if is_object else "")
-    return Finding(VariableLeftOut(name, with_article(what), advice.format(name=name)), severity="note")
+    return Finding(
+        "variable_left_out", "", {"variable": name, "what": with_article(what), "advice": advice.format(name=name)}
+    )
 
 
 def with_article(kind: str) -> str:

@@ -11,17 +11,6 @@ import numpy as np
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import (
-    ChannelCountsDiffer,
-    ChunkTimesDiffer,
-    DefinedOtherwise,
-    IndexDisagrees,
-    MessageCountDiffers,
-    NoMessage,
-    SeveralWriters,
-    SummaryDamaged,
-    Unverified,
-)
 from cdtool.formats.mcap.data_section import Block, DataSection
 from cdtool.formats.mcap.definitions import DefinedStream, Definitions
 from cdtool.formats.mcap.file_bytes import FileBytes
@@ -193,17 +182,19 @@ class Log:
         section, statistics = self.section, self.summary.statistics
         findings = section.losses.findings(self.count, self.origin)
         if self.summary.problem and not section.losses.stopped:
-            findings.append(Finding(SummaryDamaged(self.summary.problem, self.count), severity="loss"))
+            findings.append(Finding("summary_damaged", "", {"reason": self.summary.problem, "messages": self.count}))
         if statistics is not None and statistics.message_count != self.count:
-            findings.append(Finding(MessageCountDiffers(statistics.message_count, self.count), severity="loss"))
+            findings.append(
+                Finding("message_count_differs", "", {"stated": statistics.message_count, "read": self.count})
+            )
         findings += self._differences()
         if self.unverified:
-            findings.append(Finding(Unverified(self.unverified, self.count), severity="note"))
+            findings.append(Finding("unverified", "", {"count": self.unverified, "messages": self.count}))
         for topic in self.topics.values():
             if topic.channels > 1 and self._wanted(topic.name):
-                findings.append(Finding(SeveralWriters(topic.channels), topic.name))
+                findings.append(Finding("several_writers", topic.name, {"channels": topic.channels}))
         if not self.count:
-            findings.append(Finding(NoMessage()))
+            findings.append(Finding("no_message"))
         return findings
 
     def _differences(self) -> list[Finding]:
@@ -218,21 +209,21 @@ class Log:
             absent = len(summary.chunks.keys() - chunks.keys())
             both = chunks.keys() & summary.chunks.keys()
             other = sum(not matches_header(summary.chunks[at], chunks[at]) for at in both)
-            differences = (
-                IndexDisagrees(missing, "not indexed"),
-                IndexDisagrees(absent, "only indexed"),
-                IndexDisagrees(other, "other values"),
-            )
-            findings += [Finding(difference) for difference in differences if difference.count]
+            differences = {"not indexed": missing, "only indexed": absent, "other values": other}
+            findings += [
+                Finding("index_disagrees", "", {"count": count, "how": how})
+                for how, count in differences.items()
+                if count
+            ]
         if section.other_times:
-            findings.append(Finding(ChunkTimesDiffer(section.other_times)))
+            findings.append(Finding("chunk_times_differ", "", {"chunks": section.other_times}))
         statistics = summary.statistics
         if statistics is not None and statistics.channel_message_counts:
             stated = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
             read = {channel: count for channel, count in self.counts.items() if count}
             if stated != read and statistics.message_count == self.count:
-                findings.append(Finding(ChannelCountsDiffer()))
-        return findings + [Finding(DefinedOtherwise(), topic) for topic in self._definitions.redefined_topics()]
+                findings.append(Finding("channel_counts_differ"))
+        return findings + [Finding("defined_otherwise", topic) for topic in self._definitions.redefined_topics()]
 
 
 def profile_of(file: FileBytes) -> str:

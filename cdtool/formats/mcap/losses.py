@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Any
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import ChunksRefused, DamagedAt, LostBytes, MessagesLost, MoreDamage
 from cdtool.formats.mcap.chunks import ChunkHeader
 from cdtool.formats.mcap.summary import Summary
 
@@ -38,10 +38,10 @@ class Loss:
         usable = known is not None or span[0] <= span[1] < 1 << 63
         return cls(header.at, header.length, reason, 1, None, span if usable else None, refused)
 
-    def since(self, origin: int) -> LostBytes:
+    def since(self, origin: int) -> dict[str, Any]:
         """Return the lost bytes, with times in seconds after `origin` [ns]."""
         time = None if self.time is None else ((self.time[0] - origin) / 1e9, (self.time[1] - origin) / 1e9)
-        return LostBytes(self.size, bool(self.chunks), self.messages, time)
+        return {"size": self.size, "is_chunk": bool(self.chunks), "messages": self.messages, "time": time}
 
 
 @dataclass
@@ -66,24 +66,28 @@ class Losses:
         findings = [self._finding(loss, loss is last, count, origin) for loss in self.entries[:_LISTED]]
         rest = self.entries[_LISTED:]
         if rest:
-            more = MoreDamage(
-                len(rest),
-                sum(loss.size for loss in rest),
-                sum(loss.chunks for loss in rest),
-                sum(loss.messages or 0 for loss in rest),
-            )
-            findings.append(Finding(more, severity="loss"))
+            more = {
+                "places": len(rest),
+                "size": sum(loss.size for loss in rest),
+                "chunks": sum(loss.chunks for loss in rest),
+                "messages": sum(loss.messages or 0 for loss in rest),
+            }
+            findings.append(Finding("more_damage", "", more))
             if last is not None:
                 findings.append(self._finding(last, True, count, origin))
         for reason, lost in self.messages.items():
-            findings.append(Finding(MessagesLost(reason, lost), severity="loss"))
+            findings.append(Finding("messages_lost", "", {"reason": reason, "count": lost}))
         return findings + self._refused()
 
     def _refused(self) -> list[Finding]:
         """Return the advice on refused chunks: images of a dark camera have higher ratios than any sensor data."""
         count = sum(loss.refused for loss in self.entries)
-        return [Finding(ChunksRefused(count))] if count else []
+        return [Finding("chunks_refused", "", {"count": count})] if count else []
 
     def _finding(self, loss: Loss, final: bool, count: int, origin: int) -> Finding:
         reason = " ".join(loss.reason.split())[:200]
-        return Finding(DamagedAt(loss.at, reason, loss.since(origin), count if final else None), severity="loss")
+        return Finding(
+            "damaged_at",
+            "",
+            {"byte": loss.at, "reason": reason, "lost": loss.since(origin), "read_before": count if final else None},
+        )

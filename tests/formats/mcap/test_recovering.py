@@ -8,10 +8,10 @@ import pytest
 from mcap.reader import make_reader
 
 from cdtool.errors import RecordingError, UsageError
-from cdtool.findings.containers import Unverified
 from cdtool.formats.mcap.log import Log
 from cdtool.formats.mcap.records import Opcode
 from cdtool.workflows.recovering import recover
+from tests.findings.facts import fact_of
 from tests.formats.mcap.small_files import COMPRESSIONS, read, small_file
 
 
@@ -88,7 +88,7 @@ def test_without_any_checksum_nothing_is_recovered_unless_requested(tmp_path):
     assert messages == sent
     assert log.unverified == len(sent)
     assert not log.summary.verified
-    assert findings[0].fact == Unverified(24, 24)
+    assert fact_of(findings[0]) == ("unverified", {"count": 24, "messages": 24})
 
 
 def test_a_checksum_of_the_whole_data_covers_messages_outside_of_chunks(tmp_path):
