@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.rows import RowReader
+from cdtool.formats.twincat_scope import TwincatScope
+from tests.formats.scope_exports import Channel, Options, ramp, write_export
 
 DIGITS = st.text("0123456789", max_size=10)
 PLAIN = st.builds(
@@ -91,3 +93,10 @@ def test_rows_are_the_same_whether_or_not_their_lines_are_found(tmp_path_factory
         found = outcome()
         patch.setattr(RowReader, "_plain", lambda *_: None)
         assert outcome() == found
+
+
+def test_all_rows_of_a_block_may_end_before_the_last_clock(tmp_path, monkeypatch):
+    monkeypatch.setattr("cdtool.formats.csv.text.BLOCK_BYTES", 512)
+    channels = [Channel("a", "1", ramp(200)), Channel("b", "2", ramp(20))]
+    columns = TwincatScope().columns(write_export(tmp_path / "run.csv", channels, Options(full_stamps=True))).columns
+    assert [columns[channel.name].values.tolist() for channel in channels] == [channel.values for channel in channels]

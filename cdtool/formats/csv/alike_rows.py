@@ -111,7 +111,7 @@ def _alike(stream: bytes, data: npt.NDArray[np.uint8], separator: bytes) -> tupl
     others = {*stream.translate(None, _PLAIN + separator + b",")}
     begin = stream.find(b"\n", max(map(stream.rfind, others), default=-1)) + 1 if others else 0
     before_sign = data[np.flatnonzero(data[begin:] == ord("-")) + begin - 1]  # before the first byte is the line end
-    if not np.isin(before_sign, [*b"\neE", *separator]).all():
+    if bytes(before_sign).translate(None, b"\neE" + separator):
         begin = len(stream)
     places = np.flatnonzero((data[begin:] == ord(separator)) | (data[begin:] == ord("\n"))) + begin
     ends = np.flatnonzero(data[places] == ord("\n"))

@@ -187,7 +187,8 @@ class RowReader:
             rows.numbers[targets[column], to] = numbers
         worded = [column for column in np.flatnonzero(targets >= 0).tolist() if column not in parsed]
         stamped = np.flatnonzero(targets <= STAMP).tolist()
-        texts = self._texts(content, lines.widest, [*worded, *stamped, *self.whole])
+        whole = [column for column in self.whole if column < lines.widest]
+        texts = self._texts(content, lines.widest, [*worded, *stamped, *whole])
         for column in worded:
             values = _known(texts[column], lambda cell: irregular.value(column, cell))  # noqa: B023
             rows.numbers[targets[column], to] = np.array(values, dtype=np.float64)
@@ -198,7 +199,8 @@ class RowReader:
             missing = ("", *self.dialect.missing)
             doubtful = np.flatnonzero(stamps == MISSING_STAMP).tolist()
             readable[at[[i for i in doubtful if texts[column][i] not in missing]]] = False
-        for k, column in enumerate(self.whole, len(rows.stamps) - len(self.whole)):
+        for column in whole:
+            k = self.shape[1] - len(self.whole) + self.whole.index(column)
             rows.stamps[k, to] = _multiples(texts[column], self.decimals)
         return readable
 
@@ -210,8 +212,8 @@ class RowReader:
             return _by_column(self._parsed(content, width, columns, np.float64))
         except ValueError:  # of one of the columns
             kinds = self._parsed(content, width, columns, None).dtypes
-        numeric = [column for column in columns if kinds[column].kind in "biuf"]
-        return self._numbers(content, width, numeric)  # again, as integers have no -0.0
+        numeric = [column for column in columns if kinds[column].kind in "iuf"]  # read again: integers have no -0.0
+        return self._numbers(content, width, numeric) if len(numeric) < len(columns) else {}
 
     def _texts(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, list[str]]:
         """Return the cells of columns."""
