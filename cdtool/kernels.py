@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -24,9 +24,12 @@ import numpy.typing as npt
 # The signature of a read-only array (n,) of float64; writable arrays fit it too.
 READ_ONLY = "Array(float64, 1, 'C', readonly=True)"
 
+_BYTES = "Array(uint8, 1, 'C', readonly=True)"
+_FIELDS: dict[Any, str] = {float: "float64", npt.NDArray[np.float64]: READ_ONLY, npt.NDArray[np.uint8]: _BYTES}
+
 
 class Kernel:
-    """A function that numba compiles on its first call, for its signature or the types of this call.
+    """A function that numba compiles on its first call, for its signature only.
 
     A kernel may call another kernel by a name of its module, imported or not; that one is compiled as a part of it. In
     an `exact` kernel no product is fused with a sum: each operation is rounded, as in numpy.
@@ -35,14 +38,36 @@ class Kernel:
     def __init__(self, function: Callable[..., Any], signature: str, exact: bool) -> None:
         update_wrapper(self, function)
         self.function, self.signature = function, signature
-        self.compiled: Any = None  # until the first call
         self._options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": not exact and {"contract"}}
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function."""
-        if self.compiled is None:
-            self.compiled = self._from_cache(arguments)
         return self.compiled(*arguments)
+
+    @cached_property
+    def compiled(self) -> Any:
+        """Return the compiled function from the cache; compiled and stored there if it is missing or damaged."""
+        import numba
+
+        stamp = "_" + hashlib.sha256(b"".join(_taken(self))).hexdigest()[:12]
+        function, signature = self._linked(stamp), eval(self.signature, self.function.__globals__ | vars(numba.types))
+        try:
+            made: Any = numba.njit(cache=True, **self._options)(function)
+            try:
+                made.compile(signature)
+            except OSError:
+                raise
+            except Exception:  # what a crash or a full disk left in the cache, which numba reads without a check
+                for damaged in Path(made.stats.cache_path).glob(f"*{stamp}-*.nb?"):
+                    damaged.unlink()
+                made.compile(signature)
+        except (RuntimeError, OSError):
+            _tell_not_stored()
+            made = numba.njit(signature, **self._options)(function)
+        if made.stats.cache_misses:
+            _tell_first_use()
+        made.disable_compile()
+        return made
 
     @cached_property
     def part(self) -> Any:
@@ -65,37 +90,19 @@ class Kernel:
         linked.__module__, linked.__qualname__ = function.__module__, function.__qualname__ + stamp
         return linked
 
-    def _from_cache(self, arguments: tuple[Any, ...]) -> Any:
-        """Return the compiled function from the cache; compile it and store it there if it is missing or damaged."""
-        import numba
 
-        stamp = "_" + hashlib.sha256(b"".join(_taken(self))).hexdigest()[:12]
-        function, signature = self._linked(stamp), self.signature or tuple(map(numba.typeof, arguments))
-        try:
-            made: Any = numba.njit(cache=True, **self._options)(function)
-            try:
-                made.compile(signature)
-            except OSError:
-                raise
-            except Exception:  # what a crash or a full disk left in the cache, which numba reads without a check
-                for damaged in Path(made.stats.cache_path).glob(f"*{stamp}-*.nb?"):
-                    damaged.unlink()
-                made.compile(signature)
-        except (RuntimeError, OSError):
-            _tell_not_stored()
-            made = numba.njit(signature, **self._options)(function)
-        if made.stats.cache_misses:
-            _tell_first_use()
-        return made
+def kernel(signature: str, *, exact: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
+    """Mark a function as a kernel with the given numba signature.
 
-
-def kernel(signature: str = "", *, exact: bool = False) -> Callable[[Callable[..., Any]], Kernel]:
-    """Mark a function as a kernel with the given numba signature; if arguments are named tuples, without one.
-
-    The fields of such a tuple are numbers and arrays from `read_only`. `exact`: its numbers have the bits of the same
-    formula in numpy; the kernels that it calls must be exact too.
+    `exact`: its numbers have the bits of the same formula in numpy; the kernels that it calls must be exact too.
     """
     return lambda function: Kernel(function, signature, exact)
+
+
+def fields_of(kind: type) -> str:
+    """Return the signature of a `NamedTuple` of a kernel's module: numbers, and arrays from `read_only`."""
+    hints = get_type_hints(kind).values()
+    return f"BaseTuple.from_types([{', '.join(_FIELDS[hint] for hint in hints)}], {kind.__name__})"
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

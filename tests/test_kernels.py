@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cdtool import kernels
-from cdtool.kernels import kernel, read_only
+from cdtool.kernels import fields_of, kernel, read_only
 from cdtool.recording import FloatArray
 
 _PROJECT = Path(__file__).parents[1]
@@ -41,7 +41,7 @@ class _Scale(NamedTuple):
     values: FloatArray
 
 
-@kernel()
+@kernel(f"float64({fields_of(_Scale)}, int64)")
 def _scaled(scale: _Scale, k: int) -> float:
     return scale.factor * scale.values[k]
 
@@ -158,8 +158,9 @@ def test_a_cached_kernel_is_recompiled_when_what_it_imports_has_changed(outer, i
 
 def test_a_cached_kernel_is_recompiled_when_a_field_of_its_named_tuple_has_another_name(tmp_path):
     (tmp_path / "outer.py").write_text(
-        "from cdtool.kernels import kernel\nfrom inner import inner\n"
-        "@kernel()\ndef outer(x: inner):\n    return 2.0 * x.value\nprint(outer(inner(3.0, 5.0)))\n"
+        "from cdtool.kernels import fields_of, kernel\nfrom inner import inner\n"
+        "@kernel(f'float64({fields_of(inner)})')\ndef outer(x: inner):\n    return 2.0 * x.value\n"
+        "print(outer(inner(3.0, 5.0)))\n"
     )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(_PROJECT)}
     said = []

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cdtool.kernels import kernel
+from cdtool.kernels import READ_ONLY, fields_of, kernel
 from cdtool.recording import BoolArray, FloatArray
 
 # More grid steps than a number holds exactly: the nearest grid point is then the first.
@@ -40,7 +40,11 @@ def _between(value: float, after: float, slope: float, since: float, until: floa
     return float(result)
 
 
-@kernel(exact=True)
+@kernel(
+    f"void({READ_ONLY}, Array(bool, 1, 'C', readonly=True), boolean, {fields_of(LearnedColumn)}, float64, float64, "
+    "float64[::1], float64[::1])",
+    exact=True,
+)
 def look_up(  # noqa: PLR0913  a kernel: one loop, arrays and numbers one by one
     locations: FloatArray,
     running: BoolArray,

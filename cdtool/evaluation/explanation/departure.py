@@ -17,7 +17,7 @@ import numpy as np
 
 from cdtool.evaluation.explanation.movement import Movement
 from cdtool.evaluation.explanation.transient import Transient
-from cdtool.kernels import kernel
+from cdtool.kernels import READ_ONLY, fields_of, kernel
 from cdtool.recording import BoolArray, FloatArray, Recording, Series
 from cdtool.short_repr import short_repr
 from cdtool.thresholds.normal_motion import CHANNELS, POSITIONS, Comparison, NormalMotion, levels_of
@@ -346,7 +346,11 @@ def _mean(values: FloatArray) -> float:
     return float(np.add.reduce(known) / len(known)) if len(known) else math.nan
 
 
-@kernel(exact=True)
+@kernel(
+    f"UniTuple(int64, 3)({READ_ONLY}, {READ_ONLY}, Array(bool, 1, 'C', readonly=True), {fields_of(Limits)}, float64, "
+    "float64, float64, int64, int64, int64)",
+    exact=True,
+)
 def find_departure(  # noqa: C901, PLR0913  a kernel: one loop, arrays and numbers one by one
     raw: FloatArray,
     raw_level: FloatArray,
