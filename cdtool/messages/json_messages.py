@@ -105,7 +105,7 @@ class _Together:
 
 
 def _load(batch: Batch) -> tuple[Messages, dict[int, str]]:
-    """Return the objects, and the reasons of messages that are none, by row."""
+    """Return the objects, and the reasons why the other messages are not, by row."""
     messages: Messages = {}
     reasons: dict[int, str] = {}
     content, load = batch.data.data, json.loads

@@ -22,7 +22,7 @@ _SHORT = 1 << 12
 
 @dataclass(frozen=True)
 class Summary:
-    """The summary's records; `problem` is the reason why there are none, `verified`: their CRC matches."""
+    """The summary's records; `problem` is why they cannot be read, `verified`: their CRC matches."""
 
     footer: Footer | None = None
     verified: bool = False
