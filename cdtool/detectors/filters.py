@@ -141,15 +141,18 @@ def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
     """
     if len(time) <= 2:
         return np.zeros(lost.shape, dtype=bool)
+    result = np.zeros(lost.shape, dtype=bool)
+    lost = lost if lost.any() else lost[:, :1]  # then it is the same in every column
     now, usual = time[:, np.newaxis], usual_steps(time)
     period = np.concatenate((usual[1:2], usual[1:2], usual[1:-1]))[:, np.newaxis]
     since = now - np.maximum(_last_before(now, lost), time[0])
     ends_gap = (since > GAP_PERIODS * period) & ~lost
     if not ends_gap.any():
-        return ends_gap
+        return result
     until = now + np.minimum(since - period, longest)
     until = np.maximum.accumulate(np.where(ends_gap, until, -np.inf))
-    return np.asarray(now < until - 0.5 * period)
+    result[:] = now < until - 0.5 * period
+    return result
 
 
 def _last_before(now: FloatArray, lost: BoolArray) -> FloatArray:
