@@ -70,7 +70,7 @@ def no_cache_folder(monkeypatch):
 
 
 @pytest.mark.parametrize(("folder", "named"), [("/cache/numba", "in /cache/numba: "), ("", "the folder of cdtool or")])
-def test_a_cache_that_cannot_be_written_is_said_once_with_the_cure(no_cache_folder, monkeypatch, folder, named):
+def test_a_cache_that_cannot_be_written_is_reported_once(no_cache_folder, monkeypatch, folder, named):
     monkeypatch.setenv("NUMBA_CACHE_DIR", folder)
     first = kernel("float64(float64)")(lambda x: x + 1.0)
     second = kernel("float64(float64)")(lambda x: x + 2.0)
@@ -117,6 +117,11 @@ def test_a_damaged_cache_is_removed_and_compiled_again(left, kind, filled_cache,
 
 def test_three_first_starts_at_once_give_the_same(source, tmp_path):
     assert {process.communicate() for process in [_start(source, tmp_path) for _ in range(3)]} == {("3.0\n", "")}
+
+
+def test_with_numba_switched_off_a_kernel_runs_as_python(source, tmp_path):
+    switched_off = "import os\nos.environ['NUMBA_DISABLE_JIT'] = '1'\n"
+    assert _start(source, tmp_path, switched_off).communicate() == ("3.0\n", "")
 
 
 def test_a_folder_that_becomes_full_or_read_only_later_does_not_end_the_work(source, tmp_path):

@@ -15,8 +15,8 @@ from cdtool.recording import BoolArray, FloatArray
 
 # Time in which a Butterworth filter of cut-off 1 rad/s has settled to 5 %, as for the observers: 3 over its real part.
 _SETTLE = 3.0 * math.sqrt(2.0)
-# The samples whose cubics are computed at once, and the fewest that determine a cubic with one to spare.
-_BLOCK, _FEWEST = 1024, 5
+# The fewest samples that determine a cubic with one to spare.
+_FEWEST = 5
 # No gap is cut into more steps than this.
 _MOST_PIECES = 10_000
 
@@ -141,17 +141,23 @@ def unsettled(time: FloatArray, lost: BoolArray, longest: float) -> BoolArray:
     """
     if len(time) <= 2:
         return np.zeros(lost.shape, dtype=bool)
+    result = np.zeros(lost.shape, dtype=bool)
+    lost = lost if lost.any() else lost[:, :1]  # then it is the same in every column
     now, usual = time[:, np.newaxis], usual_steps(time)
     period = np.concatenate((usual[1:2], usual[1:2], usual[1:-1]))[:, np.newaxis]
     since = now - np.maximum(_last_before(now, lost), time[0])
+    ends_gap = (since > GAP_PERIODS * period) & ~lost
+    if not ends_gap.any():
+        return result
     until = now + np.minimum(since - period, longest)
-    until = np.maximum.accumulate(np.where((since > GAP_PERIODS * period) & ~lost, until, -np.inf))
-    return np.asarray(now < until - 0.5 * period)
+    until = np.maximum.accumulate(np.where(ends_gap, until, -np.inf))
+    result[:] = now < until - 0.5 * period
+    return result
 
 
 def _last_before(now: FloatArray, lost: BoolArray) -> FloatArray:
     """Return the time of the last sample before each one that is not lost (n, J); -inf without any."""
-    known = np.maximum.accumulate(np.where(lost, -np.inf, now))
+    known = np.maximum.accumulate(np.where(lost, -np.inf, now)) if lost.any() else np.broadcast_to(now, lost.shape)
     return np.concatenate((np.full((1, lost.shape[1]), -np.inf), known[:-1]))
 
 
@@ -216,22 +222,8 @@ def polynomial_rates(time: FloatArray, values: FloatArray, samples: int) -> tupl
     (0.58, 2.0)
     """
     first, second = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
-    if samples < _FEWEST:
-        return first, second
-    for begin in range(_FEWEST - 1, len(time), _BLOCK):
-        rows = np.arange(begin, min(begin + _BLOCK, len(time)))
-        window = rows[:, np.newaxis] - np.arange(samples)
-        inside, window = window >= 0, np.maximum(window, 0)
-        span = time[rows] - time[window[:, -1]]
-        x = (time[window] - time[rows, np.newaxis]) / span[:, np.newaxis]
-        powers = inside[..., np.newaxis] * x[..., np.newaxis] ** np.arange(4.0)
-        turned = powers.transpose(0, 2, 1)
-        weights = np.linalg.solve(turned @ powers, turned)[:, 1:3]
-        for joint in range(values.shape[1]):
-            with np.errstate(invalid="ignore"):  # an infinite value is as good as none
-                change = values[window, joint] - values[rows, joint, np.newaxis]
-                rates = (weights @ change[..., np.newaxis])[..., 0]
-            first[rows, joint], second[rows, joint] = rates[:, 0] / span, 2.0 * rates[:, 1] / span**2
+    if samples >= _FEWEST:
+        _fill_rates(time, np.ascontiguousarray(values), samples, np.empty(4 * values.shape[1]), first, second)
     return first, second
 
 
@@ -295,3 +287,49 @@ def _low_pass(  # noqa: PLR0913  a kernel: one loop, arrays one by one
                 last[j] = k
             filtered[k, j] = y
             rate[k, j] = slope
+
+
+@kernel(
+    f"void({READ_ONLY}, Array(float64, 2, 'C', readonly=True), int64, float64[::1], float64[:, ::1], float64[:, ::1])"
+)
+def _fill_rates(
+    time: FloatArray, values: FloatArray, samples: int, right: FloatArray, first: FloatArray, second: FloatArray
+) -> None:
+    """Solve the normal equations of a cubic in the scaled time x = (t - t_k) / span; definite, so without pivoting.
+
+    All joints share the matrix, which is eliminated once per sample. `right` (4 J,) is overwritten.
+    """
+    joints = values.shape[1]
+    for k in range(_FEWEST - 1, len(time)):
+        begin = max(k - samples + 1, 0)
+        span = time[k] - time[begin]
+        s1 = s2 = s3 = s4 = s5 = s6 = 0.0
+        right[:] = 0.0
+        for i in range(begin, k):
+            x = (time[i] - time[k]) / span
+            square = x * x
+            cube = square * x
+            s1, s2, s3 = s1 + x, s2 + square, s3 + cube
+            s4, s5, s6 = s4 + square * square, s5 + square * cube, s6 + cube * cube
+            for j in range(joints):
+                change = values[i, j] - values[k, j]
+                right[4 * j] += change
+                right[4 * j + 1] += x * change
+                right[4 * j + 2] += square * change
+                right[4 * j + 3] += cube * change
+        count = k + 1.0 - begin
+        f10, f20, f30 = s1 / count, s2 / count, s3 / count
+        m11, m12, m13 = s2 - f10 * s1, s3 - f10 * s2, s4 - f10 * s3
+        m22, m23, m33 = s4 - f20 * s2, s5 - f20 * s3, s6 - f30 * s3
+        f21, f31 = m12 / m11, m13 / m11
+        m22, m23, m33 = m22 - f21 * m12, m23 - f21 * m13, m33 - f31 * m13
+        f32 = m23 / m22
+        m33 -= f32 * m23
+        for j in range(joints):
+            r0 = right[4 * j]
+            r1, r2, r3 = right[4 * j + 1] - f10 * r0, right[4 * j + 2] - f20 * r0, right[4 * j + 3] - f30 * r0
+            r2, r3 = r2 - f21 * r1, r3 - f31 * r1
+            cubic = (r3 - f32 * r2) / m33
+            quadratic = (r2 - m23 * cubic) / m22
+            first[k, j] = (r1 - m12 * quadratic - m13 * cubic) / m11 / span
+            second[k, j] = 2.0 * quadratic / (span * span)

@@ -183,7 +183,7 @@ def relaxations(scaled: FloatArray, elapsed: FloatArray, by_modes: BoolArray) ->
 
 @kernel("void(float64[:, :, ::1], float64[:, ::1], float64[:, ::1])")
 def _relax(shares: FloatArray, targets: FloatArray, values: FloatArray) -> None:
-    """Fill `values` (n + 1, J) after its first row: each step covers its share of the way to its target."""
+    """Fill `values` (n + 1, J) after its first row: each step removes its share of the distance to its target."""
     steps, joints = targets.shape
     for k in range(steps):
         for i in range(joints):
