@@ -12,6 +12,7 @@ import math
 import struct
 import zlib
 from collections.abc import Container
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -45,27 +46,22 @@ def read_variables(path: Path) -> Variables:
     if not content.startswith(MAGIC) or len(content) < _HEADER:
         raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
     reader, variables = _Reader(path, ">" if content[126:128] == b"MI" else "<"), dict[str, Value]()
-    stored: list[tuple[int, int, memoryview]] = []
+    reader.check_unpacked(memoryview(content))
     at = _HEADER
-    try:
-        while at < len(content):
+    while at < len(content):
+        try:
             kind, element, end = reader.element(memoryview(content), at)
-            if kind == _COMPRESSED:
-                reader.check_unpacked(element)  # of all elements, before the first is decompressed
-            stored.append((at, kind, element))
-            at = end
-        for begin, kind, element in stored:
-            at = begin
             if kind == _COMPRESSED:
                 kind, element = reader.inflated(element)
             if kind == _MATRIX:
                 name, value = reader.array(element, 0)
                 if name:  # the objects of the file are stored in an array without a name
                     variables[_unique(name, variables)] = value
-    except (ValueError, struct.error, zlib.error, OverflowError) as fault:
-        raise RecordingError(
-            f"{path}: damaged at byte {at}: {fault}", "copy the file again or save it again"
-        ) from fault
+        except (ValueError, struct.error, zlib.error, OverflowError) as fault:
+            raise RecordingError(
+                f"{path}: damaged at byte {at}: {fault}", "copy the file again or save it again"
+            ) from fault
+        at = end
     return variables
 
 
@@ -74,7 +70,7 @@ class _Reader:
 
     def __init__(self, path: Path, order: str) -> None:
         self._path, self.order = path, order
-        self._count, self._values = ValueCount(path), 0
+        self._count = ValueCount(path)
 
     def element(self, content: memoryview, at: int) -> tuple[int, memoryview, int]:
         """Return kind, content and end of the element at a byte; raises ValueError if it extends beyond `content`."""
@@ -88,14 +84,19 @@ class _Reader:
             raise ValueError(f"an element declares {size} bytes, but only {len(content) - start} are left")
         return kind, content[start : start + size], start + size
 
-    def check_unpacked(self, packed: memoryview) -> None:
-        """Raise RecordingError if the compressed elements so far declare far more than a log of the file's size."""
-        head = zlib.decompressobj().decompress(packed, _HEAD)
-        values = struct.unpack_from(f"{self.order}II", head)[1] // 8
-        if len(head) == _HEAD and struct.unpack_from(f"{self.order}I", head, 16)[0] & 0xFF in _NUMERIC_CLASSES:
-            values = max(values, abs(math.prod(struct.unpack_from(f"{self.order}2i", head, 32))))
-        self._values += values
-        check_size(self._path, self._values)
+    def check_unpacked(self, content: memoryview) -> None:
+        """Raise RecordingError if the compressed elements together declare far more than a log of the file's size."""
+        values, at = 0, _HEADER
+        with suppress(ValueError, struct.error, zlib.error):  # damage is named with its byte later
+            while at < len(content):
+                kind, packed, at = self.element(content, at)
+                if kind != _COMPRESSED:
+                    continue
+                head, numbers = zlib.decompressobj().decompress(packed, _HEAD), 0
+                if len(head) == _HEAD and struct.unpack_from(f"{self.order}I", head, 16)[0] & 0xFF in _NUMERIC_CLASSES:
+                    numbers = abs(math.prod(struct.unpack_from(f"{self.order}2i", head, 32)))
+                values += max(struct.unpack_from(f"{self.order}II", head)[1] // 8, numbers)
+                check_size(self._path, values)
 
     def inflated(self, packed: memoryview) -> tuple[int, memoryview]:
         """Return kind and content of a compressed element, of which at most the declared size is decompressed."""
