@@ -12,6 +12,7 @@ import math
 import struct
 import zlib
 from collections.abc import Container
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,7 @@ def read_variables(path: Path) -> Variables:
     if not content.startswith(MAGIC) or len(content) < _HEADER:
         raise RecordingError(f"{path}: is not a MATLAB file of version 5 to 7", "save it with save(name, ..., '-v7')")
     reader, variables = _Reader(path, ">" if content[126:128] == b"MI" else "<"), dict[str, Value]()
+    reader.check_unpacked(memoryview(content))
     at = _HEADER
     while at < len(content):
         try:
@@ -68,7 +70,7 @@ class _Reader:
 
     def __init__(self, path: Path, order: str) -> None:
         self._path, self.order = path, order
-        self._count, self._values = ValueCount(path), 0
+        self._count = ValueCount(path)
 
     def element(self, content: memoryview, at: int) -> tuple[int, memoryview, int]:
         """Return kind, content and end of the element at a byte; raises ValueError if it extends beyond `content`."""
@@ -82,15 +84,24 @@ class _Reader:
             raise ValueError(f"an element declares {size} bytes, but only {len(content) - start} are left")
         return kind, content[start : start + size], start + size
 
+    def check_unpacked(self, content: memoryview) -> None:
+        """Raise RecordingError if the compressed elements together declare far more than a log of the file's size."""
+        values, at = 0, _HEADER
+        with suppress(ValueError, struct.error, zlib.error):  # damage is named with its byte later
+            while at < len(content):
+                kind, packed, at = self.element(content, at)
+                if kind != _COMPRESSED:
+                    continue
+                head, numbers = zlib.decompressobj().decompress(packed, _HEAD), 0
+                if len(head) == _HEAD and struct.unpack_from(f"{self.order}I", head, 16)[0] & 0xFF in _NUMERIC_CLASSES:
+                    numbers = abs(math.prod(struct.unpack_from(f"{self.order}2i", head, 32)))
+                values += max(struct.unpack_from(f"{self.order}II", head)[1] // 8, numbers)
+                check_size(self._path, values)
+
     def inflated(self, packed: memoryview) -> tuple[int, memoryview]:
         """Return kind and content of a compressed element, of which at most the declared size is decompressed."""
-        stream, head = zlib.decompressobj(), zlib.decompressobj().decompress(packed, _HEAD)
+        stream = zlib.decompressobj()
         kind, size = struct.unpack(f"{self.order}II", stream.decompress(packed, 8))
-        numbers = 0
-        if len(head) == _HEAD and struct.unpack_from(f"{self.order}I", head, 16)[0] & 0xFF in _NUMERIC_CLASSES:
-            numbers = abs(math.prod(struct.unpack_from(f"{self.order}2i", head, 32)))
-        self._values += max(size // 8, numbers)
-        check_size(self._path, self._values)
         content = stream.decompress(stream.unconsumed_tail, size) if size else b""
         if len(content) < size:
             raise ValueError(f"an element declares {size} bytes and has {len(content)}")
