@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -181,3 +182,9 @@ def test_a_float_that_signals_as_it_is_converted_is_read_without_a_warning():
     payload[1] = 1  # infinity with its last bit changed
     values = decoder.decode(batch_of([bytes(payload)]), fields_of("one_float")).fields[0].values
     assert np.isnan(values).all()
+
+
+def test_without_the_package_the_reason_names_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "google.protobuf", None)
+    with pytest.raises(UndecodableError, match=r"protobuf is not installed: pip install '\.\[protobuf\]'"):
+        decoder_for("protobuf", "protobuf", "pkg.Outer", b"")
