@@ -252,5 +252,5 @@ def test_a_file_of_lines_that_are_no_rows_is_refused(tmp_path, content):
     path = tmp_path / "log.csv.gz"
     path.write_bytes(gzip.compress(content))
     for read in (survey, lambda path: list(log_pieces(path))):
-        with pytest.raises(RecordingError, match="lines are no rows|of blank lines|unpacks to"):
+        with pytest.raises(RecordingError, match=r"lines are no rows|of blank lines|unpacks to"):
             read(path)
