@@ -8,6 +8,7 @@ largest error in standard errors, and the share that was refused.
 The robots are of four kinds with random parameters (tests/synthetic/strange_robots.py).
 
 python benchmarks/identification.py [AXES] [--jobs N]      # 40 axes: 20 s each
+python benchmarks/identification.py 20 --plain             # 20 gates with another law of friction: 4 min
 python benchmarks/identification.py 5 --robots             # 5 robots of each kind: 10 min
 """
 
@@ -21,6 +22,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
+from injection import LEARNED, identify_plain
 from timing import main, table
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,10 +36,12 @@ from tests.identification.robot_coverage import (  # noqa: E402
     gain_values_with_centre,
     table_of,
 )
-from tests.synthetic.foreign_axes import MOTIONS, drawn, errors_of, write_logs  # noqa: E402
+from tests.synthetic.foreign_axes import MOTIONS, drawn, errors_by_key, errors_of, write_logs  # noqa: E402
+from tests.synthetic.plain_gate import drawn_gate, strokes  # noqa: E402
 from tests.synthetic.strange_robots import KINDS  # noqa: E402
 
 AXES, LEAST_CONTAINED, MOST_REFUSED = 40, 0.9, 0.3
+PLAIN = "plain gates, 1 speed, one way"
 
 
 def errors_of_axis(number: int) -> tuple[str, dict[str, float]]:
@@ -47,11 +51,21 @@ def errors_of_axis(number: int) -> tuple[str, dict[str, float]]:
         return axis.motion, errors_of(axis, cdtool.identify(logs, machine))
 
 
-def coverage(axes: int, jobs: int) -> bool:
+def errors_of_plain_gate(number: int) -> tuple[str, dict[str, float]]:
+    gate = drawn_gate(number)
+    truth = {"machine.load_mass": gate.leaf_mass, "model.friction.static": gate.static}
+    if not gate.stiffening:
+        truth["model.drive.stiffness"] = gate.stiffness
+    with tempfile.TemporaryDirectory() as folder:
+        done = identify_plain(gate, strokes(gate, number, range(LEARNED)).recordings, Path(folder))
+    return PLAIN, errors_by_key(truth, done)
+
+
+def coverage(axes: int, jobs: int, is_plain: bool) -> bool:
     with ProcessPoolExecutor(jobs) as pool:
-        done = list(pool.map(errors_of_axis, range(axes)))
+        done = list(pool.map(errors_of_plain_gate if is_plain else errors_of_axis, range(axes)))
     met = True
-    for motion in MOTIONS:
+    for motion in [PLAIN] if is_plain else MOTIONS:
         errors: dict[str, list[float]] = {}
         for one in (item for moved, item in done if moved == motion):
             for key, error in one.items():
@@ -92,8 +106,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("axes", type=int, nargs="?", default=AXES)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--plain", action="store_true")
     parser.add_argument("--robots", action="store_true")
     asked = parser.parse_args()
     if asked.robots:
         main("printed errors of identified robots", partial(robots, asked.axes))
-    main("printed errors of an identified axis", partial(coverage, asked.axes, asked.jobs))
+    main("printed errors of an identified axis", partial(coverage, asked.axes, asked.jobs, asked.plain))

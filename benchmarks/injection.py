@@ -58,6 +58,7 @@ from cdtool.simulation.gate_model import Impact, simulate_gate_run  # noqa: E402
 from cdtool.simulation.gate_recordings import as_recording  # noqa: E402
 from cdtool.tables import Table  # noqa: E402
 from cdtool.thresholds.signature import Signature  # noqa: E402
+from cdtool.workflows.identification.identifying import IdentifiedMachine  # noqa: E402
 from tests.axis_model.gate_as_model import gate_as_model, soft_obstacle, stiff_obstacle  # noqa: E402
 from tests.synthetic import plain_gate  # noqa: E402
 from tests.synthetic.gate_runs import GATE, ON_LOAD_SIDE, free_recording, without_references  # noqa: E402
@@ -257,19 +258,23 @@ def plain_machine(gate: plain_gate.PlainGate) -> str:
     return "\n".join((*lines, f"accelerometer_hz = {gate.accelerometer_hz}\n"))
 
 
+def identify_plain(gate: plain_gate.PlainGate, learned: Sequence[Recording], folder: Path) -> IdentifiedMachine:
+    """The result of `cdtool identify` for the logs of a plain gate; it writes `identified.toml`."""
+    of_gate = plain_columns(gate)
+    logs = [folder / f"{number}.csv" for number in range(len(learned))]
+    for log, recording in zip(logs, learned, strict=True):
+        columns = [factor * recording[name].values[:, 0] for name, (_, factor) in of_gate.items()]
+        rows = np.column_stack((recording["torque"].time, *columns))
+        np.savetxt(log, rows, "%.9g", ",", header=f"time,{','.join(of_gate)}", comments="")
+    (folder / "machine.toml").write_text(plain_machine(gate), encoding="utf-8")
+    return cdtool.identify(logs, folder / "machine.toml", folder / "identified.toml")
+
+
 def identified_plain(gate: plain_gate.PlainGate, learned: Sequence[Recording]) -> AxisModel:
     """The model that `cdtool identify` writes from the logs of a plain gate."""
-    of_gate = plain_columns(gate)
     with tempfile.TemporaryDirectory() as folder:
-        logs = [Path(folder) / f"{number}.csv" for number in range(len(learned))]
-        for log, recording in zip(logs, learned, strict=True):
-            columns = [factor * recording[name].values[:, 0] for name, (_, factor) in of_gate.items()]
-            rows = np.column_stack((recording["torque"].time, *columns))
-            np.savetxt(log, rows, "%.9g", ",", header=f"time,{','.join(of_gate)}", comments="")
-        given, written = Path(folder) / "machine.toml", Path(folder) / "identified.toml"
-        given.write_text(plain_machine(gate), encoding="utf-8")
-        cdtool.identify(logs, given, written)
-        machine_file = read_machine_file(written)
+        identify_plain(gate, learned, Path(folder))
+        machine_file = read_machine_file(Path(folder) / "identified.toml")
         assert isinstance(machine_file.machine, LinearAxis)
         return axis_model(machine_file.machine, machine_file.model)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 
@@ -12,12 +12,12 @@ import numpy as np
 
 from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
+from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import BagDamaged, MessagesUnreadable
 from cdtool.formats.container_checks import check_size
 from cdtool.formats.source import Source, TopicDetails
-from cdtool.messages.batch import Batch
-from cdtool.messages.stream import Stream
+from cdtool.messages.batch import Batch, Stream
+from cdtool.messages.decoders import Decoders
 from cdtool.messages.topic import wanted_columns, wanted_topics
 from cdtool.messages.topic_columns import TopicColumns
 from cdtool.messages.topic_survey import TopicSurvey
@@ -77,6 +77,17 @@ class Bag(ABC):
         columns, findings, self.origin = wanted_columns(self.path, wanted, topics, logged, self.origin)
         return columns, self._losses() + self.findings + findings
 
+    def element_names(self, topic: str) -> tuple[str, ...]:
+        """Return the names of array elements in a topic's first decodable message; () if it has none."""
+        decoders = Decoders()
+        batches = self.batches(topic.__eq__)
+        with closing(batches), suppress(RecordingError):  # the survey reports the problem
+            for stream, batch in batches:
+                names = decoders.element_names(stream, batch)
+                if names is not None:
+                    return names
+        return ()
+
     def batches(self, is_wanted: IsWanted) -> Generator[tuple[Stream, Batch], None, None]:
         """Yield the messages of the wanted topics, batch by batch.
 
@@ -99,11 +110,15 @@ class Bag(ABC):
 
     def _losses(self) -> list[Finding]:
         unreadable = [
-            Finding(MessagesUnreadable(self.topics[topic][1] - count, self.topics[topic][1], self.end), topic, "loss")
+            Finding(
+                "messages_unreadable",
+                topic,
+                {"count": self.topics[topic][1] - count, "messages": self.topics[topic][1], "reason": self.end},
+            )
             for topic, count in self.read.items()
             if count < self.topics[topic][1]
         ]
-        return unreadable or ([Finding(BagDamaged(self.end), severity="loss")] if self.end else [])
+        return unreadable or ([Finding("bag_damaged", "", {"reason": self.end})] if self.end else [])
 
 
 def one_line(fault: BaseException) -> str:

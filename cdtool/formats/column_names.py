@@ -12,7 +12,6 @@ from typing import Literal
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError, nearest
 from cdtool.findings import Finding
-from cdtool.findings.channels import AbsentTruth
 from cdtool.formats.source import Source
 from cdtool.recording import GROUND_TRUTH
 
@@ -108,7 +107,10 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
     resolved, absent = _resolved(source.path, plain, names)
     resolved = replace(resolved, time=channels.time) if own else resolved
     what: Literal["column", "topic"] = "topic" if channels.topics else "column"
-    notes = [Finding(AbsentTruth(what, cell.described, _similar(cell, names)), cell.channel, "note") for cell in absent]
+    notes = [
+        Finding("absent_truth", cell.channel, {"what": what, "name": cell.described, "similar": _similar(cell, names)})
+        for cell in absent
+    ]
     return replace(source, findings=(*source.findings, *notes)), resolved
 
 

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.formats.bag_messages import Bag, IsWanted, one_line
-from cdtool.formats.container_checks import library, one_line_errors
+from cdtool.formats.container_checks import one_line_errors
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
-from cdtool.messages.stream import Stream
+from cdtool.messages.batch import Stream
 
 _BAG = b"#ROSBAG V2.0"
 
@@ -45,18 +45,10 @@ class Rosbag:
         return bag.source(*(yield from bag.pieces()))
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
-        """Return the `name` list of a topic's first message; empty if the message has no such list."""
-        from rosbags.highlevel import AnyReader
-
-        with one_line_errors(path, "a ROS bag"), AnyReader([Path(os.fspath(path))]) as reader:
-            chosen = [connection for connection in reader.connections if connection.topic == topic]
-            for connection, _, raw in reader.messages(connections=chosen):
-                names = getattr(reader.deserialize(raw, connection.msgtype), "name", ())
-                return tuple(map(str, names)) if isinstance(names, list) else ()
-        return ()
+        """Return the names of array elements in a topic's first decodable message; () if it has none."""
+        return self._bag(path).element_names(topic)
 
     def _bag(self, path: Path) -> _Ros1Bag:
-        library("rosbags", "rosbag", path)
         if not self.sniff(path):
             raise RecordingError(f"{path}: is not a ROS bag", "see cdtool list formats")
         return _Ros1Bag(path, self.name)

@@ -24,15 +24,12 @@ from typing import Any, ClassVar
 from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.containers import BagNotClosed, DamagedRows, StandardDefinitions
 from cdtool.formats.bag_messages import Bag, IsWanted, one_line
 from cdtool.formats.container_checks import check_size, one_line_errors
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
-from cdtool.messages.columns import UndecodableError
-from cdtool.messages.decoders import Decoders
+from cdtool.messages.batch import Stream
 from cdtool.messages.schemas import DEFINITIONS
-from cdtool.messages.stream import Stream
 from cdtool.remote.remote_path import location
 
 _SQLITE, _ZSTD = b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
@@ -83,16 +80,8 @@ class Rosbag2:
         return bag.source(*(yield from bag.pieces()))
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
-        """Return the `name` list of a topic's first decodable message; empty if the message has no such list."""
-        decoders = Decoders()
-        batches = self._bag(path).batches(topic.__eq__)
-        with closing(batches), suppress(RecordingError):  # the survey reports the problem
-            for stream, batch in batches:
-                decoder = decoders.of(stream, batch)
-                if decoder is not None:
-                    with suppress(UndecodableError):
-                        return decoder.element_names(batch.first(1))
-        return ()
+        """Return the names of array elements in a topic's first decodable message; () if it has none."""
+        return self._bag(path).element_names(topic)
 
     def _bag(self, path: Path) -> _Ros2Bag:
         if not self.sniff(path):
@@ -127,7 +116,7 @@ class _Ros2Bag(Bag):
                 else:
                     yield streams[topic], time, content
             if damaged:
-                self.findings.append(Finding(DamagedRows(damaged), severity="loss"))
+                self.findings.append(Finding("damaged_rows", "", {"count": damaged}))
             if not is_counted:
                 self.topics = {name: (kind, self.read.get(name, 0)) for name, (kind, _) in self.topics.items()}
 
@@ -160,7 +149,7 @@ class _Ros2Bag(Bag):
                 with closing(sqlite3.connect(copy)) as base:  # applies the journal
                     base.execute("SELECT count(*) FROM sqlite_master").fetchone()
                     base.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
-                self.findings.append(Finding(BagNotClosed(journals[0].name)))
+                self.findings.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
             yield copy
 
     def _count(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> bool:
@@ -198,7 +187,7 @@ class _Ros2Bag(Bag):
                     standard[kind] = None
             streams[topic] = Stream(number, name, encoding, (definition[0], kind, definition[1].encode()))
         if standard:
-            self.findings.append(Finding(StandardDefinitions(tuple(standard)), severity="note"))
+            self.findings.append(Finding("standard_definitions", "", {"types": tuple(standard)}))
         return streams
 
 
@@ -251,11 +240,11 @@ def _standard_definition(kind: str) -> str:
     name = kind if rest.startswith("msg/") else f"{package}/msg/{rest}"
     if name in DEFINITIONS:
         return DEFINITIONS[name].text
-    try:
-        from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys import Stores, get_typestore
 
+    try:
         text, _ = get_typestore(Stores.ROS2_HUMBLE).generate_msgdef(name, ros_version=2)
-    except Exception:  # rosbags is not installed, or does not know the type
+    except Exception:  # the package does not know the type
         return ""
     return str(text)
 

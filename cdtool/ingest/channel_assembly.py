@@ -22,17 +22,7 @@ from cdtool.clock.lower_rate import sampled_rows
 from cdtool.clock.stamps import gaps_of, missing_findings
 from cdtool.dynamics import Machine
 from cdtool.errors import ConfigurationError, RecordingError
-from cdtool.findings import Finding, Severity
-from cdtool.findings.channels import (
-    ImpossibleValues,
-    InfiniteValues,
-    MaskedValues,
-    SaturatedValues,
-    StuckChannel,
-    UnitContradicted,
-)
-from cdtool.findings.clocks import ClocksApart, LowerRate
-from cdtool.findings.plausibility import Confirmed
+from cdtool.findings import Finding
 from cdtool.formats.source import Source
 from cdtool.ingest.header_units import check_clock_unit, guessed_units, time_unit_findings, unit_findings
 from cdtool.kernels import READ_ONLY, kernel
@@ -47,12 +37,8 @@ _READ_AT_ONCE = 1 << 20
 # A channel of a lower rate has empty cells in these first rows of a table.
 _FIRST_ROWS = 1 << 12
 Counts = npt.NDArray[np.int64]
-# The kinds of masked values, in the order of convert_to_si, with their severity.
-_MASKED: tuple[tuple[type[MaskedValues], Severity], ...] = (
-    (InfiniteValues, "loss"),
-    (SaturatedValues, "warning"),
-    (ImpossibleValues, "loss"),
-)
+# The kinds of masked values, in the order of convert_to_si.
+_MASKED = ("infinite_values", "saturated_values", "impossible_values")
 
 
 def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, digest: str = "") -> Recording:
@@ -64,7 +50,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
     work = _Assembly(source, channels)
     series = {}
     findings = (*source.findings, *work.findings)
-    doubted = {item.channel for item in findings if isinstance(item.fact, UnitContradicted) and item.severity == "loss"}
+    doubted = {item.channel for item in findings if item.kind == "unit_contradicted" and item.severity == "loss"}
     for number, item in enumerate(channels.sources):
         made = work.series(item)
         if item.channel not in doubted:
@@ -91,7 +77,7 @@ def assemble_recording(source: Source, channels: ChannelMap, machine: Machine, d
         findings=(
             *source.findings,
             *work.findings,
-            *(Finding(Confirmed(), item.channel, "note") for item in channels.sources if item.confirmed),
+            *(Finding("confirmed", item.channel) for item in channels.sources if item.confirmed),
             *stuck_findings({name: _is_constant(series[name]) for name in MEASURED if name in series}, channels.joints),
             *disjoint_clock_findings(
                 {name: (float(item.time[0]), float(item.time[-1])) for name, item in series.items()}
@@ -193,7 +179,7 @@ class _Assembly:
         time = clock.time[rows]
         own = Series(time, np.zeros(len(time)), "s")
         share = clock.period / own.period if own.period > 0.0 else np.nan
-        self.findings.append(Finding(LowerRate(1.0 / own.period, share), channel, "note"))
+        self.findings.append(Finding("lower_rate", channel, {"rate": 1.0 / own.period, "share": share}))
         return values[rows], own, tuple(gaps_of(own.time, own.period, "time"))
 
     def _topic_clock(self, stamps: FloatArray, item: ChannelSource) -> _TopicClock:
@@ -283,14 +269,14 @@ def masked_findings(masked: Counts, item: ChannelSource, joints: Sequence[str]) 
     """Return the findings on masked values by joint, or by axis of a force; `masked` (3, J): as of convert_to_si."""
     if item.axes:
         return [
-            Finding(kind(count, ""), f"{item.channel} {item.axes[j]}", severity)
-            for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
+            Finding(kind, f"{item.channel} {item.axes[j]}", {"count": count, "joint": ""})
+            for kind, counts in zip(_MASKED, masked.tolist(), strict=True)
             for j, count in enumerate(counts)
             if count
         ]
     return [
-        Finding(kind(count, joint_name(joints, j, len(counts))), item.channel, severity)
-        for (kind, severity), counts in zip(_MASKED, masked.tolist(), strict=True)
+        Finding(kind, item.channel, {"count": count, "joint": joint_name(joints, j, len(counts))})
+        for kind, counts in zip(_MASKED, masked.tolist(), strict=True)
         for j, count in enumerate(counts)
         if count
     ]
@@ -351,7 +337,9 @@ def stuck_findings(constant: Mapping[str, Sequence[bool]], joints: Sequence[str]
         others = [constant[other] for other in ("speed", "position") if other in constant and other != name]
         for joint, is_constant in enumerate(constant[name]):
             if is_constant and not all(other[joint] for other in others):
-                findings.append(Finding(StuckChannel(joint_name(joints, joint, len(constant[name]))), name))
+                findings.append(
+                    Finding("stuck_channel", name, {"joint": joint_name(joints, joint, len(constant[name]))})
+                )
     return findings
 
 
@@ -368,7 +356,7 @@ def disjoint_clock_findings(first_and_last: Mapping[str, tuple[float, float]]) -
     for start, end, name in spans[1:]:
         distance = start - latest
         if distance > (longest if {name, before} & set(UNITLESS) else 0.0):
-            findings.append(Finding(ClocksApart(distance, before), name))
+            findings.append(Finding("clocks_apart", name, {"distance": distance, "before": before}))
         if end > latest:
             latest, before = end, name
     return findings

@@ -14,7 +14,6 @@ from cdtool.clock.stamps import EDGE_ROWS, ClockCleaner, count_leading_strays, g
 from cdtool.columns import Column
 from cdtool.distribution import Distribution
 from cdtool.findings import Finding
-from cdtool.findings.clocks import AssumedClock, HeaderUnitImplausible
 from cdtool.formats.source import Source
 from cdtool.ingest.log_statistics import ClockStatistics, ColumnStatistics
 from cdtool.recording import FloatArray
@@ -137,7 +136,7 @@ def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], 
     if known is not None and stated and contradicted_by_epoch(start, known.factor):
         stated = False
         readings = both_readings(start, known.factor, str(column.unit), epoch)
-        wrong = (Finding(HeaderUnitImplausible(readings), column.name),)
+        wrong = (Finding("header_unit_implausible", column.name, {"readings": readings}),)
     if stated:
         unit, evidence = str(column.unit), "header"
     elif epoch:
@@ -149,7 +148,7 @@ def _describe(column: Column, first_row: int, step: float, stamps: Callable[[], 
     factor = _DAY if unit == "days" else found.factor if (found := find_unit(unit)) else 1.0
     # An epoch is subtracted before scaling, so that no digit is lost.
     origin = start if epoch or unit == "days" else 0.0
-    assumed = Finding(AssumedClock(unit, evidence, start, step), column.name, "note")
+    assumed = Finding("assumed_clock", column.name, {"unit": unit, "evidence": evidence, "start": start, "step": step})
     clock = TableClock(column.name, origin, factor, ClockStatistics(), (assumed, *wrong))
     return _with_findings(clock, first_row, stamps)
 

@@ -16,8 +16,6 @@ from cdtool.clock import GAP_PERIODS
 from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.messages import ArrayLengthsDiffer
-from cdtool.findings.parts import PartCompressed, PartGap, PartMissing, PartOfOtherKind, PartsOverlap, PartUnreadable
 from cdtool.formats.source import Source, TopicDetails
 from cdtool.recording import GROUND_TRUTH, Recording, Series
 from cdtool.remote.remote_path import location
@@ -42,8 +40,8 @@ def missing_part_findings(folder: Path, parts: Sequence[Path]) -> list[Finding]:
         if name in read or plain in read:
             continue
         exists = (folder / name).exists()
-        kind = PartMissing if not exists else PartCompressed if name != plain else PartOfOtherKind
-        findings.append(Finding(kind(name, _METADATA), severity="loss"))
+        kind = "part_missing" if not exists else "part_compressed" if name != plain else "part_of_other_kind"
+        findings.append(Finding(kind, "", {"part": name, "metadata": _METADATA}))
     return findings
 
 
@@ -52,7 +50,7 @@ def loss_findings(folder: Path, parts: Sequence[Path], unread: Mapping[Path, Rec
     findings = missing_part_findings(folder, parts)
     for part, fault in unread.items():
         reason = fault.message.removeprefix(f"{part}: ")
-        findings.append(Finding(PartUnreadable(part.name, reason), severity="loss"))
+        findings.append(Finding("part_unreadable", "", {"part": part.name, "reason": reason}))
     return tuple(findings)
 
 
@@ -76,14 +74,14 @@ def join_sources(
         containing = [(source, spans.get(name)) for source, spans in parts if name in source.columns]
         widths = sorted({source.columns[name].values.shape[1:] for source, _ in containing})
         if len(widths) > 1:
-            lengths = ArrayLengthsDiffer(tuple(width[0] if width else 1 for width in widths))
-            findings.append(Finding(lengths, name, "note"))
+            lengths = {"lengths": tuple(width[0] if width else 1 for width in widths)}
+            findings.append(Finding("array_lengths_differ", name, lengths))
             continue
         columns[name] = containing[0][0].columns[name]
         for (_, before), (source, span) in pairwise(containing):
             if before and span and span[0] < before[1]:
                 late.setdefault(source.path, name)
-    findings += [Finding(PartsOverlap(path.name, name)) for path, name in late.items()]
+    findings += [Finding("parts_overlap", "", {"part": path.name, "column": name}) for path, name in late.items()]
     first, names = sources[0], tuple(columns)
     details, topics = join_details(sources), join_topics(sources)
     return Source(folder, first.format, columns, first.origin, tuple(findings), details, names=names, topics=topics)
@@ -159,7 +157,7 @@ def part_gap_findings(parts: Sequence[PartSpan]) -> Iterator[Finding]:
                 gaps[name] = gap
         if gaps:
             paused = () if len(gaps) == len(channels) else tuple(gaps)
-            yield Finding(PartGap(min(gaps.values()), paused), file=Path(after.path).name)
+            yield Finding("part_gap", "", {"gap": min(gaps.values()), "channels": paused}, file=Path(after.path).name)
 
 
 def join_recordings(parts: Sequence[Recording], name: str) -> Recording:

@@ -18,8 +18,6 @@ from cdtool.channels import ChannelMap, ChannelSource
 from cdtool.columns import Column
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.channels import AbsentTruth
-from cdtool.findings.runs import ReturningIds, SamplesOutsideRuns
 from cdtool.formats.source import Source, in_words
 from cdtool.ingest.channel_assembly import assemble_recording, file_digest
 from cdtool.ingest.parts import join_details, join_digests, join_topics, missing_part_findings, with_file_name
@@ -130,7 +128,7 @@ def read_runs(log: Path, machine_file: MachineFile, cut: RunCut) -> LogRuns:
     findings = [*whole.source.findings, *whole.outside()]
     later = tuple(name for (run, name) in chosen if segments.number[run])
     if later and cut.by == "column":
-        findings.append(Finding(ReturningIds(later, cut.column)))
+        findings.append(Finding("returning_ids", "", {"names": later, "column": cut.column}))
     short = np.flatnonzero(lengths < FEWEST_SAMPLES)
     if pattern:
         fits = [_fits(name, pattern) for name in segments.names(short)]
@@ -328,7 +326,10 @@ class _CutLog:
             for item in self.channels.sources
             if item.channel in GROUND_TRUTH and not all(len(columns[key].values) for key in item.keys)
         ]
-        notes = [Finding(AbsentTruth("column", item.described, ""), item.channel, "note") for item in absent]
+        notes = [
+            Finding("absent_truth", item.channel, {"what": "column", "name": item.described, "similar": ""})
+            for item in absent
+        ]
         sources = tuple(item for item in self.channels.sources if item not in absent)
         return replace(self.channels, sources=sources), notes
 
@@ -338,8 +339,8 @@ class _CutLog:
             return
         for clock, rows in self.rows.items():
             if rows.outside:
-                fact = SamplesOutsideRuns(rows.outside, rows.total, self.cut.column)
-                yield Finding(fact, self._channel(clock) if self.channels.topics else "")
+                fact = {"count": rows.outside, "total": rows.total, "column": self.cut.column}
+                yield Finding("samples_outside_runs", self._channel(clock) if self.channels.topics else "", fact)
 
     def _channel(self, clock: int) -> str:
         of = (item for item in self.channels.sources if id(self.source.columns[item.keys[0]].time) == clock)

@@ -11,7 +11,6 @@ from cdtool.clock import previous_value
 from cdtool.dynamics import JointEquation, Pendulum
 from cdtool.errors import ConfigurationError, RecordingError, nearest
 from cdtool.findings import Finding
-from cdtool.findings.channels import LinkAccelerations
 from cdtool.machines.coupled import CoupledMachine
 from cdtool.recording import FloatArray, Recording, Series
 from cdtool.tables import Table
@@ -168,7 +167,7 @@ class PlanarArm(CoupledMachine):
                 "give the sensors' distances from their joints [m], or accelerations in rad/s2",
             )
         channels = {**referred.channels, "acceleration": self.link_acceleration(referred)}
-        findings = (*referred.findings, Finding(LinkAccelerations(), "acceleration", "note"))
+        findings = (*referred.findings, Finding("link_accelerations", "acceleration"))
         return replace(referred, channels=channels, findings=findings)
 
     def link_acceleration(self, recording: Recording) -> Series:

@@ -9,13 +9,10 @@ import numpy.typing as npt
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.messages import UndecodableMessages
-from cdtool.messages.batch import Batch
-from cdtool.messages.columns import DecodedBatch, Decoder, UndecodableError, decoder_for
-from cdtool.messages.columns.decoded_batch import DECODED
-from cdtool.messages.fast_path import RowLayout
-from cdtool.messages.fields import Field, FieldMissingError, missing_field
-from cdtool.messages.stream import Stream
+from cdtool.messages.batch import Batch, Stream
+from cdtool.messages.decoded_batch import DECODED, DecodedBatch, Decoder, UndecodableError
+from cdtool.messages.encodings import decoder_for
+from cdtool.messages.fields import Field, element_names
 
 
 class Decoders:
@@ -43,39 +40,47 @@ class Decoders:
             return None
         return decoder
 
-    def row_layout(
-        self, channel: int, wanted: Sequence[Field], joints: Sequence[str], stamps: bool
-    ) -> RowLayout | None:
-        """Return the row layout of further messages of a channel (by id); None if they must be decoded in full."""
-        decoder = self._by_channel.get(channel)
-        if decoder is None or isinstance(decoder, UndecodableError):
-            return None
-        return decoder.row_layout(wanted, joints, stamps)
-
     def decode(
-        self, where: str, stream: Stream, batch: Batch, wanted: Sequence[Field], joints: Sequence[str], stamps: bool
-    ) -> tuple[Decoder, DecodedBatch] | None:
-        """Return the decoder and the decoded batch, with the time stamps of the headers if `stamps`.
+        self, stream: Stream, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
+    ) -> DecodedBatch | None:
+        """Return the decoded batch, with the time stamps of the headers if `stamps`; None if it cannot be decoded."""
+        decoder = self._by_channel[stream.id]
+        if isinstance(decoder, UndecodableError):
+            return None
+        try:
+            return decoder.decode(batch, wanted, joints, stamps)
+        except UndecodableError as fault:  # for a reason that only its messages reveal
+            self._give_up(stream, batch, fault)
+            return None
 
-        If the batch cannot be decoded, its messages are counted as failed and the result is None. Raises
-        RecordingError, with `where` as its subject, if the message definition does not have a field.
-        """
+    def fields(self, stream: Stream, batch: Batch) -> list[str]:
+        """Return the fields of a channel whose `decoder` exists; if they are too many, it can no more be decoded."""
+        decoder = self._by_channel[stream.id]
+        if isinstance(decoder, UndecodableError):
+            return []
+        try:
+            return decoder.fields(batch)
+        except UndecodableError as fault:
+            self._give_up(stream, batch, fault)
+            return []
+
+    def _give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
+        self._by_channel[stream.id] = fault
+        self._fail(len(batch), str(fault))
+
+    def element_names(self, stream: Stream, batch: Batch) -> tuple[str, ...] | None:
+        """Return the texts of the array `name` of the first decodable message; None if no message is decodable."""
         decoder = self.of(stream, batch)
         if decoder is None:
             return None
-        try:
-            decoded = decoder.decode(batch, wanted, joints, stamps)
-        except FieldMissingError as fault:
-            raise missing_field(where, _absent(decoder, batch, wanted, joints), fault) from fault
-        except UndecodableError as fault:
-            self.give_up(stream, batch, fault)
-            return None
-        return decoder, decoded
-
-    def give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
-        """Mark a channel as undecodable, for a reason that only the wanted fields reveal, and count its batch."""
-        self._by_channel[stream.id] = fault
-        self._fail(len(batch), str(fault))
+        for row in range(len(batch)):
+            try:
+                contents = decoder.contents(batch.rows(slice(row, row + 1)))
+            except UndecodableError:
+                return None
+            if contents:
+                return tuple(element_names(contents[0]))
+        return None
 
     def keep(self, decoded: DecodedBatch) -> npt.NDArray[np.bool_]:
         """Return which messages of a batch are decoded (n,), and count both kinds."""
@@ -92,8 +97,8 @@ class Decoders:
 
     def failure(self, topic: str) -> list[Finding]:
         """Return the finding on messages that could not be decoded, if there are any."""
-        fact = UndecodableMessages(self.failed, self.failed + self.decoded, self.reason)
-        return [Finding(fact, topic, "loss")] if self.failed else []
+        fact = {"count": self.failed, "messages": self.failed + self.decoded, "reason": self.reason}
+        return [Finding("undecodable_messages", topic, fact)] if self.failed else []
 
     def checked_failure(self, path: str, topic: str) -> list[Finding]:
         """Return the same as `failure`; raises RecordingError if no message could be decoded."""
@@ -103,13 +108,3 @@ class Decoders:
                 "record the topic as JSON, ROS 2 CDR, ROS 1 or protobuf, with its message definition",
             )
         return self.failure(topic)
-
-
-def _absent(decoder: Decoder, batch: Batch, wanted: Sequence[Field], joints: Sequence[str]) -> str:
-    """Return the first field that the schema does not have."""
-    for field in wanted:
-        try:
-            decoder.decode(batch.first(1), [field], joints)
-        except FieldMissingError:
-            return field.text
-    return wanted[0].text

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.findings import Finding
-from cdtool.findings.clocks import OutOfOrder
 
 Stamps = npt.NDArray[np.uint64] | npt.NDArray[np.int64]
 
@@ -73,5 +72,11 @@ class StampOrder:
         period = (self._highest - self._lowest) / max(1, self._count - 1)
         is_set_back = self._largest_step_back > _PERIODS * period
         step_back = self._largest_step_back / 1e9
-        fact = OutOfOrder(self._late, self._count, step_back, is_set_back, self._latest_message)
-        return [Finding(fact, topic, "warning" if is_set_back else "note")]
+        fact = {
+            "count": self._late,
+            "messages": self._count,
+            "back": step_back,
+            "set_back": is_set_back,
+            "worst": self._latest_message,
+        }
+        return [Finding("out_of_order", topic, fact, "warning" if is_set_back else "note")]

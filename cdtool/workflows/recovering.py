@@ -15,8 +15,8 @@ from cdtool.remote.remote_path import is_remote
 from cdtool.remote.uploads import check_place
 
 if TYPE_CHECKING:
-    from cdtool.formats.mcap.container.clean_file import CleanFile
-    from cdtool.formats.mcap.container.log import Log
+    from cdtool.formats.mcap.clean_file import CleanFile
+    from cdtool.formats.mcap.log import Log
     from cdtool.workflows.execution.workers import Progress
 
 _PIECE = 1 << 20
@@ -86,7 +86,7 @@ def recover(
     (False, True)
     """
     from cdtool.formats.mcap import Mcap
-    from cdtool.formats.mcap.container.log import Log
+    from cdtool.formats.mcap.log import Log
 
     _check_names(source, output, force)
     if not Mcap().sniff(source) and source.suffix.lower() != ".mcap":
@@ -113,9 +113,10 @@ def recover(
 def _write(
     source: Path, file: IO[bytes], result: Recovered, all_covered: bool, progress: Progress | None = None
 ) -> None:
-    from cdtool.formats.mcap.container.clean_file import CleanFile
-    from cdtool.formats.mcap.container.log import Log
-    from cdtool.formats.mcap.container.records import Metadata
+    from mcap.records import Metadata
+
+    from cdtool.formats.mcap.clean_file import CleanFile
+    from cdtool.formats.mcap.log import Log
 
     log = Log(source, strict=False)
     clean = CleanFile(file, log.profile)
@@ -144,18 +145,18 @@ def _write(
 
 def _copy_extras(log: Log, clean: CleanFile) -> None:
     """Copy intact attachments and metadata; their checksums are kept, missing ones stay missing."""
-    from cdtool.formats.mcap.container.attachments import attachment_index
-    from cdtool.formats.mcap.container.file_bytes import FileBytes
-    from cdtool.formats.mcap.container.records import PREFIX, Attachment, Metadata
+    from cdtool.formats.mcap.attachments import attachment_index
+    from cdtool.formats.mcap.file_bytes import FileBytes
+    from cdtool.formats.mcap.records import PREFIX, Opcode, parse
 
     with FileBytes(log.path) as file:
         for opcode, at, length in log.section.extras:
-            if opcode == Attachment.opcode:
+            if opcode == Opcode.ATTACHMENT:
                 ends = range(at + _PIECE, at + length + _PIECE, _PIECE)
                 pieces = (bytes(file.read(end - _PIECE, min(end, at + length) - end + _PIECE)) for end in ends)
                 clean.add_attachment(pieces, attachment_index(file, at, length))
             else:
-                clean.add_metadata(Metadata.read(file.read(at + PREFIX, length - PREFIX)))
+                clean.add_metadata(parse(opcode, file.read(at + PREFIX, length - PREFIX)))
 
 
 def _check_names(source: Path, output: Path, force: bool) -> None:

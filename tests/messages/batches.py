@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.columns.decoded_batch import ABSENT, OTHER_JOINTS
+from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS
 from cdtool.messages.fields import FieldMissingError, parse_field
 
 

@@ -9,6 +9,7 @@ Integrated by the semi-implicit Euler method.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -225,13 +226,17 @@ def write_logs(axis: ForeignAxis, folder: Path) -> tuple[list[Path], Path]:
     return logs, folder / "machine.toml"
 
 
-def errors_of(axis: ForeignAxis, done: IdentifiedMachine) -> dict[str, float]:
+def errors_by_key(truth: Mapping[str, float], done: IdentifiedMachine) -> dict[str, float]:
     """The error of each value in standard errors, by key; NaN if it was refused."""
     printed = {f"{item.section}.{item.key}": (item.values[0], item.standard_errors[0]) for item in done.changes}
-    found = {
-        key: (printed[key][0] - value) / printed[key][1] if key in printed else math.nan
-        for key, value in axis.truth.items()
+    return {
+        key: (printed[key][0] - value) / printed[key][1] if key in printed else math.nan for key, value in truth.items()
     }
+
+
+def errors_of(axis: ForeignAxis, done: IdentifiedMachine) -> dict[str, float]:
+    """The errors of the axis's values, and of its friction at speed, as of `errors_by_key`."""
+    found = errors_by_key(axis.truth, done)
     (joint,) = done.joints
     levels = {item.direction: item for item in joint.rigid.levels} if joint.rigid else {}
     for direction, name in ((1, "forward"), (-1, "backward")) if axis.motion == MOTIONS[0] else ((1, "forward"),):

@@ -15,7 +15,7 @@ from cdtool import file_locks
 from cdtool.cli import streams
 from cdtool.file_locks import holding, lock_handle
 from cdtool.files import replaced_folder, write_text
-from cdtool.formats.mcap.container import file_bytes
+from cdtool.formats.mcap import file_bytes
 from cdtool.report.plots.figures import slug
 from cdtool.workflows.execution import processes
 from cdtool.workflows.runs import shown_path

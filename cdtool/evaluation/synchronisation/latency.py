@@ -135,7 +135,7 @@ def latency_from(empty: ChannelLatency, events: Sequence[TimedEvent]) -> Channel
     known = [number for number, event in enumerate(events) if event.delay.known]
     if not known:
         reasons = [event.delay.reason for event in events]
-        reason = max(set(reasons), key=reasons.count) if reasons else "no event"
+        reason = max(reasons, key=reasons.count) if reasons else "no event"
         return replace(empty, events=tuple(events), reason=reason)
     line = clock_line([events[number].delay for number in known])
     used = tuple(known[number] for number in line.used)

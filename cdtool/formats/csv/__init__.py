@@ -117,7 +117,6 @@ def _pieces_of_clocks(
     pieces: Generator[Piece, None, TextTable],
 ) -> Pieces:
     """Yield the columns of a table with several clocks, by clock if their rates differ."""
-    from cdtool.findings.clocks import OtherClock
     from cdtool.formats.csv.several_clocks import pieces_by_own_clock, unit_from_header
 
     names = dialect.names
@@ -130,7 +129,7 @@ def _pieces_of_clocks(
         for key in table.values
         if names.index(key) not in clocks.columns and (keys is None or key in keys)
     }
-    table.findings = [*(found for found in table.findings if not isinstance(found.fact, OtherClock)), *findings]
+    table.findings = [*(found for found in table.findings if found.kind != "other_clock"), *findings]
     table.values = {}
     return replace(_source(path, dialect, table), columns=columns, origin=origin or written_origin(path), first_row=0)
 

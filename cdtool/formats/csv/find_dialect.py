@@ -14,17 +14,7 @@ from typing import Any
 
 from cdtool.channels import TablePins
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
-from cdtool.findings.tables import (
-    DoubtfulPoint,
-    FooterSkipped,
-    NamedSeparator,
-    NamesFromComment,
-    NumbersAboveRows,
-    OtherEncoding,
-    PinnedLinesSkipped,
-    WordsAboveRows,
-)
+from cdtool.findings import Finding, lines_of
 from cdtool.formats.csv.alike_rows import shorter_sample
 from cdtool.formats.csv.ambiguous_marks import (
     refuse_commas_that_may_be_decimal,
@@ -272,7 +262,7 @@ def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | No
         findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset)))
     marks = dialect.marks if dialect.marks.sure else resolve_marks(dialect)
     if marks.doubt:
-        findings.append(Finding(DoubtfulPoint(marks.doubt.text, marks.doubt.line)))
+        findings.append(Finding("doubtful_point", "", {"text": marks.doubt.text, "line": marks.doubt.line}))
     if not findings and marks is dialect.marks and not dialect.blank_is_missing:
         return dialect
     text = strip_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
@@ -400,19 +390,19 @@ def _trailing(head: Head, kinds: str, data: Sequence[tuple[Line, list[str]]]) ->
 def _findings(text: Text, lines: SampleLines, head: Head) -> list[Finding]:
     findings = []
     if lines.skipped:
-        findings.append(Finding(PinnedLinesSkipped(tuple(lines.skipped)), severity="note"))
+        findings.append(Finding("pinned_lines_skipped", "", lines_of(lines.skipped)))
     encoding = _SHOWN_ENCODINGS.get(text.encoding)
     if encoding:
-        findings.append(Finding(OtherEncoding(encoding), severity="note"))
+        findings.append(Finding("other_encoding", "", {"encoding": encoding}))
     if lines.separator:
         line = lines.separator
-        findings.append(Finding(NamedSeparator(line.number, line.text.strip()[:12]), severity="note"))
+        findings.append(Finding("named_separator", "", {"line": line.number, "text": line.text.strip()[:12]}))
     if head.numbers:
-        findings.append(Finding(NumbersAboveRows(tuple(head.numbers)), severity="loss"))
+        findings.append(Finding("numbers_above_rows", "", lines_of(head.numbers)))
     if words := [line for line in head.preamble if line not in head.numbers]:
-        findings.append(Finding(WordsAboveRows(tuple(words)), severity="note"))
+        findings.append(Finding("words_above_rows", "", lines_of(words)))
     if head.from_comment:
-        findings.append(Finding(NamesFromComment(head.header_line), severity="note"))
+        findings.append(Finding("names_from_comment", "", {"line": head.header_line}))
     return findings
 
 
@@ -432,7 +422,9 @@ class Footer:
 
     def finding(self, first_line: int) -> Finding:
         """Return the warning on a footer that starts in that line of the file."""
-        return Finding(FooterSkipped(tuple(first_line + line for line in self.lines), self.first))
+        return Finding(
+            "footer_skipped", "", {**lines_of([first_line + line for line in self.lines]), "text": self.first}
+        )
 
     def removed_from(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
         """Return the text, and the sample of its stream, without the footer."""

@@ -5,24 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from cdtool.columns import Categories
 from cdtool.errors import RecordingError
-from cdtool.findings import Finding
-from cdtool.findings.tables import (
-    BlankLines,
-    BlankRows,
-    BlankSamples,
-    CellAdvice,
-    CommentLines,
-    DrawnLines,
-    HeaderLines,
-    NotNumeric,
-    NulLines,
-    SkippedLines,
-    UnreadCells,
-    WordsBelowRows,
-)
+from cdtool.findings import Finding, lines_of
 from cdtool.formats.csv.cells import NULLS, STAMP_LIKE, has_numbers, has_open_quote, kind, number, split_line
 from cdtool.formats.csv.dialect import Dialect, quoted
 from cdtool.formats.csv.lines import begins_comment, is_ruler
@@ -66,7 +53,7 @@ class IrregularLines:
     dropped: dict[int, int] = field(default_factory=dict)
     left_out: dict[int, Finding] = field(default_factory=dict)
     unread: dict[int, list[tuple[int, str]]] = field(default_factory=dict)
-    skipped: dict[type[SkippedLines], list[int]] = field(default_factory=dict)
+    skipped: dict[str, list[int]] = field(default_factory=dict)
     cut_line: int = 0
     ends_skipped: bool = False
     blank: list[int] = field(default_factory=list)
@@ -91,18 +78,17 @@ class IrregularLines:
         findings = list(self.left_out.values())
         findings += [self._unread(column) for column in self.unread if column not in self.left_out]
         if self.empty:
-            findings.append(Finding(BlankRows(tuple(self.empty))))
+            findings.append(Finding("blank_rows", "", lines_of(self.empty)))
         blank = [line for line in self.blank if line < last_line]
         if blank and self.dialect.width == 1 and 2 * len(blank) < last_line - self.dialect.first_line:
-            findings.append(Finding(BlankSamples(tuple(blank)), severity="loss"))
+            findings.append(Finding("blank_samples", "", lines_of(blank)))
         elif blank:
-            findings.append(Finding(BlankLines(tuple(blank)), severity="note"))
+            findings.append(Finding("blank_lines", "", lines_of(blank)))
         for kind_of_lines, lines in self.skipped.items():
-            is_loss = kind_of_lines is NulLines
-            findings.append(Finding(kind_of_lines(tuple(lines)), severity="loss" if is_loss else "note"))
+            findings.append(Finding(kind_of_lines, "", lines_of(lines)))
         return findings
 
-    def _drop(self, irregular: IrregularLine, line: int, fact: type[SkippedLines] | None = None) -> None:
+    def _drop(self, irregular: IrregularLine, line: int, fact: str | None = None) -> None:
         self.dropped[irregular.row] = line
         if fact is not None:
             self.skipped.setdefault(fact, []).append(line)
@@ -110,13 +96,13 @@ class IrregularLines:
     def _is_skipped(self, irregular: IrregularLine, line: int) -> bool:
         text = self.dialect.text.decode(irregular.text).rstrip("\r")
         if self._is_comment(text):
-            self._drop(irregular, line, CommentLines)
+            self._drop(irregular, line, "comment_lines")
         elif text.strip() in {header.strip() for header in self.dialect.header_text}:
-            self._drop(irregular, line, HeaderLines)
+            self._drop(irregular, line, "header_lines")
         elif is_ruler(text):
-            self._drop(irregular, line, DrawnLines)
+            self._drop(irregular, line, "drawn_lines")
         elif b"\0" in irregular.text:
-            self._drop(irregular, line, NulLines)
+            self._drop(irregular, line, "nul_lines")
         else:
             return False
         return True
@@ -156,7 +142,7 @@ class IrregularLines:
     def _skip_footer(self, irregular: IrregularLine, line: int, cells: list[str], text: str) -> None:
         """Skip a line of words, which is a footer if only words follow; raise RecordingError for any other line."""
         if len(cells) == 1 and self.dialect.width > 1 and kind(cells[0]) == "X" and not has_numbers(text):
-            self._drop(irregular, line, WordsBelowRows)
+            self._drop(irregular, line, "words_below_rows")
             self.words = self.words or (irregular.row, line, text)
             return
         if self.words is not None:
@@ -207,7 +193,6 @@ class IrregularLines:
             if value is not None:
                 rows.numbers[target, row] = value
                 return
-        name = self.dialect.names[column]
         if not self.survey:
             raise self._unreadable(line, column, target, cell)
         if target <= STAMP:
@@ -219,12 +204,12 @@ class IrregularLines:
         so_far = max(self.dialect.sampled, line - self.dialect.first_line)
         if len(unread) > max(_FEW, _SHARE * so_far):
             self.targets[column] = LEFT
-            self.left_out[column] = Finding(NotNumeric(name, *unread[0], _advice(self.dialect, unread[0][1])))
+            self.left_out[column] = self._left_out(unread[0][0], column, unread[0][1])
 
     def _unreadable(self, line: int, column: int, target: int, cell: str) -> RecordingError:
         """Return the error for an unreadable cell of a wanted column."""
         layouts = self.dialect.stamped.get(column)
-        problem, hint = "is not a number", str(_advice(self.dialect, cell))
+        problem, hint = "is not a number", self._left_out(line, column, cell).words_for("advice[looks_like]")
         if layouts is not None and target <= STAMP:
             problem = f"is not a time with the layout {layouts.layouts[0].pattern}"
         elif layouts is not None and STAMP_LIKE.fullmatch(cell):
@@ -234,11 +219,15 @@ class IrregularLines:
         where = f"line {line}, column '{self.dialect.names[column]}'"
         return RecordingError(f"{self.path}: {where}: {cell[:60]!r} {problem}", hint)
 
+    def _left_out(self, line: int, column: int, cell: str) -> Finding:
+        numbers = {"column": self.dialect.names[column], "line": line, "cell": cell}
+        return Finding("not_numeric", "", {**numbers, "advice": _advice(self.dialect, cell)}, "warning")
+
     def _unread(self, column: int) -> Finding:
         cells = self.unread[column]
         first = cells[0][1]
-        fact = UnreadCells(tuple(line for line, _ in cells), first, _advice(self.dialect, first))
-        return Finding(fact, self.dialect.names[column], "loss")
+        fact = {**lines_of([line for line, _ in cells]), "cell": first, "advice": _advice(self.dialect, first)}
+        return Finding("unread_cells", self.dialect.names[column], fact)
 
     def _number(self, cell: str) -> float | None:
         if cell in self.dialect.missing:
@@ -263,14 +252,14 @@ class IrregularLines:
 
 def not_numeric(name: str, line: int, cell: str) -> Finding:
     """Return the note on a column that a survey leaves out."""
-    advice = CellAdvice("time") if STAMP_LIKE.fullmatch(cell) else None
-    return Finding(NotNumeric(name, line, cell, advice), severity="note")
+    advice = {"looks_like": "time", "text": ""} if STAMP_LIKE.fullmatch(cell) else None
+    return Finding("not_numeric", "", {"column": name, "line": line, "cell": cell, "advice": advice})
 
 
-def _advice(dialect: Dialect, cell: str) -> CellAdvice:
+def _advice(dialect: Dialect, cell: str) -> dict[str, Any]:
     """Return the advice on a cell that cannot be read."""
     if STAMP_LIKE.fullmatch(cell):
-        return CellAdvice("time")
+        return {"looks_like": "time", "text": ""}
     if any(letter.isdigit() for letter in cell):
-        return CellAdvice("number", dialect.details["decimal mark"])
-    return CellAdvice("word", quoted(cell[:40]))
+        return {"looks_like": "number", "text": dialect.details["decimal mark"]}
+    return {"looks_like": "word", "text": quoted(cell[:40])}

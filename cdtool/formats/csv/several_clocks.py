@@ -12,7 +12,7 @@ from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from cdtool.clock import EPOCH
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import ClockDifference, ClockUnitAssumed, OtherClock, OwnClocks, ValuesWithoutTime
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.recording import FloatArray
@@ -91,7 +90,9 @@ def describe_other_clock(
         other = names[clocks.groups[group][0]]
         difference = _difference(dialect, values, clock, other)
         if difference:
-            return f"column '{key}' is beside the clock '{other}', but the machine file names '{clock}': {difference}"
+            found = Finding("other_clock", other, {"first": clock, "difference": difference, "columns": (key,)})
+            beside = f"column '{key}' is beside the clock '{other}', but the machine file names '{clock}'"
+            return f"{beside}: {found.words_for('difference[what]')}"
     return ""
 
 
@@ -104,7 +105,9 @@ def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatA
         is_read = {first, other} <= values.keys()
         difference = _difference(dialect, values, first, other) if columns and is_read else None
         if difference:
-            findings.append(Finding(OtherClock(first, difference, tuple(columns)), other))
+            findings.append(
+                Finding("other_clock", other, {"first": first, "difference": difference, "columns": tuple(columns)})
+            )
     return findings
 
 
@@ -121,7 +124,7 @@ def have_other_rates(dialect: Dialect, clocks: Clocks, values: Mapping[str, Floa
     if not {first, *others} <= values.keys():
         return False
     return any(
-        ((difference := _difference(dialect, values, first, other)) is not None and difference.what == "steps")
+        ((difference := _difference(dialect, values, first, other)) is not None and difference["what"] == "steps")
         or _end_apart(values[first], values[other])
         for other in others
     )
@@ -191,11 +194,13 @@ def _step(stamps: FloatArray) -> float:
 
 def _own_clock_findings(dialect: Dialect, steps: Mapping[str, float], lost: Mapping[str, int]) -> list[Finding]:
     """Return the findings on a table whose channels have the clocks beside them; `steps` are those of each clock."""
-    findings = [Finding(OwnClocks(tuple(steps)), "time", "note")]
+    findings = [Finding("own_clocks", "time", {"clocks": tuple(steps)})]
     assumed = {name: step for name, step in steps.items() if not np.isfinite(_factor(dialect, name, np.nan))}
     if assumed:
-        findings.append(Finding(ClockUnitAssumed(tuple(assumed), next(iter(assumed.values()))), "time"))
-    return findings + [Finding(ValuesWithoutTime(count), key, "loss") for key, count in lost.items() if count]
+        findings.append(
+            Finding("clock_unit_assumed", "time", {"clocks": tuple(assumed), "step": next(iter(assumed.values()))})
+        )
+    return findings + [Finding("values_without_time", key, {"count": count}) for key, count in lost.items() if count]
 
 
 def columns_by_own_clock(
@@ -214,15 +219,15 @@ def columns_by_own_clock(
         name = dialect.names[clocks.groups[group][0]]
         times.setdefault(group, values[name] * _factor(dialect, name, 1.0))
     origin = _epoch_origin(times.values())
-    used = OwnClocks(tuple(dialect.names[clocks.groups[group][0]] for group in times))
-    columns, findings = {}, [Finding(used, "time", "note")]
+    used = {"clocks": tuple(dialect.names[clocks.groups[group][0]] for group in times)}
+    columns, findings = {}, [Finding("own_clocks", "time", used)]
     for key in keys:
         time = times[clocks.group(dialect.names.index(key)) or 0]
         timed = np.isfinite(time)
         columns[key] = Column(key, values[key][timed], time[timed] - origin, unit_from_header(dialect, key))
         lost = int(np.count_nonzero(np.isfinite(values[key][~timed])))
         if lost:
-            findings.append(Finding(ValuesWithoutTime(lost), key, "loss"))
+            findings.append(Finding("values_without_time", key, {"count": lost}))
     return columns, origin, findings
 
 
@@ -242,7 +247,7 @@ def _factor(dialect: Dialect, name: str, default: float) -> float:
     return unit.factor if unit is not None and unit.si == "s" else default
 
 
-def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> ClockDifference | None:
+def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, other: str) -> dict[str, Any] | None:
     """Return how two clocks differ in the same rows; None if they differ only in unit or start."""
     a, b = values[first], values[other]
     both = np.isfinite(a) & np.isfinite(b)
@@ -259,10 +264,10 @@ def _difference(dialect: Dialect, values: Mapping[str, FloatArray], first: str, 
     factors = (stated,) if np.isfinite(stated) else (1.0,) if same_name else _FACTORS
     scale = min(factors, key=lambda factor: abs(np.log(ratio / factor)))
     if abs(ratio / scale - 1.0) > _SAME_FACTOR:
-        return ClockDifference("steps", step, other_step)
+        return {"what": "steps", "first": step, "other": other_step}
     b = b / scale
     offset, length = float(b[0] - a[0]), float(a[-1] - a[0])
     if 0.5 * step < abs(offset) <= length:
-        return ClockDifference("start", float(a[0]), float(b[0]))
+        return {"what": "start", "first": float(a[0]), "other": float(b[0])}
     drift = float(np.max(np.abs((b - b[0]) - (a - a[0]))))
-    return ClockDifference("drift", 0.0, drift) if drift > 0.5 * step else None
+    return {"what": "drift", "first": 0.0, "other": drift} if drift > 0.5 * step else None

@@ -18,8 +18,6 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Categories, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import WrittenTimes
-from cdtool.findings.tables import AmbiguousTimes, LastLineCut, LastLineDropped, LastLineKept, NulBytesAtEnd, TotalRow
 from cdtool.formats.column_names import column_key
 from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.dialect import Dialect
@@ -95,14 +93,14 @@ class StampColumns:
         for column in self._columns:
             layout = self._layout(column)
             wraps = layout.wraps[1]
-            fact = WrittenTimes(
-                layout.pattern,
-                f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wraps,
-                days_column=self._dialect.names[self._dates[column]] if column in self._dates else "",
-                wraps=wraps,
-                wrapped=self._passed[column],
-            )
-            findings.append(Finding(fact, self._dialect.names[column], "note"))
+            fact = {
+                "pattern": layout.pattern,
+                "since": f"{np.datetime64(self._start(column), 'ns')}" if self._dated(column) else wraps,
+                "days_column": self._dialect.names[self._dates[column]] if column in self._dates else "",
+                "wraps": wraps,
+                "wrapped": self._passed[column],
+            }
+            findings.append(Finding("written_times", self._dialect.names[column], fact))
         return findings
 
 
@@ -177,7 +175,7 @@ class _TableReader:
         findings = end_of_rows(self.reader, self.irregular, rows, self.requested, before)
         clock = len(self.requested.numeric) > 0 and self.requested.numeric[0] == 0
         if self.survey and not before and is_total(rows.numbers[int(clock) :]):
-            findings.append(Finding(TotalRow(rows.line(rows.count - 1))))
+            findings.append(Finding("total_row", "", {"line": rows.line(rows.count - 1)}))
         return findings
 
     def table(self, columns: Mapping[str, FloatArray], findings: list[Finding], unbroken: bool) -> TextTable:
@@ -265,7 +263,7 @@ def _sort_columns(
                 raise RecordingError(
                     f"{path}: column '{name}': {stamped.readings}", "pin time_format in [csv] of the machine file"
                 )
-            left_out[column] = Finding(AmbiguousTimes(name, stamped.readings))
+            left_out[column] = Finding("ambiguous_times", "", {"column": name, "readings": stamped.readings})
         else:
             stamps.append(column)
     return numeric, stamps, left_out
@@ -345,9 +343,9 @@ def end_of_rows(
         findings += _check_last_line(reader.dialect, rows, requested, before)
     if irregular.cut_line or text.padding:
         line = irregular.cut_line or rows.line(rows.count)
-        findings.insert(0, Finding(LastLineCut(line), severity="loss"))
+        findings.insert(0, Finding("last_line_cut", "", {"line": line}))
     if text.padding:
-        findings.append(Finding(NulBytesAtEnd(text.padding), severity="loss"))
+        findings.append(Finding("nul_bytes_at_end", "", {"count": text.padding}))
     return findings
 
 
@@ -373,13 +371,13 @@ def _check_last_line(dialect: Dialect, rows: Rows, requested: RequestedColumns, 
     if complete and (certain or not dialect.text.padding):
         if certain:
             return []
-        return [Finding(LastLineKept(line, cell))]
+        return [Finding("last_line_kept", "", {"line": line, "cell": cell})]
     rows.count -= 1
     rows.numbers, rows.stamps = rows.numbers[:, :-1], rows.stamps[:, :-1]
     rows.not_rows = np.append(rows.not_rows, line)
     if dialect.text.padding:
         return []
-    return [Finding(LastLineDropped(line, cell), severity="loss")]
+    return [Finding("last_line_dropped", "", {"line": line, "cell": cell})]
 
 
 def is_total(columns: FloatArray) -> bool:

@@ -17,7 +17,6 @@ import numpy as np
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.findings.clocks import RepeatedRows, StatedPeriodDiffers, ValuesWithoutTime
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
 from cdtool.formats.csv.row_arrays import LEFT, Rows
@@ -100,20 +99,6 @@ class TickClock:
         """Return the seconds since the first tick: differences are exact before they are rounded."""
         ticks = rows.whole[self.column]
         return np.where(ticks == MISSING_STAMP, np.nan, (ticks - self.first) / self.per_second)
-
-
-@dataclass(frozen=True)
-class CountClock:
-    """Rows are counted: the first is at `start` [s], and `step` [s] is their period."""
-
-    start: float
-    step: float
-    numbers: tuple[int, ...] = ()
-    whole: tuple[int, ...] = ()
-
-    def times(self, rows: RowCells) -> FloatArray:
-        """Return the times of the rows by their numbers."""
-        return self.start + np.arange(rows.first, rows.first + rows.count, dtype=np.float64) * self.step
 
 
 @dataclass(frozen=True)
@@ -285,14 +270,16 @@ class _GroupRows:
     def findings(self, left_out: Collection[str]) -> list[Finding]:
         """Return what was found about the group's columns and their clock."""
         keys = [key for key in self.group.columns if key not in left_out]
-        findings = [Finding(ValuesWithoutTime(self.untimed[key]), key, "loss") for key in keys if self.untimed[key]]
+        findings = [
+            Finding("values_without_time", key, {"count": self.untimed[key]}) for key in keys if self.untimed[key]
+        ]
         for key in keys:
             findings += rounding_finding(key, self.rounded[key])
         if self.repeated and keys:
-            findings.append(Finding(RepeatedRows(self.repeated), keys[0], "note"))
+            findings.append(Finding("repeated_rows", keys[0], {"count": self.repeated}))
         stated = self.group.period
         if keys and stated and self.step and abs(self.step / stated - 1.0) > _SAME_PERIOD:
-            findings.append(Finding(StatedPeriodDiffers(stated, self.step), keys[0]))
+            findings.append(Finding("stated_period_differs", keys[0], {"stated": stated, "step": self.step}))
         return findings
 
 

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
-
-import numpy.typing as npt
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RowsAsColumns, VariableLeftOut, WithoutClock
 from cdtool.formats.clock_beside import is_clock_name
-from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
+from cdtool.formats.mat.leaves import Leaf, MatColumn
 from cdtool.formats.mat.runs import StructRuns, short_name
-from cdtool.formats.mat.variables import Cells, Numbers, Structs, Text, Value, Variables, left_out
+from cdtool.formats.mat.variables import Numbers, Value, Variables, left_out
 
 _DETAIL = 80
 # A matrix in a struct with more columns than this is an image or a model.
@@ -28,11 +24,14 @@ _WIDEST = 64
 class Layout:
     """The columns of a file in its order; `hidden` ones are read only where a machine file names them.
 
-    `numbers` are the single numbers, `texts` the texts of a file by name; `own_clocks`: several clocks are logged.
+    `leaves` are the arrays of numbers, `numbers` the single numbers, `texts` the texts by name. `with_runs`: arrays of
+    structs may be runs.
     """
 
+    with_runs: bool = True
     columns: dict[str, MatColumn] = field(default_factory=dict)
     hidden: dict[str, MatColumn] = field(default_factory=dict)
+    leaves: list[Leaf] = field(default_factory=list)
     numbers: dict[str, Numbers] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
@@ -43,68 +42,21 @@ class Layout:
         return tuple(dict.fromkeys((*self.columns, *self.hidden)))
 
     @property
-    def clocks(self) -> dict[str, MatColumn]:
-        """The clocks of columns by name."""
-        return {column.clock: self.columns[column.clock] for column in self.columns.values() if column.clock}
-
-    @property
     def own_clocks(self) -> bool:
         """Whether there are several clocks, so that each column needs the one beside it."""
-        alone = [name for name, column in self.columns.items() if not column.clock and is_clock_name(name)]
-        return len(self.clocks) + bool(alone) > 1
+        alone = any(not column.clock and is_clock_name(name) for name, column in self.columns.items())
+        return len({column.clock for column in self.columns.values() if column.clock}) + alone > 1
 
-
-def arrange_columns(variables: Variables) -> Layout:
-    """Return the layout of the variables of a file."""
-    layout, walk = Layout(), _Walk(runs=True)
-    for name, value in variables.items():
-        walk.value(value, name, name, ())
-    layout.findings += walk.findings
-    layout.numbers, layout.texts = walk.numbers, walk.texts
-    layout.columns.update(walk.runs)
-    layout.hidden.update(walk.single_runs)
-    clocks = _clocks(walk.leaves)
-    for leaf in walk.leaves:
-        clock, is_alone = _clock_of(leaf, clocks)
-        into = layout.hidden if is_alone else layout.columns
-        if is_alone:
-            layout.findings.append(Finding(WithoutClock(leaf.name, leaf.rows), severity="note"))
-        into.update({name: MatColumn((section,), clock) for name, section in leaf.columns()})
-    layout.columns = {name: layout.columns[name] for name in _in_file_order(layout.columns, variables)}
-    return layout
-
-
-def as_table(section: Section, whole: npt.NDArray[Any], findings: list[Finding]) -> npt.NDArray[Any]:
-    """Return an array as a table (n, k), its rows along the longer dimension; a note is added if it is read across."""
-    table = whole.reshape(-1, 1) if 1 in whole.shape else whole
-    if table.shape[0] >= table.shape[1]:
-        return table
-    findings.append(Finding(RowsAsColumns("variable", section.name, *whole.shape), severity="note"))
-    return table.T
-
-
-class _Walk:
-    """Collects what is in values: arrays of numbers, single numbers, texts, runs, and what is left out."""
-
-    def __init__(self, runs: bool) -> None:
-        self._with_runs = runs
-        self.leaves: list[Leaf] = []
-        self.numbers: dict[str, Numbers] = {}
-        self.texts: dict[str, str] = {}
-        self.runs: dict[str, MatColumn] = {}
-        self.single_runs: dict[str, MatColumn] = {}
-        self.findings: list[Finding] = []
-
-    def value(self, value: Value, name: str, last: str, structs: tuple[str, ...]) -> None:
+    def add(self, value: Value, name: str, last: str, structs: tuple[str, ...]) -> None:
         """Add a value, or what is inside of it."""
         if isinstance(value, Numbers):
             self._array(value, name, last, structs)
-        elif isinstance(value, Text):
-            if text := " ".join(value.text.split()):
+        elif isinstance(value, str):
+            if text := " ".join(value.split()):
                 self.texts[name] = text[:_DETAIL]
-        elif isinstance(value, Structs):
+        elif isinstance(value, list):
             self._structs(value, name, structs)
-        elif isinstance(value, Cells):
+        elif isinstance(value, tuple):
             self._cells(value, name, last, structs)
         else:
             self.findings.append(left_out(name, value.what))
@@ -118,59 +70,80 @@ class _Walk:
         elif structs and min(shape) > _WIDEST:
             self.findings.append(left_out(name, f"{shape[0]} x {shape[1]} matrix, too wide for a log"))
         else:
-            self.leaves.append(Leaf(name, last, structs, value))
+            leaf = Leaf(name, last, structs, value)
+            self.leaves.append(leaf)
+            self.columns |= {key: MatColumn((section,)) for key, section in leaf.columns()}
 
-    def _cells(self, value: Cells, name: str, last: str, structs: tuple[str, ...]) -> None:
-        if not any(_has_array(element) for element in value.elements):
-            texts = bool(value.elements) and all(isinstance(element, Text) for element in value.elements)
+    def _cells(self, value: tuple[Value, ...], name: str, last: str, structs: tuple[str, ...]) -> None:
+        if not any(_has_array(element) for element in value):
+            texts = bool(value) and all(isinstance(element, str) for element in value)
             self.findings.append(left_out(name, "cell of texts" if texts else "cell"))
             return
-        for number, element in enumerate(value.elements, 1):
-            self.value(element, f"{name}{{{number}}}", last, structs)
+        for number, element in enumerate(value, 1):
+            self.add(element, f"{name}{{{number}}}", last, structs)
 
-    def _structs(self, value: Structs, name: str, structs: tuple[str, ...]) -> None:
-        if not value.elements:
+    def _structs(self, value: list[dict[str, Value]], name: str, structs: tuple[str, ...]) -> None:
+        if not value:
             self.findings.append(left_out(name, "empty array of structs"))
-        elif len(value.elements) == 1:
-            self._fields(value.elements[0], name, structs)
-        elif not (self._with_runs and self._runs(value, name)):
-            for number, element in enumerate(value.elements, 1):
+        elif len(value) == 1:
+            self._fields(value[0], name, structs)
+        elif not (self.with_runs and self._runs(value, name)):
+            for number, element in enumerate(value, 1):
                 self._fields(element, f"{name}({number})", structs)
 
     def _fields(self, element: Mapping[str, Value], name: str, structs: tuple[str, ...]) -> None:
         for key, part in element.items():
-            self.value(part, f"{name}.{key}", key, (*structs, name))
+            self.add(part, f"{name}.{key}", key, (*structs, name))
 
-    def _runs(self, value: Structs, name: str) -> bool:
+    def _runs(self, value: list[dict[str, Value]], name: str) -> bool:
         """Add the elements of an array of structs as runs; False if they are not runs."""
-        walks = []
-        for number, element in enumerate(value.elements, 1):
-            walk = _Walk(runs=False)
-            walk._fields(element, f"{name}({number})", ())
-            walks.append(walk)
-        runs = StructRuns(name, [walk.leaves for walk in walks], [walk.numbers for walk in walks])
+        inside = [Layout(with_runs=False) for _ in value]
+        for number, (layout, element) in enumerate(zip(inside, value, strict=True), 1):
+            layout._fields(element, f"{name}({number})", ())
+        runs = StructRuns(name, [each.leaves for each in inside], [each.numbers for each in inside])
         if not runs.are_runs:
             return False
-        self.runs |= runs.columns()
-        self.single_runs |= runs.single_columns()
+        self.columns |= runs.columns()
+        self.hidden |= runs.single_columns()
         self.findings += runs.findings()
-        for walk in walks:
-            self.texts |= walk.texts
-        left = (finding.fact for number in runs.used for finding in walks[number].findings)
-        kinds = {
-            f"{name}(:).{short_name(fact.variable, name)}": fact for fact in left if isinstance(fact, VariableLeftOut)
-        }
-        self.findings += [Finding(replace(fact, variable=key), severity="note") for key, fact in kinds.items()]
+        self.texts |= {key: text for each in inside for key, text in each.texts.items()}
+        left = (
+            finding.numbers
+            for number in runs.used
+            for finding in inside[number].findings
+            if finding.kind == "variable_left_out"
+        )
+        kinds = {f"{name}(:).{short_name(numbers['variable'], name)}": numbers for numbers in left}
+        self.findings += [
+            Finding("variable_left_out", "", {**numbers, "variable": key}) for key, numbers in kinds.items()
+        ]
         return True
+
+
+def arrange_columns(variables: Variables) -> Layout:
+    """Return the layout of the variables of a file."""
+    layout = Layout()
+    for name, value in variables.items():
+        layout.add(value, name, name, ())
+    clocks = _clocks(layout.leaves)
+    for leaf in layout.leaves:
+        clock, is_alone = _clock_of(leaf, clocks)
+        names = [key for key, _ in leaf.columns()]
+        if is_alone:
+            layout.findings.append(Finding("without_clock", "", {"variable": leaf.name, "rows": leaf.rows}))
+            layout.hidden |= {key: layout.columns.pop(key) for key in names}
+        else:
+            layout.columns |= {key: replace(layout.columns[key], clock=clock) for key in names}
+    return layout
 
 
 def _has_array(value: Value) -> bool:
     """Return whether a value, or one inside of it, is an array of more than one number."""
     if isinstance(value, Numbers):
         return value.shape != (1, 1) and 0 not in value.shape
-    if isinstance(value, Structs):
-        return any(_has_array(part) for element in value.elements for part in element.values())
-    return isinstance(value, Cells) and any(_has_array(part) for part in value.elements)
+    if isinstance(value, list):
+        return any(_has_array(part) for element in value for part in element.values())
+    return isinstance(value, tuple) and any(_has_array(part) for part in value)
 
 
 def _clocks(leaves: Sequence[Leaf]) -> dict[str, dict[int, str]]:
@@ -196,13 +169,3 @@ def _clock_of(leaf: Leaf, clocks: Mapping[str, Mapping[int, str]]) -> tuple[str,
             own = of_struct[leaf.rows]
             return ("" if of_struct is clocks.get("") else own), False
     return "", bool(around)
-
-
-def _in_file_order(columns: Mapping[str, MatColumn], variables: Variables) -> list[str]:
-    """Return the names of the columns in the order of the variables that they are from."""
-    order = {name: number for number, name in enumerate(variables)}
-    return sorted(columns, key=lambda name: order[_variable(name, order)])
-
-
-def _variable(name: str, variables: Mapping[str, int]) -> str:
-    return next(name[:end] for end in range(len(name), 0, -1) if name[:end] in variables)

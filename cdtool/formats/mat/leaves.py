@@ -25,9 +25,11 @@ class Section:
     index: int = 0
     rows: int = 0
 
-    def values(self, whole: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return the section's values (n,) from the variable as a table (n, k)."""
-        return np.repeat(whole[:1, 0], self.rows) if self.rows else whole[:, self.index]
+    def values(self) -> npt.NDArray[Any]:
+        """Return its values (n,)."""
+        if self.numbers is None:
+            return np.full(self.rows, np.nan)
+        return np.repeat(self.numbers.table[:1, 0], self.rows) if self.rows else self.numbers.table[:, self.index]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from cdtool.findings import Finding
-from cdtool.findings.containers import RunsOfStructs, RunsWithoutRows, WithoutClock
 from cdtool.formats.mat.leaves import Leaf, MatColumn, Section
 from cdtool.formats.mat.variables import Numbers
 
@@ -26,16 +25,20 @@ class StructRuns:
         self.name = name
         self._leaves = [{short_name(leaf.name, name): leaf for leaf in some} for some in leaves]
         self._numbers = [{short_name(key, name): value for key, value in some.items()} for some in numbers]
-        self._clock = self._common_clock()
-        clocks = [some.get(self._clock) for some in self._leaves]
-        has_arrays = any(self._leaves)
-        self._rows = [1 if not has_arrays else 0 if clock is None else clock.rows for clock in clocks]
+        with_arrays = [some for some in self._leaves if some]
+        clocks = [{key for key, leaf in some.items() if leaf.is_clock and "." not in key} for some in with_arrays]
+        common = set.intersection(*clocks) if clocks else set[str]()
+        self._clock = next((key for some in with_arrays for key in some if key in common), "")
+        known = [some[self._clock] for some in with_arrays if self._clock in some]
+        self._rows = [some[self._clock].rows if self._clock in some else int(not with_arrays) for some in self._leaves]
         self.used = [number for number, rows in enumerate(self._rows) if rows]
-        if has_arrays:
-            known = [clock for clock in clocks if clock is not None]
-            self.are_runs = (
-                bool(self._clock) and len(known) > 1 and not self._has_two_clocks() and not _are_equal(known)
-            )
+        has_second = any(
+            leaf.is_clock and leaf.rows != rows
+            for some, rows in zip(self._leaves, self._rows, strict=True)
+            for leaf in some.values()
+        )
+        if with_arrays:
+            self.are_runs = len(known) > 1 and not has_second and not _are_equal(known)
         else:
             self.are_runs = any(self._numbers)
 
@@ -62,10 +65,10 @@ class StructRuns:
         """Return what the runs are, and which of their fields are left out."""
         if not self._clock:
             return []
-        found = [Finding(RunsOfStructs(self.name, len(self.used), sum(self._rows)), severity="note")]
+        found = [Finding("runs_of_structs", "", {"array": self.name, "runs": len(self.used), "rows": sum(self._rows)})]
         empty = tuple(number + 1 for number, rows in enumerate(self._rows) if not rows)
         if empty:
-            found.append(Finding(RunsWithoutRows(self.name, empty), severity="note"))
+            found.append(Finding("runs_without_rows", "", {"array": self.name, "runs": empty}))
         other = {
             key: leaf.rows
             for number in self.used
@@ -74,23 +77,11 @@ class StructRuns:
         }
         return [
             *found,
-            *(Finding(WithoutClock(f"{self.name}(:).{key}", rows), severity="note") for key, rows in other.items()),
+            *(
+                Finding("without_clock", "", {"variable": f"{self.name}(:).{key}", "rows": rows})
+                for key, rows in other.items()
+            ),
         ]
-
-    def _common_clock(self) -> str:
-        """Return the field that is the clock of every element with arrays; empty without one."""
-        clocks = [
-            {key for key, leaf in some.items() if leaf.is_clock and "." not in key} for some in self._leaves if some
-        ]
-        common = set.intersection(*clocks) if clocks else set()
-        return next((key for some in self._leaves for key in some if key in common), "")
-
-    def _has_two_clocks(self) -> bool:
-        return any(
-            leaf.is_clock and leaf.rows != rows
-            for some, rows in zip(self._leaves, self._rows, strict=True)
-            for leaf in some.values()
-        )
 
     def _fields(self, number: int) -> dict[str, Section]:
         """Return the columns of one run: arrays as long as its clock, and single numbers in each of its rows."""

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -15,19 +13,14 @@ from cdtool.channels import ChannelMap
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.mcap.container.log import Log, Messages
-from cdtool.formats.mcap.container.messages import NO_DATE
-from cdtool.formats.mcap.container.read_ahead import read_ahead
-from cdtool.formats.mcap.container.records import MAGIC
 from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times, with_exact_pieces, with_exact_times
+from cdtool.formats.mcap.log import Log
+from cdtool.formats.mcap.messages import NO_DATE
+from cdtool.formats.mcap.records import MAGIC
 from cdtool.formats.mcap.sequence_jumps import SequenceJumps
-from cdtool.formats.mcap.uniform import UniformChunkReader
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
-from cdtool.messages.column_memory import ColumnMemory
-from cdtool.messages.columns import UndecodableError
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.fast_path import Binding
 from cdtool.messages.topic import BatchValues, Topic, sort_times, wanted_columns, wanted_topics
 from cdtool.messages.topic_columns import TopicColumns
 from cdtool.messages.topic_survey import TopicSurvey
@@ -60,7 +53,7 @@ class Mcap:
         topics: dict[str, TopicSurvey] = {}
         jumps = SequenceJumps()
         origin: int | None = None
-        for piece in read_ahead(log.pieces()):
+        for piece in log.pieces():
             origin = _origin(path, log) if origin is None else origin
             jumps.add(piece, origin)
             for messages in piece:
@@ -88,10 +81,9 @@ class Mcap:
         decoders = Decoders()
         try:
             for messages in chain.from_iterable(Log(path, topic.__eq__).pieces()):
-                decoder = decoders.of(messages.stream, messages.batch)
-                if decoder is not None:
-                    with suppress(UndecodableError):  # another channel of the topic may be decodable
-                        return decoder.element_names(messages.batch.first(1))
+                names = decoders.element_names(messages.stream, messages.batch)
+                if names is not None:
+                    return names
         except RecordingError:  # the survey reports the problem
             return ()
         return ()
@@ -99,51 +91,18 @@ class Mcap:
 
 def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
     names = {source.topic for source in wanted.sources}
-    chunk_reader = UniformChunkReader(publish=wanted.time.clock == "publish")
-    log = Log(path, names.__contains__, chunk_reader=chunk_reader)
+    log = Log(path, names.__contains__)
     expected = {topic: log.expected(topic) for topic in names}
-    topics = wanted_topics(path, wanted, partial(TopicColumns, expected=expected, memory=ColumnMemory()))
-    for piece in _ahead(log):
+    topics = wanted_topics(path, wanted, partial(TopicColumns, expected=expected))
+    for piece in log.pieces():
         for messages in piece:
-            topic = topics[messages.stream.topic]
-            if messages.parts:
-                topic.confirm(messages.stream, messages.parts)
-            else:
-                topic.add(messages.stream, messages.batch)
-        if any(not messages.parts for messages in piece):
-            chunk_reader.learn(_bindings(log, topics))
+            topics[messages.stream.topic].add(messages.stream, messages.batch)
     return mapped_source_of(log, wanted, topics)[0]
-
-
-def _ahead(log: Log) -> Iterator[tuple[Messages, ...]]:
-    """Yield the pieces; a thread reads the next one, unless the threads that decompress the chunks read the messages.
-
-    The chunk reader must learn from the first piece before the second one is read.
-    """
-    pieces = log.pieces()
-    for piece in pieces:
-        yield piece
-        if not log.section.is_fast:
-            break
-    yield from read_ahead(pieces)
-
-
-def _bindings(log: Log, topics: Mapping[str, TopicColumns]) -> dict[int, Binding]:
-    """Return, by id, the channels that uniform chunks may contain: wanted ones with a row layout, and unwanted ones."""
-    channels = log.summary.channels.values()
-    channels_per_topic = Counter(channel.topic for channel in channels)
-    bindings: dict[int, Binding] = {}
-    for channel in channels:
-        if channel.topic not in topics:
-            bindings[channel.id] = None
-        elif channels_per_topic[channel.topic] == 1 and (of_channel := topics[channel.topic].binding(channel.id)):
-            bindings[channel.id] = of_channel
-    return bindings
 
 
 def _origin(path: Path, log: Log) -> int:
     """Return the time [ns] of a log's first message, after its first piece was read."""
-    first = log.section.arena.first_time or 0
+    first = log.section.first_time or 0
     if first >= NO_DATE:  # the times so far are not dates: the first valid one is known after reading all messages
         log = Log(path)
         for _ in log.pieces():
@@ -174,8 +133,8 @@ class MappedFields:
         topics = wanted_topics(self.path, self.wanted, Topic, () if self._converted is None else (EXACT_TIME,))
         log = Log(self.path, topics.__contains__)
         start = self.origin
-        for piece in read_ahead(log.pieces()):
-            first = log.section.arena.first_time
+        for piece in log.pieces():
+            first = log.section.first_time
             if start is None and self.wanted.time.clock == "log" and first is not None and first < NO_DATE:
                 start = first
             for messages in piece:

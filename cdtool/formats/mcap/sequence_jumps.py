@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.findings import Finding
-from cdtool.findings.messages import MissingMessages
-from cdtool.formats.mcap.container.log import Messages
+from cdtool.formats.mcap.log import Messages
 
 Numbers = npt.NDArray[np.uint32]
 
@@ -88,4 +87,15 @@ class _SequenceCount:
         is_count = self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
         if not self._jumps or not is_count:
             return []
-        return [Finding(MissingMessages(self._jumps, self._missing, self._jump_time, bool(self._topic)), self._topic)]
+        return [
+            Finding(
+                "missing_messages",
+                self._topic,
+                {
+                    "jumps": self._jumps,
+                    "missing": self._missing,
+                    "after": self._jump_time,
+                    "of_topic": bool(self._topic),
+                },
+            )
+        ]

@@ -10,7 +10,6 @@ import json
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -148,11 +147,10 @@ def _grouped(stream: Stream, definition: Definition) -> dict[str, FloatArray]:
 def _open_cdr(
     file: IO[bytes], fillers: Sequence[_Filler], stamps: Sequence[npt.NDArray[np.int64]], compression: str
 ) -> tuple[_Send, _Finish]:
-    from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
-    from mcap_ros2 import __version__
+    from mcap.writer import CompressionType, Writer
 
     writer = Writer(file, compression=CompressionType[compression])
-    writer.start(profile="ros2", library=f"{LIBRARY_IDENTIFIER} mcap-ros2-support/{__version__}")
+    writer.start(profile="ros2", library="cdtool")
     schemas = {
         name: writer.register_schema(name, "ros2msg", DEFINITIONS[name].text.encode()) for name in _types(fillers)
     }
@@ -201,16 +199,31 @@ def _layout(filler: _Filler) -> tuple[bytes, list[tuple[int, FloatArray]]]:
 
 def _encoded(schema: str, message: Mapping[str, Any]) -> bytes:
     """Return a message in CDR, as the library writes it."""
-    from mcap.reader import make_reader
-    from mcap.writer import CompressionType
-    from mcap_ros2.writer import Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    file = BytesIO()
-    writer: Any = Writer(file, compression=CompressionType.NONE)
-    writer.write_message("/topic", writer.register_msgdef(schema, DEFINITIONS[schema].text), message, 0, 0, 0)
-    writer.finish()
-    ((_, _, written),) = make_reader(BytesIO(file.getvalue())).iter_messages()
-    return bytes(written.data)
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(DEFINITIONS[schema].text, schema))
+    return bytes(store.serialize_cdr(_filled(store, schema, message), schema))
+
+
+def _filled(store: Any, schema: str, content: Mapping[str, Any]) -> Any:
+    """Return the library's object of a message; a number without content is 0, an array empty or of zeros."""
+    from rosbags.interfaces import Nodetype
+
+    if schema == "geometry_msgs/msg/Quaternion":
+        content = {"w": 1.0, **content}  # the default of its definition
+    values: dict[str, Any] = {}
+    for name, (kind, detail) in store.fielddefs[schema][1]:
+        if kind == Nodetype.NAME:
+            values[name] = _filled(store, detail, content.get(name, {}))
+        elif kind == Nodetype.BASE:
+            values[name] = content.get(name, "" if detail[0] == "string" else 0)
+        elif detail[0][0] == Nodetype.BASE and detail[0][1][0] != "string":
+            size = detail[1] if kind == Nodetype.ARRAY else 0
+            values[name] = np.array(content.get(name, [0] * size), dtype=detail[0][1][0])
+        else:
+            values[name] = list(content.get(name, ()))
+    return store.types[schema](**values)
 
 
 def _open_json(

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from cdtool.errors import RecordingError, UsageError
 from cdtool.files import replaced
 from cdtool.findings import Finding
-from cdtool.findings.containers import Unverified
 from cdtool.formats.groups import UNVERIFIED, Parts
 from cdtool.ingest.channel_assembly import file_digest
 from cdtool.ingest.parts import join_digests
@@ -177,7 +176,7 @@ def _provenance(
         told["section"] = str(section)
     if lost := [str(finding) for finding in rows.findings if finding.severity == "loss"]:
         told["lost"] = "; ".join(lost)
-    if unverified := [finding.message for finding in rows.findings if isinstance(finding.fact, Unverified)]:
+    if unverified := [finding.message for finding in rows.findings if finding.kind == "unverified"]:
         told[UNVERIFIED] = "; ".join(unverified)
     if machine_file is not None:
         told |= {"machine": machine_file.machine.name, "machine_fingerprint": fingerprint(machine_file.machine)}

@@ -93,7 +93,7 @@ def _end(*_: object) -> None:
 
 
 def _end_from_callback(unraisable: sys.UnraisableHookArgs) -> None:
-    """End a worker that was told so in a callback from C, as while LLVM compiles: no exception passes C code."""
+    """End a worker that gets the signal in a callback from C, as while LLVM compiles: no exception passes C code."""
     if unraisable.exc_type is SystemExit:
         os._exit(TOLD_TO_END)
     sys.__unraisablehook__(unraisable)

@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.log import Log
 
 COMPRESSIONS = ("none", "lz4", "zstd")
 Message = tuple[str, int, bytes]

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import RecordingError
-from cdtool.findings import Fact, Finding
+from cdtool.findings import Finding
 from cdtool.formats.mcap import Mcap
-from cdtool.formats.mcap.container.log import Log
+from cdtool.formats.mcap.log import Log
 from cdtool.formats.source import Source
 from tests.formats.mcap_damage.truth import FIELDS, Message
 
@@ -33,9 +33,9 @@ class Reading:
     topics: tuple[str, ...] | None = None
     origin: float = 0.0
 
-    def has(self, *kinds: type[Fact]) -> bool:
+    def has(self, *kinds: str) -> bool:
         """Return whether a finding is of one of the kinds."""
-        return any(isinstance(finding.fact, kinds) for finding in self.findings)
+        return any(finding.kind in kinds for finding in self.findings)
 
     @property
     def lossy(self) -> bool:

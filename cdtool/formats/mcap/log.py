@@ -1,0 +1,250 @@
+"""Read an MCAP log piece by piece, with findings on losses, unverified messages and inconsistencies."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from cdtool.errors import RecordingError
+from cdtool.findings import Finding
+from cdtool.formats.mcap.data_section import Block, DataSection
+from cdtool.formats.mcap.definitions import DefinedStream, Definitions
+from cdtool.formats.mcap.file_bytes import FileBytes
+from cdtool.formats.mcap.losses import Loss
+from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, parse
+from cdtool.formats.mcap.summary import matches_header, read_summary, skippable_chunks
+from cdtool.formats.source import TopicDetails
+from cdtool.messages.batch import Batch
+
+_LONGEST_HEADER = 1 << 12
+
+
+@dataclass(frozen=True)
+class Messages:
+    """Messages of one channel; `covered`: a CRC covers them and their definitions."""
+
+    stream: DefinedStream
+    batch: Batch
+    covered: bool
+
+
+@dataclass
+class Topic:
+    """All channels of one topic: schema and encoding of the first, numbers of messages and of used channels."""
+
+    name: str
+    schema: str
+    encoding: str
+    count: int = 0
+    channels: int = 0
+
+
+class Log:
+    """An MCAP file. After all `pieces()` were read, `topics`, `origin`, `count` and `findings()` are valid.
+
+    `wanted` selects topics: messages of other topics are only counted, and chunks without wanted topics are skipped if
+    the summary is verified. Without `use_index` every chunk is read, from the start. If not `strict`, a file without
+    any readable message, or with values that are known to be wrong, is a finding instead of an error.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        wanted: Callable[[str], bool] | None = None,
+        use_index: bool = True,
+        strict: bool = True,
+    ) -> None:
+        self.path = path
+        self._strict = strict
+        self._wanted = wanted or (lambda _: True)
+        self._file = FileBytes(path)
+        self.summary = read_summary(self._file)
+        self._skip = skippable_chunks(self._file, self.summary, self._wanted) if use_index and wanted else {}
+        self._definitions = Definitions(self.summary)
+        self.section = DataSection(self._file, self.summary, self._definitions, self._skip)
+        self.profile = profile_of(self._file)
+        self.counts: Counter[int] = Counter()
+        self.topics: dict[str, Topic] = {}
+        self.origin = 0
+        self.unverified = 0
+
+    def pieces(self) -> Iterator[tuple[Messages, ...]]:
+        """Yield the wanted messages, one memory block after the other in the file's order, channel by channel in each.
+
+        Raises RecordingError if no message can be read, or if a CRC shows that values are wrong but not which ones.
+        """
+        with self._file:
+            try:
+                for piece in self.section.pieces():
+                    yield tuple(self._usable(piece))
+                self._finish()
+            except (OSError, DamageError) as fault:  # a lost drive, or a file that shrinks while it is read
+                raise RecordingError(f"{self.path}: cannot be read to its end: {fault}", "read a copy of it") from fault
+
+    @property
+    def count(self) -> int:
+        """Return the number of messages that were read."""
+        return sum(self.counts.values())
+
+    @property
+    def topic_details(self) -> dict[str, TopicDetails]:
+        """Return the details of each topic."""
+        return {topic.name: TopicDetails(topic.schema, topic.count, topic.encoding) for topic in self.topics.values()}
+
+    def expected(self, topic: str) -> int:
+        """Return the number of messages of a topic in the summary; 0 if the summary is not verified."""
+        summary = self.summary
+        if not summary.verified or summary.statistics is None:
+            return 0
+        counts = summary.statistics.channel_message_counts
+        return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
+
+    def _usable(self, block: Block) -> Iterator[Messages]:
+        for channel, batch in block.batches:
+            if channel in block.cuts:
+                unambiguous = int(np.searchsorted(batch.start, block.cuts[channel]))
+                if unambiguous < len(batch):
+                    reason = self._definitions.ambiguous[channel]
+                    self.section.losses.messages[reason] += len(batch) - unambiguous
+                batch = batch.rows(slice(unambiguous))
+            if len(batch):
+                yield from self._counted(channel, len(batch), block.covered, batch)
+
+    def _counted(self, channel: int, count: int, covered: bool, batch: Batch) -> Iterator[Messages]:
+        try:
+            stream = self._definitions.stream(channel)
+        except DamageError as fault:
+            self.section.losses.messages[str(fault)] += count
+            return
+        self.counts[channel] += count
+        covered = covered and stream.covered
+        self.unverified += 0 if covered else count
+        if self._wanted(stream.topic):
+            yield Messages(stream, batch, covered)
+
+    def _finish(self) -> None:
+        self._file.check_unchanged()
+        section = self.section
+        for at in self._skip.keys() & section.chunks.keys():
+            self.counts.update(self._skip[at])
+        for stream in self._definitions.streams():
+            name = stream.topic
+            schema = stream.schema.name if stream.schema is not None else "no schema"
+            topic = self.topics.setdefault(name, Topic(name, schema, stream.encoding))
+            topic.count += self.counts[stream.id]
+            topic.channels += bool(self.counts[stream.id])
+        self.origin = section.first_time or 0
+        self._check_data_crc()
+        self._check_appended_data()
+        if self._strict and not self.count and section.losses:
+            self._raise_nothing_left()
+
+    def _check_data_crc(self) -> None:
+        stated = self.section.data_crc
+        if not stated or (self.section.is_partly_read and not self.unverified):
+            return
+        if self._file.crc(0, self.section.end_at) == stated:
+            self.unverified = 0
+        elif self._strict and self.unverified:
+            raise RecordingError(
+                f"{self.path}: the checksum of the data does not match: values are damaged, and it is unknown which",
+                "copy the file again from its source",
+            )
+        elif self.unverified or not self.section.losses:
+            text = "the checksum of the data section does not match"
+            text += "" if self.unverified else " (those of all chunks with messages match)"
+            self.section.losses.add(Loss(self.section.end_at, 0, text))
+
+    def _check_appended_data(self) -> None:
+        """Add the bytes after the log's end as a loss: another file was appended, whose summary is not this log's."""
+        if not self.summary.problem or not self.section.is_ended:
+            return
+        end = end_of_log(self._file, self.section.end_at)
+        if end is not None and end < self._file.size:
+            self.section.losses.add(Loss(end, self._file.size - end, "the log ends here: was another file appended?"))
+            self.summary = replace(self.summary, problem="")
+
+    def _raise_nothing_left(self) -> None:
+        losses = self.section.losses
+        first = losses.entries[0] if losses.entries else Loss(8, 0, next(iter(losses.messages)))
+        reason = " ".join(first.reason.split())[:200]
+        raise RecordingError(
+            f"{self.path}: damaged at byte {first.at}, before its first message: {reason}",
+            "copy the file again from its source; no message in it can be read",
+        )
+
+    def findings(self) -> list[Finding]:
+        """Return findings on losses, then on differences from the summary, then on messages without a checksum."""
+        section, statistics = self.section, self.summary.statistics
+        findings = section.losses.findings(self.count, self.origin)
+        if self.summary.problem and not section.losses.stopped:
+            findings.append(Finding("summary_damaged", "", {"reason": self.summary.problem, "messages": self.count}))
+        if statistics is not None and statistics.message_count != self.count:
+            findings.append(
+                Finding("message_count_differs", "", {"stated": statistics.message_count, "read": self.count})
+            )
+        findings += self._differences()
+        if self.unverified:
+            findings.append(Finding("unverified", "", {"count": self.unverified, "messages": self.count}))
+        for topic in self.topics.values():
+            if topic.channels > 1 and self._wanted(topic.name):
+                findings.append(Finding("several_writers", topic.name, {"channels": topic.channels}))
+        if not self.count:
+            findings.append(Finding("no_message"))
+        return findings
+
+    def _differences(self) -> list[Finding]:
+        """Return the differences between summary and data, unless a loss may explain them."""
+        section, summary = self.section, self.summary
+        if section.losses or summary.problem:
+            return []
+        findings: list[Finding] = []
+        chunks = section.chunks
+        if summary.chunks:
+            missing = len(chunks.keys() - summary.chunks.keys())
+            absent = len(summary.chunks.keys() - chunks.keys())
+            both = chunks.keys() & summary.chunks.keys()
+            other = sum(not matches_header(summary.chunks[at], chunks[at]) for at in both)
+            differences = {"not indexed": missing, "only indexed": absent, "other values": other}
+            findings += [
+                Finding("index_disagrees", "", {"count": count, "how": how})
+                for how, count in differences.items()
+                if count
+            ]
+        if section.other_times:
+            findings.append(Finding("chunk_times_differ", "", {"chunks": section.other_times}))
+        statistics = summary.statistics
+        if statistics is not None and statistics.channel_message_counts:
+            stated = {channel: count for channel, count in statistics.channel_message_counts.items() if count}
+            read = {channel: count for channel, count in self.counts.items() if count}
+            if stated != read and statistics.message_count == self.count:
+                findings.append(Finding("channel_counts_differ"))
+        return findings + [Finding("defined_otherwise", topic) for topic in self._definitions.redefined_topics()]
+
+
+def profile_of(file: FileBytes) -> str:
+    """Return the profile that the file's header states, such as `ros2`; empty if there is no header."""
+    head = file.read(len(MAGIC), PREFIX)
+    length = int.from_bytes(head[1:], "little")
+    if len(head) < PREFIX or head[0] != Opcode.HEADER or length > _LONGEST_HEADER:
+        return ""
+    try:
+        return str(parse(Opcode.HEADER, file.read(len(MAGIC) + PREFIX, length)).profile)
+    except DamageError:
+        return ""
+
+
+def end_of_log(file: FileBytes, at: int) -> int | None:
+    """Return the end of a log whose data end record is at byte `at`: the byte after the footer and magic bytes."""
+    while True:
+        head = file.read(at, PREFIX)
+        length = PREFIX + int.from_bytes(head[1:], "little")
+        if len(head) < PREFIX or not head[0] or length > file.size - at:
+            return None
+        at += length
+        if head[0] == Opcode.FOOTER:
+            return at + len(MAGIC) if bytes(file.read(at, len(MAGIC))) == MAGIC else None
