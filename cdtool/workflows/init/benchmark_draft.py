@@ -200,7 +200,7 @@ def _learning(impacts: Sequence[_Log], free: Sequence[_Log], folder: Path, by_po
             "",
             "[learn]",
             'until = "onset"',
-            '# from = "0.5s"  # without the beginning of each log, here and under [impacts.NAME]',
+            '# from = "0.5s"  # without the beginning of each log, here and in each group of impacts',
             f"logs = {_paths(both, folder)}",
         ]
     return [f"{why} Limits are those of each run's own first seconds in motion.", 'threshold = "baseline"']
