@@ -53,7 +53,7 @@ class Kernel:
         function, signature = self._linked(stamp), eval(self.signature, self.function.__globals__ | vars(numba.types))
         try:
             made: Any = numba.njit(cache=True, **self._options)(function)
-            if numba.config.DISABLE_JIT:
+            if made is function:  # NUMBA_DISABLE_JIT
                 return made
             try:
                 made.compile(signature)

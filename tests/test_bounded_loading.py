@@ -63,6 +63,7 @@ PARSED_ELSEWHERE = {
     "cdtool/messages/json_messages.py": "one message of a log, whose nesting is a reason",
     "cdtool/report/protocol/words.py": "a file of the package",
     "cdtool/cli/init.py": "one value of an option",
+    "cdtool/findings/kinds.py": "a file of the package",
 }
 
 

@@ -14,43 +14,52 @@ from cdtool.plain_text import counted, counted_lines, digits, first_of
 _SHOWN = 40
 
 
-class FindingWords(Formatter):
-    """The words of a kind with the numbers of a finding."""
+class FindingWords:
+    """The words of a kind with the numbers of a finding, and with what is computed from them."""
 
     def __init__(self, kind: FindingKind, numbers: Mapping[str, Any]) -> None:
         self.kind = kind
-        self.numbers = numbers
+        self.numbers = _Numbers(numbers)
 
     def sentence(self) -> str:
         """Return the sentence."""
-        return self.vformat(self.kind.sentence, (), {})
+        return self._written(self.kind.sentence)
 
     def words_for(self, name: str) -> str:
         """Return the words for the value of a number; empty if it has none."""
-        value, _ = self.get_field(name, (), {})
-        words = self.kind.words[name]
-        text = words.get(str(value)) or words.get("given" if _is_given(value) else "absent", "")
-        return self.vformat(text, (), {})
+        value, words = self._value(name), self.kind.words[name]
+        return self._written(words.get(str(value)) or words.get("given" if _is_given(value) else "absent", ""))
 
-    def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
-        """Return what stands in braces, with a question mark before it the words for its value."""
-        if field_name.startswith("?"):
-            return self.words_for(field_name[1:]), ""
-        return super().get_field(field_name, args, kwargs)
+    def _written(self, text: str) -> str:
+        """Return a text with what stands in braces; after a question mark a number's name stands for its words."""
+        written = []
+        for before, name, spec, _ in _FORMATTER.parse(text):
+            written.append(before)
+            if name is not None:
+                of_words = name.startswith("?")
+                written.append(self.words_for(name[1:]) if of_words else _formatted(self._value(name), spec or ""))
+        return "".join(written)
 
-    def get_value(self, key: int | str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:  # noqa: ARG002
-        """Return a number of the finding, or what is computed from its numbers."""
-        return self.numbers[key] if key in self.numbers else _COMPUTED[str(key)](self.numbers)  # type: ignore[index]
+    def _value(self, name: str) -> Any:
+        return _FORMATTER.get_field(name, (), self.numbers)[0]
 
-    def format_field(self, value: Any, format_spec: str) -> str:
-        """Return a value in one of the formats of this module, or as Python formats it."""
-        name, _, rest = format_spec.partition(" ")
-        if name in _FORMATS:
-            return _FORMATS[name](value, rest)
-        if "|" in format_spec:
-            one, _, many = format_spec.partition("|")
-            return one if value == 1 else many
-        return format(value, format_spec)
+
+class _Numbers(dict[str, Any]):
+    def __missing__(self, name: str) -> Any:
+        return _COMPUTED[name](self)
+
+
+_FORMATTER = Formatter()
+
+
+def _formatted(value: Any, spec: str) -> str:
+    name, _, rest = spec.partition(" ")
+    if name in _FORMATS:
+        return _FORMATS[name](value, rest)
+    if "|" in spec:
+        one, _, many = spec.partition("|")
+        return one if value == 1 else many
+    return format(value, spec)
 
 
 def _is_given(value: Any) -> bool:

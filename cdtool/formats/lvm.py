@@ -256,7 +256,7 @@ def _heads(path: Path, text: Text, style: _Style) -> tuple[list[_Head], int | No
         if is_head and len(below) > 1:
             wrong = below[1]
             raise RecordingError(
-                f"{path}: line {wrong.number} ({wrong.cells[0][:30]!r}) is below the names, but is no row of numbers",
+                f"{path}: line {wrong.number} ({wrong.cells[0][:30]!r}) is below the names, but not a row of numbers",
                 "repair the line",
             )
         if is_head and below:

@@ -144,12 +144,6 @@ def numeric_fields(message: Any, prefix: str = "") -> dict[str, float | list[flo
     return found
 
 
-def header_stamp(message: Any) -> int | None:
-    """Return the header's time stamp [ns]; None if the message has no header stamp."""
-    parts = stamp_parts(message)
-    return None if parts is None else int(parts[0]) * 10**9 + int(parts[1])
-
-
 def stamp_parts(message: Any) -> tuple[Any, Any] | None:
     """Return seconds and nanoseconds of the header's time stamp; None if the message has no header stamp."""
     try:

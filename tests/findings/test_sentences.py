@@ -55,9 +55,9 @@ def _said(kind: str, numbers: dict[str, object]) -> list[str]:
     said: list[str] = []
 
     class Recorded(FindingWords):
-        def vformat(self, text, args, kwargs):
+        def _written(self, text):
             said.append(text)
-            return super().vformat(text, args, kwargs)
+            return super()._written(text)
 
     Recorded(kind_of(kind), numbers).sentence()
     return said

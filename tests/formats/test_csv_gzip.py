@@ -237,7 +237,7 @@ def test_a_compressed_log_at_a_url_is_read(tmp_path):
     assert remote["torque"].values.tobytes() == local["torque"].values.tobytes()
 
 
-# Lines that are no rows: tens of kilobytes of .csv.gz unpacked to 2.7 GB, or took 100 s.
+# Lines that are not rows: tens of kilobytes of .csv.gz unpacked to 2.7 GB, or took 100 s.
 NO_ROWS = {
     "blank": b"t,a\n0,1.5\n1,2.5\n" + b"\n" * 2_000_000,
     "blank in one column": b"a\n1.5\n2.5\n" + b"\n" * 2_000_000 + b"3.5\n",
@@ -252,5 +252,5 @@ def test_a_file_of_lines_that_are_no_rows_is_refused(tmp_path, content):
     path = tmp_path / "log.csv.gz"
     path.write_bytes(gzip.compress(content))
     for read in (survey, lambda path: list(log_pieces(path))):
-        with pytest.raises(RecordingError, match=r"lines are no rows|of blank lines|unpacks to"):
+        with pytest.raises(RecordingError, match=r"lines are not rows|of blank lines|unpacks to"):
             read(path)

@@ -192,7 +192,7 @@ def test_a_machine_file_that_names_the_column_of_times_is_followed(log, machine)
         ("Decimal_Separator\t.", "Decimal_Separator\t;", "states the decimal separator ';'"),
         ("Channels\t2", "Channels\t1000000000", "has 2 names, but 1000000000 channels are stated above it"),
         ("X_Dimension\tTime\tTime", "X_Dimension\tTime\tFrequency", "x axis of channel 'Torque' is 'Frequency'"),
-        ("0.000000\t0.000000", "a\t0.000000", r"line 24 \('a'\) is below the names, but is no row"),
+        ("0.000000\t0.000000", "a\t0.000000", r"line 24 \('a'\) is below the names, but not a row"),
         ("0.010000\t", "x0.010000\t", "line 34"),
     ],
     ids=["separator", "decimal separator", "channels", "dimension", "first row", "a row"],

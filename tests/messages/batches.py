@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from cdtool.messages.batch import Batch
 from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS
-from cdtool.messages.fields import FieldMissingError, parse_field
+from cdtool.messages.fields import FieldMissingError, parse_field, stamp_parts
 
 
 def batch_of(payloads):
@@ -66,3 +67,9 @@ def assert_follows_field_language(decoded, messages, wanted, joints=()):
         assert (field_values.fault is None) == (first is None), (field.text, field_values.fault, first)
         if first is not None:
             assert (field_values.fault.problem, field_values.fault.advice) == (first.problem, first.advice)
+
+
+def header_stamp(message: Any) -> int | None:
+    """Return the header's time stamp [ns]; None if the message has no header stamp."""
+    parts = stamp_parts(message)
+    return None if parts is None else int(parts[0]) * 10**9 + int(parts[1])

@@ -14,9 +14,9 @@ from mcap_ros2._dynamic import _for_each_msgdef, _write_complex_type, generate_d
 
 from cdtool.messages.decoded_batch import ABSENT, UndecodableError
 from cdtool.messages.encodings import decoder_for
-from cdtool.messages.fields import FieldMissingError, header_stamp, numeric_fields
+from cdtool.messages.fields import FieldMissingError, numeric_fields
 from tests.data_folder import DATA, data, needs_data
-from tests.messages.batches import assert_follows_field_language, batch_of, fields_of
+from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, header_stamp
 from tests.messages.ros_messages import definitions, numeric_texts
 
 NAME = "test_msgs/msg/Thing"

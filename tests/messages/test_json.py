@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from cdtool.formats.mcap import Mcap
 from cdtool.messages.encodings import decoder_for
-from cdtool.messages.fields import header_stamp, numeric_fields
+from cdtool.messages.fields import numeric_fields
 from tests.formats.mcap_files import by_hand  # noqa: F401
-from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, same
+from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, header_stamp, same
 
 WANTED = ("a", "b.c", "q[:]", "q[1]", "q[x]", "b.q[:]", "l[0].c", "l[1].q[0]", "l[x].c", "name[0]", "b", "b[0]", "a.c")
 JOINTS = ("x", "y")

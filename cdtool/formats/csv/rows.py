@@ -153,7 +153,7 @@ class RowReader:
     def _check(self, skipped: int, rows: int) -> None:
         """Raise RecordingError if a file has many more lines of other kinds than rows."""
         if skipped > max(_MOST_SKIPPED, 2 * rows):
-            raise RecordingError(f"{self.path}: more than {_MOST_SKIPPED} lines are no rows", "is it a table?")
+            raise RecordingError(f"{self.path}: more than {_MOST_SKIPPED} lines are not rows", "is it a table?")
 
     def allocate(self, count: int) -> Rows:
         """Return uninitialised arrays for `count` rows."""
