@@ -92,7 +92,7 @@ def recover(
     if not Mcap().sniff(source) and source.suffix.lower() != ".mcap":
         raise RecordingError(f"{source}: is not an MCAP file", "only MCAP files have checksums to recover by")
     surveyed = Log(source, strict=False)
-    for _ in surveyed.pieces():
+    for _ in surveyed.blocks():
         pass
     findings = surveyed.findings()
     if not surveyed.count:
@@ -120,7 +120,7 @@ def _write(
 
     log = Log(source, strict=False)
     clean = CleanFile(file, log.profile)
-    for piece in log.pieces():
+    for piece in log.blocks():
         covered = [item for item in piece if all_covered or item.covered]
         if covered:
             clean.add_messages(covered, covered=True)

@@ -13,8 +13,9 @@ import numpy as np
 from mcap import records as written
 from mcap.data_stream import RecordBuilder
 
-from cdtool.formats.mcap.log import Messages
+from cdtool.formats.mcap.definitions import DefinedStream
 from cdtool.formats.mcap.records import MAGIC, crc32
+from cdtool.formats.topic_log import Messages
 
 _HEADER = 31  # bytes before a payload: opcode, length, channel id, sequence, two times
 
@@ -99,7 +100,9 @@ class CleanFile:
 
     def _define(self, channel_messages: Messages, builder: RecordBuilder, covered: bool) -> None:
         """Write schema and channel to the chunk of their first messages, and of the first messages with a CRC."""
-        channel, schema = channel_messages.stream.channel, channel_messages.stream.schema
+        stream = channel_messages.stream
+        assert isinstance(stream, DefinedStream), "the messages are those of an MCAP file"
+        channel, schema = stream.channel, stream.schema
         known = self._covered if covered else self._defined
         if channel.id in known:
             return
