@@ -14,20 +14,18 @@ import os
 import re
 import shutil
 import sqlite3
-from collections.abc import Collection, Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
-from cdtool.channels import ChannelMap
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.bag_messages import Bag, IsWanted, one_line
+from cdtool.formats.bag import Bag, one_line
 from cdtool.formats.container_checks import check_size, one_line_errors
-from cdtool.formats.pieces import Pieces, join_pieces
-from cdtool.formats.source import Source
+from cdtool.formats.topic_log import IsWanted, TopicFormat
 from cdtool.messages.batch import Stream
 from cdtool.messages.schemas import DEFINITIONS
 from cdtool.remote.remote_path import location
@@ -50,12 +48,11 @@ _LAST_STAMP = 2**63 - 1
 
 
 @dataclass(frozen=True)
-class Rosbag2:
+class Rosbag2(TopicFormat):
     """ROS 2 bags in SQLite: a column is a topic and a numeric field of its messages, as in an MCAP file."""
 
     name: ClassVar[str] = "rosbag2"
     suffixes: ClassVar[tuple[str, ...]] = (".db3", *_COMPRESSED)
-    topics: ClassVar[bool] = True
 
     def sniff(self, path: Path) -> bool:
         """Return whether the file is an SQLite database with a table of messages, compressed or not."""
@@ -67,32 +64,19 @@ class Rosbag2:
         journal = location(f"{path}{_JOURNALS[0]}")  # of a bag that was not closed, it may have all but the first bytes
         return b"messages" in head or (_is_filled(journal) and b"messages" in _head(journal))
 
-    def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
-        """Return the fields that `wanted` names, or all numeric fields; raises RecordingError."""
-        if wanted is None:
-            return join_pieces(self.pieces(path), sort=True)
-        bag = self._bag(path)
-        return bag.source(*bag.wanted(wanted))
-
-    def pieces(self, path: Path, _: Collection[str] | None = None) -> Pieces:
-        """Yield all numeric fields, some thousand messages of a topic at a time; raises RecordingError."""
-        bag = self._bag(path)
-        return bag.source(*(yield from bag.pieces()))
-
-    def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
-        """Return the names of array elements in a topic's first decodable message; () if it has none."""
-        return self._bag(path).element_names(topic)
-
-    def _bag(self, path: Path) -> _Ros2Bag:
+    def log(self, path: Path, is_wanted: IsWanted | None = None) -> Bag:
+        """Open a bag; raises RecordingError if the file is not one."""
         if not self.sniff(path):
             raise RecordingError(f"{path}: is not a ROS 2 bag", "see cdtool list formats")
-        return _Ros2Bag(path, self.name)
+        return _Ros2Bag(path, is_wanted)
 
 
 class _Ros2Bag(Bag):
     """A ROS 2 bag, read by SQLite in the order in which it was written."""
 
-    def messages(self, is_wanted: IsWanted) -> Generator[tuple[Stream, int, bytes], None, None]:
+    format = Rosbag2.name
+
+    def messages(self) -> Generator[tuple[Stream, int, bytes], None, None]:
         """Yield the messages to the bag's end or to the first damage."""
         with ExitStack() as stack:
             with one_line_errors(self.path, "a ROS 2 bag"):
@@ -104,7 +88,7 @@ class _Ros2Bag(Bag):
                     base = stack.enter_context(closing(_connect(file, damaged=True)))
                     kinds = _topics(self.path, base)
                 is_counted = self._count(base, kinds)
-                streams = self._streams(base, kinds, is_wanted)
+                streams = self._streams(base, kinds)
             unwanted = kinds.keys() - streams.keys()
             decompress, damaged = _Decompressor(), 0
             for topic, time, raw in self._rows(base, file.stat().st_size // _ROW_BYTES):
@@ -116,9 +100,9 @@ class _Ros2Bag(Bag):
                 else:
                     yield streams[topic], time, content
             if damaged:
-                self.findings.append(Finding("damaged_rows", "", {"count": damaged}))
+                self.noted.append(Finding("damaged_rows", "", {"count": damaged}))
             if not is_counted:
-                self.topics = {name: (kind, self.read.get(name, 0)) for name, (kind, _) in self.topics.items()}
+                self.counts = {name: (kind, self.read.get(name, 0)) for name, (kind, _) in self.counts.items()}
 
     def _rows(self, base: sqlite3.Connection, most: int) -> Iterator[tuple[Any, Any, Any]]:
         """Yield the rows of the table of messages, to its end or to the first damage; at most `most`."""
@@ -149,12 +133,12 @@ class _Ros2Bag(Bag):
                 with closing(sqlite3.connect(copy)) as base:  # applies the journal
                     base.execute("SELECT count(*) FROM sqlite_master").fetchone()
                     base.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
-                self.findings.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
+                self.noted.append(Finding("bag_not_closed", "", {"journal": journals[0].name}))
             yield copy
 
     def _count(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> bool:
         """Set the topics with their numbers of messages, and the origin; return False if the bag is too damaged."""
-        self.topics = {name: (kind, 0) for name, kind, _ in kinds.values()}
+        self.counts = {name: (kind, 0) for name, kind, _ in kinds.values()}
         try:
             counted = base.execute("SELECT topic_id, count(*), min(timestamp) FROM messages GROUP BY topic_id")
             rows = counted.fetchmany(_MOST_TOPICS)
@@ -165,19 +149,17 @@ class _Ros2Bag(Bag):
         for topic, count, _ in rows:
             if topic in kinds:
                 name, kind, _ = kinds[topic]
-                self.topics[name] = (kind, self.topics[name][1] + count)
+                self.counts[name] = (kind, self.counts[name][1] + count)
         self.origin = min((first for _, _, first in rows if _is_stamp(first)), default=0)
         return True
 
-    def _streams(
-        self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]], is_wanted: IsWanted
-    ) -> dict[int, Stream]:
+    def _streams(self, base: sqlite3.Connection, kinds: Mapping[int, tuple[str, str, str]]) -> dict[int, Stream]:
         """Return the streams of the wanted topics by the topics' numbers, with the definitions of their messages."""
         own = _definitions(base)
         streams: dict[int, Stream] = {}
         standard: dict[str, None] = {}
         for number, (topic, (name, kind, encoding)) in enumerate(kinds.items()):
-            if not is_wanted(name):
+            if not self.is_wanted(name):
                 continue
             definition = own.get(kind)
             if definition is None:
@@ -187,7 +169,7 @@ class _Ros2Bag(Bag):
                     standard[kind] = None
             streams[topic] = Stream(number, name, encoding, (definition[0], kind, definition[1].encode()))
         if standard:
-            self.findings.append(Finding("standard_definitions", "", {"types": tuple(standard)}))
+            self.noted.append(Finding("standard_definitions", "", {"types": tuple(standard)}))
         return streams
 
 

@@ -63,7 +63,7 @@ class Example:
         self.payload = payload
         self.content: dict[str, Any] = {}
         self._runs = [_Run(0, 1, 0, 0, "zero")]
-        self._shared: list[tuple[int, int, int]] = []
+        self.shared: list[tuple[int, int, int]] = []
         self._words: tuple[npt.NDArray[Any], ...] = ()
         self._found: dict[tuple[Field, tuple[str, ...]], Found] = {}
 
@@ -76,7 +76,7 @@ class Example:
 
     def share(self, at: int, size: int, bits: int = 0xFF) -> None:
         """Let all messages have the same bits in these bytes."""
-        self._shared.append((at, size, bits))
+        self.shared.append((at, size, bits))
 
     def find(self, field: Field, joints: tuple[str, ...]) -> Found:
         """Return the indices of a field's numbers, as the field language finds them in the content."""
@@ -92,7 +92,7 @@ class Example:
         """Return which messages of this length (n, length in whole words) have the same layout."""
         if not self._words:
             shared = np.zeros(table.shape[1], np.uint8)
-            for at, size, bits in self._shared:
+            for at, size, bits in self.shared:
                 shared[at : at + size] |= bits
             words = shared.view(np.uint64)
             used = np.flatnonzero(words)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cdtool.messages.alike import SchemaDecoder
 from cdtool.messages.decoded_batch import Decoder, UndecodableError
 from cdtool.messages.layout import SchemaError
 
@@ -22,11 +23,11 @@ def _decoder(message_encoding: str, schema_encoding: str, schema_name: str, sche
             return JsonDecoder()
         case ("cdr", "ros2msg") | ("ros1", "ros1msg"):
             from cdtool.messages.ros_definitions import parse_definitions
-            from cdtool.messages.sequential import cdr_decoder, ros1_decoder
+            from cdtool.messages.sequential import walk_cdr, walk_ros1
 
-            ros = 2 if message_encoding == "cdr" else 1
-            schema = parse_definitions(schema_name, schema_data, ros)
-            return cdr_decoder(schema) if ros == 2 else ros1_decoder(schema)
+            is_cdr = message_encoding == "cdr"
+            schema = parse_definitions(schema_name, schema_data, 2 if is_cdr else 1)
+            return SchemaDecoder(schema, walk_cdr if is_cdr else walk_ros1)
         case "protobuf", "protobuf":
             from cdtool.messages.protobuf import protobuf_decoder
 

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 from cdtool.errors import RecordingError, nearest
@@ -192,22 +191,14 @@ def joint_order(count: int, names: Sequence[str], joints: Sequence[str]) -> list
 
 
 def _member(value: Any, name: str) -> Any:
-    if isinstance(value, dict):
-        if name in value:
-            return value[name]
-    elif name in _member_names(value):
-        return getattr(value, name)
     known = _member_names(value)
-    raise FieldMissingError(f"there is no '{name}'", known)
+    if name not in known:
+        raise FieldMissingError(f"there is no '{name}'", known)
+    return value[name]
 
 
-def _member_names(value: Any) -> Sequence[str]:
-    if isinstance(value, dict):
-        return [str(name) for name in value]
-    # The ROS 2 decoder creates a class for each message type, with the fields as slots.
-    if isinstance(value, SimpleNamespace):
-        return tuple(getattr(type(value), "__slots__", ())) or tuple(vars(value))
-    return ()
+def _member_names(value: Any) -> list[str]:
+    return list(value) if isinstance(value, dict) else []
 
 
 def _is_array(value: Any) -> bool:
@@ -221,7 +212,7 @@ def _is_number(value: Any) -> bool:
 def _number(value: Any, text: str) -> float:
     if value is None:  # JSON's null
         return math.nan
-    if isinstance(value, dict | SimpleNamespace):
+    if isinstance(value, dict):
         known = [f"{text}.{name}" for name in _member_names(value)]
         raise FieldMissingError(f"'{text}' has members, it is not a number", known)
     if not _is_number(value):

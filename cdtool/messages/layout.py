@@ -27,9 +27,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Text:
-    """A string; `wide`: of wide characters, whose width depends on the writer."""
-
-    wide: bool = False
+    """A string."""
 
 
 @dataclass(frozen=True)
@@ -93,16 +91,6 @@ class Schema:
 
     root: Layout
     layouts: Mapping[str, Layout]
-
-    def walk(self) -> Iterator[Member]:
-        """Yield every member of the message and of its nested messages, each layout once."""
-        seen, waiting = {self.root.name}, [self.root]
-        while waiting:
-            for member in waiting.pop().members:
-                yield member
-                if isinstance(member.kind, Message) and member.kind.name not in seen:
-                    seen.add(member.kind.name)
-                    waiting.append(self.layouts[member.kind.name])
 
     def missing(self, field: Field) -> FieldMissingError | None:
         """Return why no message can have a field, even if the arrays that lead to it are empty; None if one can."""

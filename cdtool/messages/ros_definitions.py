@@ -35,7 +35,6 @@ _ROS1: dict[str, Kind] = {"byte": Number("i1"), "time": Message("time"), "durati
 # https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html: `byte` is an octet.
 _ROS2: dict[str, Kind] = {
     "byte": Number("u1"),
-    "wstring": Text(wide=True),
     "time": Message("builtin_interfaces/Time"),
     "duration": Message("builtin_interfaces/Duration"),
 }
@@ -117,7 +116,8 @@ def _member(text: str, name: str, title: str, names: set[str], primitives: dict[
         raise SchemaError(f"type '{text[:60]}' of {title}.{name} cannot be parsed")
     kind = primitives.get(match["base"]) or _message(match["base"], title, names)
     if kind is None:
-        raise SchemaError(f"type '{match['base']}' of {title}.{name} is not defined")
+        why = "has characters whose width depends on the writer" if match["base"] == "wstring" else "is not defined"
+        raise SchemaError(f"type '{match['base']}' of {title}.{name} {why}")
     if match["text_bound"] and not isinstance(kind, Text):
         raise SchemaError(f"type '{text[:60]}' of {title}.{name}: only strings can have a length limit")
     if not match["array"]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from cdtool.messages.alike import DamagedMessageError, Example, SchemaDecoder
+from cdtool.messages.alike import DamagedMessageError, Example
 from cdtool.messages.decoded_batch import UndecodableError
 from cdtool.messages.layout import Layout, Member, Message, Number, Schema, Text
 
@@ -21,23 +21,8 @@ PADDING = 3  # bytes that may follow a CDR message: some writers fill it up to a
 _MOST_MEMBERS = 20_000
 
 
-def cdr_decoder(schema: Schema) -> SchemaDecoder:
-    """Return the decoder of CDR messages; raises UndecodableError for wide strings."""
-    for member in schema.walk():
-        if isinstance(member.kind, Text) and member.kind.wide:
-            raise UndecodableError(
-                f"schema '{schema.root.name}': field '{member.name}' is a wstring, whose character width depends on "
-                "the writer"
-            )
-    return SchemaDecoder(schema, _walk_cdr)
-
-
-def ros1_decoder(schema: Schema) -> SchemaDecoder:
-    """Return the decoder of ROS 1 messages."""
-    return SchemaDecoder(schema, _walk_ros1)
-
-
-def _walk_cdr(schema: Schema, payload: bytes) -> Example:
+def walk_cdr(schema: Schema, payload: bytes) -> Example:
+    """Return the layout of a message; raises DamagedMessageError."""
     if len(payload) < _HEADER or payload[0] or payload[1] > 1:
         raise DamagedMessageError(f"not plain CDR (starts with {payload[:4].hex() or 'nothing'})")
     walk = _Walk(schema, payload, _HEADER, is_big=not payload[1])
@@ -45,7 +30,8 @@ def _walk_cdr(schema: Schema, payload: bytes) -> Example:
     return walk.finished()
 
 
-def _walk_ros1(schema: Schema, payload: bytes) -> Example:
+def walk_ros1(schema: Schema, payload: bytes) -> Example:
+    """Return the layout of a message; raises DamagedMessageError."""
     return _Walk(schema, payload, 0, is_big=False).finished()
 
 
@@ -58,7 +44,6 @@ class _Walk:
         self._schema, self._payload, self._header = schema, payload, header
         self._order, self._code = ("big", ">") if is_big else ("little", "<")
         self._left = _MOST_MEMBERS + len(payload)
-        self._sizes: dict[str, tuple[int, int]] = {}
 
     def finished(self) -> Example:
         """Walk the whole message; raises DamagedMessageError, or UndecodableError for a schema that is too large."""
@@ -94,14 +79,17 @@ class _Walk:
         return [self._text(member) for _ in range(count)]
 
     def _messages(self, layout: Layout, count: int) -> Sequence[Any]:
-        size, alignment = self._element_size(layout)
-        if not alignment:
-            self._check(count)
-            return [self._message(layout) for _ in range(count)]
-        self._align(alignment if count else 1)
-        begin = self.at
-        self._advance(size * count)
-        return _Elements(self, layout, begin, size, count)
+        """Walk an array of messages; if nothing in the first two has a length, the others are like the second."""
+        lengths = len(self.example.shared)
+        begins: list[int] = [self.at]
+        found: list[Any] = []
+        while len(found) < count and (len(found) < 2 or len(self.example.shared) > lengths):
+            found.append(self._message(layout))
+            begins.append(self.at)
+        if len(found) == count:
+            return found
+        self._advance((count - 2) * (begins[2] - begins[1]))
+        return _Elements(self, layout, begins, count)
 
     def element(self, layout: Layout, at: int) -> dict[str, Any]:
         """Return the message at this byte."""
@@ -142,30 +130,12 @@ class _Walk:
         if count > len(self._payload) - self.at:
             raise DamagedMessageError(f"a decoding error: its {len(self._payload)} bytes end before its last field")
 
-    def _element_size(self, layout: Layout) -> tuple[int, int]:
-        """Return size and alignment of a message that needs no padding in an array; alignment 0: it may need some."""
-        if layout.name not in self._sizes:
-            self._sizes[layout.name] = self._measured(layout)
-        return self._sizes[layout.name]
-
-    def _measured(self, layout: Layout) -> tuple[int, int]:
-        size, alignments = (0 if layout.members or not self._header else 1), set()
-        for member in layout.members:
-            if isinstance(member.kind, Text) or (member.array is not None and member.array.length is None):
-                return 0, 0
-            each = alignment = member.kind.size if isinstance(member.kind, Number) else 0
-            if isinstance(member.kind, Message):
-                each, alignment = self._element_size(self._schema.layouts[member.kind.name])
-            size += each * (member.array.length or 1 if member.array is not None else 1)
-            alignments.add(alignment if self._header or not alignment else 1)
-        return (size, max(alignments, default=1)) if len(alignments) < 2 and 0 not in alignments else (0, 0)
-
 
 class _Elements(Sequence[Any]):
-    """An array of messages of one size, each of which is walked when it is asked for: a cloud has many points."""
+    """An array of messages alike, each of which is walked when it is asked for: a cloud has many points."""
 
-    def __init__(self, walk: _Walk, layout: Layout, begin: int, size: int, count: int) -> None:
-        self._walk, self._layout, self._begin, self._size, self._count = walk, layout, begin, size, count
+    def __init__(self, walk: _Walk, layout: Layout, begins: list[int], count: int) -> None:
+        self._walk, self._layout, self._begins, self._count = walk, layout, begins, count
 
     def __len__(self) -> int:
         return self._count
@@ -173,4 +143,5 @@ class _Elements(Sequence[Any]):
     def __getitem__(self, number: Any) -> Any:
         if not 0 <= number < self._count:
             raise IndexError(number)
-        return self._walk.element(self._layout, self._begin + number * self._size)
+        first, second, third = self._begins
+        return self._walk.element(self._layout, second + (number - 1) * (third - second) if number else first)

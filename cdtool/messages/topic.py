@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,8 +27,21 @@ _FIRST = 10
 # A field's values in a batch, and which messages name other joints only. Values are None for an array that has been
 # empty so far, so that its width is unknown; the mask is None if no message names other joints only.
 Values = tuple[FloatArray | None, BoolArray | None]
-# The time stamps [ns] of a batch's messages, and each field's values.
-BatchValues = tuple[Stamps, dict[str, Values]]
+
+
+class BatchValues(NamedTuple):
+    """The time stamps [ns] of a batch's messages, and each field's values."""
+
+    stamps: Stamps
+    values: dict[str, Values]
+
+
+class FieldRows(NamedTuple):
+    """One field in a batch's messages that name its joints: time stamps [ns], exact times [s] if the log has them."""
+
+    stamps: Stamps
+    exact: FloatArray | None
+    values: FloatArray | None
 
 
 class WantedField:
@@ -64,12 +77,16 @@ class WantedField:
 class Topic:
     """The wanted fields of a topic, batch by batch.
 
-    `texts` are the fields in the field language; whole arrays with named elements are in the order of `joints`.
+    `texts` are the fields in the field language; whole arrays with named elements are in the order of `joints`. `exact`
+    is the field with the time [s] of each message, if the log's time stamps are rounded.
     """
 
-    def __init__(self, path: Path, topic: str, texts: Iterable[str], clock: str, joints: Sequence[str]) -> None:
+    def __init__(
+        self, path: Path, topic: str, texts: Iterable[str], clock: str, joints: Sequence[str], exact: str = ""
+    ) -> None:
         self.where, self.topic, self.clock, self.joints = f"{path}: {topic}", topic, clock, joints
-        self.fields = {text: WantedField(text, self.where) for text in texts}
+        self.exact = exact
+        self.fields = {text: WantedField(text, self.where) for text in (*texts, *([exact] if exact else ()))}
         self.wanted = [each.field for each in self.fields.values()]
         self.decoders, self.orders = Decoders(), StampOrders(topic)
         self.first_stamp: int | None = None  # [ns], by the chosen clock
@@ -100,7 +117,16 @@ class Topic:
             if each.elsewhere and not each.names:
                 contents = decoder.contents(batch.rows(slice(_FIRST)))
                 each.names = sorted({name for content in contents for name in each.field.names_in(content)})
-        return stamps, values
+        return BatchValues(stamps, values)
+
+    def rows_of(self, decoded: BatchValues, text: str) -> FieldRows:
+        """Return one field of the messages that name its joints."""
+        (values, other), stamps = decoded.values[text], decoded.stamps
+        exact = decoded.values[self.exact][0] if self.exact else None
+        if other is not None:
+            stamps = stamps[~other]
+            values, exact = (None if each is None else each[~other] for each in (values, exact))
+        return FieldRows(stamps, exact, values)
 
     def _check(self, decoded: DecodedBatch, whole: BoolArray) -> None:
         """Raise RecordingError for the first message without a field or without the header's time stamp.
@@ -146,18 +172,13 @@ class Topic:
 _Topic = TypeVar("_Topic", bound=Topic)
 
 
-def wanted_topics(
-    path: Path, wanted: ChannelMap, make: Callable[..., _Topic], also: Sequence[str] = ()
-) -> dict[str, _Topic]:
-    """Return the topics that a map names, each with its fields and those of `also`.
-
-    `make` creates a topic; its parameters are those of Topic.
-    """
+def wanted_topics(path: Path, wanted: ChannelMap, make: Callable[..., _Topic], exact: str = "") -> dict[str, _Topic]:
+    """Return the topics that a map names, each with its fields; `make` has the parameters of Topic."""
     texts: dict[str, dict[str, None]] = {}
     for source in wanted.sources:
         texts.setdefault(source.topic, {})[source.field] = None
     clock, joints = wanted.time.clock, wanted.joint_names
-    return {name: make(path, name, fields | dict.fromkeys(also), clock, joints) for name, fields in texts.items()}
+    return {name: make(path, name, fields, clock, joints, exact) for name, fields in texts.items()}
 
 
 def wanted_columns(
@@ -207,10 +228,13 @@ def count_values(counts: npt.NDArray[np.int64]) -> Counter[int]:
     return Counter(counts.tolist())
 
 
-def sort_times(stamps: Stamps, origin: int) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
+def sort_times(
+    stamps: Stamps, origin: int, exact: FloatArray | None = None
+) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
     """Return times [s] after `origin` [ns] in ascending order, and the order; None if they are already ascending.
 
-    The difference is between integers, as an epoch in ns has more digits than a float64; it may need all 64 bits.
+    With `exact` times [s] these are returned, in the order of the stamps. The difference is between integers, as an
+    epoch in ns has more digits than a float64; it may need all 64 bits.
     """
     after = np.ascontiguousarray(stamps).view(np.uint64) - np.uint64(origin % 2**64)
     limits = np.iinfo(stamps.dtype)
@@ -219,6 +243,6 @@ def sort_times(stamps: Stamps, origin: int) -> tuple[FloatArray, npt.NDArray[np.
     time[early] = -((~after[early] + np.uint64(1)).astype(np.float64))
     time /= 1e9
     if not (time[1:] < time[:-1]).any():
-        return time, None
+        return time if exact is None else exact, None
     order = np.argsort(time, kind="stable")
-    return time[order], order
+    return (time if exact is None else exact)[order], order

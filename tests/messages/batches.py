@@ -21,6 +21,14 @@ def batch_of(payloads):
     return Batch(data, start, length, np.zeros(len(payloads), dtype=np.uint64))
 
 
+def plain(message):
+    """Return a message of a ROS decoder, an object with slots, as dictionaries."""
+    if isinstance(message, list):
+        return [plain(item) for item in message]
+    names = getattr(type(message), "__slots__", None) if type(message).__module__ != "builtins" else None
+    return message if names is None else {name: plain(getattr(message, name)) for name in names}
+
+
 def fields_of(*texts):
     return [parse_field(text, "here") for text in texts]
 

@@ -16,7 +16,7 @@ from cdtool.messages.decoded_batch import ABSENT, UndecodableError
 from cdtool.messages.encodings import decoder_for
 from cdtool.messages.fields import FieldMissingError, numeric_fields
 from tests.data_folder import DATA, data, needs_data
-from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, header_stamp
+from tests.messages.batches import assert_follows_field_language, batch_of, fields_of, header_stamp, plain
 from tests.messages.ros_messages import definitions, numeric_texts
 
 NAME = "test_msgs/msg/Thing"
@@ -37,7 +37,7 @@ def encode(text, value, big=False, name=NAME):
 
 
 def oracle(text, payload, name=NAME):
-    return generate_dynamic(name, text)[name](payload)
+    return plain(generate_dynamic(name, text)[name](payload))
 
 
 def read(text, payloads, wanted, joints=()):
@@ -65,7 +65,7 @@ def test_random_messages_decode_as_with_the_package(data):
 def _is_empty_array(message, name):
     value = message
     for step in name.removesuffix("[:]").split("."):
-        value = getattr(value, step)
+        value = value[step]
     return name.endswith("[:]") and not len(value)
 
 
@@ -191,7 +191,7 @@ def test_a_schema_of_exponential_size_is_refused_at_once():
 
 
 def test_a_wide_string_is_refused():
-    with pytest.raises(UndecodableError, match="'s' is a wstring"):
+    with pytest.raises(UndecodableError, match="type 'wstring' of test_msgs/Thing.s has characters"):
         decoder_of("float64 data\nwstring s")
 
 
@@ -214,7 +214,7 @@ def test_files_of_other_writers_decode_as_with_the_package(name):
             assert message_encoding != "cdr" or "wstring" in text or "---" in text
             continue
         decode = generate_dynamic(title, text)[title]
-        expected = [decode(part) for part in parts]
+        expected = [plain(decode(part)) for part in parts]
         batch = batch_of(parts)
         # ROS 2's char is a uint8; the package reads it as signed.
         wanted = fields_of(*(field for field in decoder.fields(batch) if "char_value" not in field))

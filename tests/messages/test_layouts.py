@@ -19,7 +19,7 @@ def members(text):
 def test_types_arrays_defaults_constants_and_comments_are_distinguished():
     parsed = members(
         "# Thing\nint32 FIVE=5\nstring TEXT='a # b'\nfloat64 a 1.5\nstring<=10 b \"x = y\"\nint8[3] c [1, 2, 3]\n"
-        "float32[<=4] d\nstring<=3[<=2] e\nbyte f  # comment\nchar g\nwstring h\n\tbool[] i"
+        "float32[<=4] d\nstring<=3[<=2] e\nbyte f  # comment\nchar g\n\tbool[] i"
     )
     assert [(member.name, member.kind, member.array) for member in parsed] == [
         ("a", Number("f8"), None),
@@ -29,7 +29,6 @@ def test_types_arrays_defaults_constants_and_comments_are_distinguished():
         ("e", Text(), Array()),
         ("f", Number("u1"), None),
         ("g", Number("u1"), None),
-        ("h", Text(wide=True), None),
         ("i", Number("?"), Array()),
     ]
 

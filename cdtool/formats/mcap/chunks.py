@@ -13,10 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from cdtool.formats.mcap.records import PREFIX, DamageError, RefusedError, crc32
+from cdtool.formats.mcap.records import LARGEST, PREFIX, DamageError, RefusedError, crc32
 
-# The largest size of a record, compressed or not [bytes]: writers make chunks of 1 to 8 MB.
-LARGEST = 128 << 20
 # The largest compression ratio: sensor data has ratios of 2 to 50, but small chunks may be all zeros.
 LARGEST_SHARE, _SMALL = 250, 16 << 20
 # Long logs contain motion, so that their ratio is smaller. lz4 cannot reach the larger ratio.

@@ -18,7 +18,6 @@ from cdtool.formats.mcap import messages
 from cdtool.formats.mcap.attachments import check_attachment
 from cdtool.formats.mcap.chunks import (
     HEADER_LENGTH,
-    LARGEST,
     Bytes,
     ChunkHeader,
     ClaimedSizes,
@@ -30,7 +29,7 @@ from cdtool.formats.mcap.definitions import Definitions
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss, Losses
 from cdtool.formats.mcap.messages import Positions, Walk
-from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
+from cdtool.formats.mcap.records import LARGEST, MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
 from cdtool.formats.mcap.summary import Summary
 from cdtool.messages.batch import Batch
 
@@ -79,7 +78,7 @@ class DataSection:
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
 
-    def pieces(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[Block]:
         """Yield all messages that can be read."""
         yield from self._records()
         yield from self._flush()

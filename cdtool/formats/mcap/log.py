@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,96 +12,81 @@ import numpy as np
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.formats.mcap.data_section import Block, DataSection
-from cdtool.formats.mcap.definitions import DefinedStream, Definitions
+from cdtool.formats.mcap.definitions import Definitions
+from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_origin
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss
+from cdtool.formats.mcap.messages import NO_DATE
 from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, parse
 from cdtool.formats.mcap.summary import matches_header, read_summary, skippable_chunks
 from cdtool.formats.source import TopicDetails
+from cdtool.formats.topic_log import IsWanted, Messages, TopicLog
 from cdtool.messages.batch import Batch
 
 _LONGEST_HEADER = 1 << 12
 
 
-@dataclass(frozen=True)
-class Messages:
-    """Messages of one channel; `covered`: a CRC covers them and their definitions."""
-
-    stream: DefinedStream
-    batch: Batch
-    covered: bool
-
-
-@dataclass
-class Topic:
-    """All channels of one topic: schema and encoding of the first, numbers of messages and of used channels."""
-
-    name: str
-    schema: str
-    encoding: str
-    count: int = 0
-    channels: int = 0
-
-
-class Log:
-    """An MCAP file. After all `pieces()` were read, `topics`, `origin`, `count` and `findings()` are valid.
+class Log(TopicLog):
+    """An MCAP file; `counts` are the messages by channel.
 
     `wanted` selects topics: messages of other topics are only counted, and chunks without wanted topics are skipped if
     the summary is verified. Without `use_index` every chunk is read, from the start. If not `strict`, a file without
     any readable message, or with values that are known to be wrong, is a finding instead of an error.
     """
 
+    format = "mcap"
+
     def __init__(
         self,
         path: Path,
-        wanted: Callable[[str], bool] | None = None,
+        wanted: IsWanted | None = None,
         use_index: bool = True,
         strict: bool = True,
     ) -> None:
-        self.path = path
+        super().__init__(path, wanted)
         self._strict = strict
-        self._wanted = wanted or (lambda _: True)
         self._file = FileBytes(path)
         self.summary = read_summary(self._file)
-        self._skip = skippable_chunks(self._file, self.summary, self._wanted) if use_index and wanted else {}
+        self._skip = skippable_chunks(self._file, self.summary, self.is_wanted) if use_index and wanted else {}
         self._definitions = Definitions(self.summary)
         self.section = DataSection(self._file, self.summary, self._definitions, self._skip)
-        self.profile = profile_of(self._file)
+        self.profile, after = header_of(self._file)
+        origin = exact_origin(self._file, self.summary, after)
+        if origin is not None:
+            self.exact, self.exact_origin = EXACT_TIME, origin
         self.counts: Counter[int] = Counter()
-        self.topics: dict[str, Topic] = {}
-        self.origin = 0
+        self._writers: Counter[str] = Counter()  # channels with messages by topic
         self.unverified = 0
 
-    def pieces(self) -> Iterator[tuple[Messages, ...]]:
+    def blocks(self) -> Generator[Sequence[Messages], None, None]:
         """Yield the wanted messages, one memory block after the other in the file's order, channel by channel in each.
 
         Raises RecordingError if no message can be read, or if a CRC shows that values are wrong but not which ones.
         """
         with self._file:
             try:
-                for piece in self.section.pieces():
-                    yield tuple(self._usable(piece))
+                for number, block in enumerate(self.section.blocks()):
+                    self.origin = self.origin if number else self._first_valid_time()
+                    yield tuple(self._usable(block))
                 self._finish()
             except (OSError, DamageError) as fault:  # a lost drive, or a file that shrinks while it is read
                 raise RecordingError(f"{self.path}: cannot be read to its end: {fault}", "read a copy of it") from fault
+
+    def _first_valid_time(self) -> int:
+        """Return the time [ns] of the log's first message; the first valid time may be far behind it."""
+        first = self.section.first_time or 0
+        if first < NO_DATE:
+            return first
+        log = Log(self.path)
+        with log._file:
+            for _ in log.section.blocks():
+                pass
+        return log.section.first_time or 0
 
     @property
     def count(self) -> int:
         """Return the number of messages that were read."""
         return sum(self.counts.values())
-
-    @property
-    def topic_details(self) -> dict[str, TopicDetails]:
-        """Return the details of each topic."""
-        return {topic.name: TopicDetails(topic.schema, topic.count, topic.encoding) for topic in self.topics.values()}
-
-    def expected(self, topic: str) -> int:
-        """Return the number of messages of a topic in the summary; 0 if the summary is not verified."""
-        summary = self.summary
-        if not summary.verified or summary.statistics is None:
-            return 0
-        counts = summary.statistics.channel_message_counts
-        return sum(counts.get(channel.id, 0) for channel in summary.channels.values() if channel.topic == topic)
 
     def _usable(self, block: Block) -> Iterator[Messages]:
         for channel, batch in block.batches:
@@ -123,7 +108,7 @@ class Log:
         self.counts[channel] += count
         covered = covered and stream.covered
         self.unverified += 0 if covered else count
-        if self._wanted(stream.topic):
+        if self.is_wanted(stream.topic):
             yield Messages(stream, batch, covered)
 
     def _finish(self) -> None:
@@ -131,12 +116,13 @@ class Log:
         section = self.section
         for at in self._skip.keys() & section.chunks.keys():
             self.counts.update(self._skip[at])
+        details: dict[str, TopicDetails] = {}
         for stream in self._definitions.streams():
-            name = stream.topic
             schema = stream.schema.name if stream.schema is not None else "no schema"
-            topic = self.topics.setdefault(name, Topic(name, schema, stream.encoding))
-            topic.count += self.counts[stream.id]
-            topic.channels += bool(self.counts[stream.id])
+            topic = details.get(stream.topic, TopicDetails(schema, 0, stream.encoding))
+            details[stream.topic] = replace(topic, messages=topic.messages + self.counts[stream.id])
+            self._writers[stream.topic] += bool(self.counts[stream.id])
+        self.topic_details = details
         self.origin = section.first_time or 0
         self._check_data_crc()
         self._check_appended_data()
@@ -190,9 +176,11 @@ class Log:
         findings += self._differences()
         if self.unverified:
             findings.append(Finding("unverified", "", {"count": self.unverified, "messages": self.count}))
-        for topic in self.topics.values():
-            if topic.channels > 1 and self._wanted(topic.name):
-                findings.append(Finding("several_writers", topic.name, {"channels": topic.channels}))
+        findings += [
+            Finding("several_writers", topic, {"channels": channels})
+            for topic, channels in self._writers.items()
+            if channels > 1 and self.is_wanted(topic)
+        ]
         if not self.count:
             findings.append(Finding("no_message"))
         return findings
@@ -226,16 +214,16 @@ class Log:
         return findings + [Finding("defined_otherwise", topic) for topic in self._definitions.redefined_topics()]
 
 
-def profile_of(file: FileBytes) -> str:
-    """Return the profile that the file's header states, such as `ros2`; empty if there is no header."""
+def header_of(file: FileBytes) -> tuple[str, int]:
+    """Return the profile that the file's header states, such as `ros2`, and the byte after the header."""
     head = file.read(len(MAGIC), PREFIX)
-    length = int.from_bytes(head[1:], "little")
+    length, at = int.from_bytes(head[1:], "little"), len(MAGIC) + PREFIX
     if len(head) < PREFIX or head[0] != Opcode.HEADER or length > _LONGEST_HEADER:
-        return ""
+        return "", len(MAGIC)
     try:
-        return str(parse(Opcode.HEADER, file.read(len(MAGIC) + PREFIX, length)).profile)
+        return str(parse(Opcode.HEADER, file.read(at, length)).profile), at + length
     except DamageError:
-        return ""
+        return "", at + length
 
 
 def end_of_log(file: FileBytes, at: int) -> int | None:

@@ -16,10 +16,23 @@ try:  # ISA-L's function needs about a seventh of the time of zlib's, and return
 except ImportError:  # a platform without a wheel
     from zlib import crc32
 
-__all__ = ["MAGIC", "PREFIX", "DamageError", "Opcode", "RefusedError", "crc32", "parse", "parse_all", "record_length"]
+__all__ = [
+    "LARGEST",
+    "MAGIC",
+    "PREFIX",
+    "DamageError",
+    "Opcode",
+    "RefusedError",
+    "crc32",
+    "parse",
+    "parse_all",
+    "record_length",
+]
 
 MAGIC = b"\x89MCAP0\r\n"
 PREFIX = 9  # opcode (uint8) and content length (uint64)
+# The largest size of a record, compressed or not [bytes]: writers make chunks of 1 to 8 MB.
+LARGEST = 128 << 20
 # The records that are parsed whole, by their opcode.
 _KINDS: dict[int, Any] = {
     Opcode.HEADER: records.Header,
@@ -27,6 +40,7 @@ _KINDS: dict[int, Any] = {
     Opcode.SCHEMA: records.Schema,
     Opcode.CHANNEL: records.Channel,
     Opcode.CHUNK_INDEX: records.ChunkIndex,
+    Opcode.ATTACHMENT: records.Attachment,
     Opcode.ATTACHMENT_INDEX: records.AttachmentIndex,
     Opcode.METADATA_INDEX: records.MetadataIndex,
     Opcode.SUMMARY_OFFSET: records.SummaryOffset,

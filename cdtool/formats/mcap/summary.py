@@ -9,11 +9,21 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from mcap.records import Channel, ChunkIndex, Footer, Schema, Statistics
+from mcap.records import Channel, ChunkIndex, Footer, MetadataIndex, Schema, Statistics
 
-from cdtool.formats.mcap.chunks import HEADER_LENGTH, LARGEST, ChunkHeader, chunk_header
+from cdtool.formats.mcap.chunks import HEADER_LENGTH, ChunkHeader, chunk_header
 from cdtool.formats.mcap.file_bytes import FileBytes
-from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, crc32, parse, parse_all, record_length
+from cdtool.formats.mcap.records import (
+    LARGEST,
+    MAGIC,
+    PREFIX,
+    DamageError,
+    Opcode,
+    crc32,
+    parse,
+    parse_all,
+    record_length,
+)
 
 _FOOTER = PREFIX + 20  # a footer is never extended
 # The message indexes of a chunk that are read as a whole [bytes].
@@ -31,6 +41,7 @@ class Summary:
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: dict[int, ChunkIndex] = field(default_factory=dict)
     statistics: Statistics | None = None
+    metadata: tuple[MetadataIndex, ...] = ()
 
 
 def read_summary(file: FileBytes) -> Summary:
@@ -58,6 +69,7 @@ def read_summary(file: FileBytes) -> Summary:
         channels={record.id: record for record in records if isinstance(record, Channel)},
         chunks={record.chunk_start_offset: record for record in records if isinstance(record, ChunkIndex)},
         statistics=counts[0] if counts else None,
+        metadata=tuple(record for record in records if isinstance(record, MetadataIndex)),
     )
 
 

@@ -31,7 +31,7 @@ from cdtool.formats.mcap.log import Log
 def run(path):
     try:
         log = Log(Path(path))
-        for _ in log.pieces():
+        for _ in log.blocks():
             pass
         return [str(finding) for finding in log.findings()]
     except RecordingError as fault:

@@ -70,7 +70,7 @@ def test_headers_of_messages_are_read_at_their_positions(tmp_path):
         for i in range(5):
             writer.add_message(channel, 100 + i, b"x" * i, 2**63 + i, 2**32 - 1 - i)
         writer.finish()
-    ((item,),) = Log(path).pieces()
+    ((item,),) = Log(path).blocks()
     assert item.batch.log_time.tolist() == [100 + i for i in range(5)]
     assert item.batch.publish_time.tolist() == [2**63 + i for i in range(5)]
     assert item.batch.sequence.tolist() == [2**32 - 1 - i for i in range(5)]
@@ -90,4 +90,4 @@ def test_a_file_that_shrinks_while_it_is_read_is_one_clear_error(tmp_path, monke
 
     monkeypatch.setattr(FileBytes, "read_into", shrink)
     with pytest.raises(RecordingError, match="became shorter while it was read"):
-        list(log.pieces())
+        list(log.blocks())

@@ -59,7 +59,7 @@ def test_chunks_without_a_wanted_topic_are_not_read(tmp_path, monkeypatch):
         assert {name for name, _, _ in messages} == {topic}
         assert not findings
         assert log.count == 200
-        assert {name: item.count for name, item in log.topics.items()} == {"/a": 100, "/b": 100}
+        assert {name: topic.messages for name, topic in log.topic_details.items()} == {"/a": 100, "/b": 100}
         assert len(checked) < len(log.summary.chunks)
         assert log.origin == 0
 

@@ -105,7 +105,7 @@ def _of_source(source: Source, topics: tuple[str, ...] | None = None) -> Reading
 
 def _of_log(log: Log, topics: tuple[str, ...] | None = None) -> Reading:
     read: list[tuple[Key, float]] = []
-    for piece in log.pieces():
+    for piece in log.blocks():
         for messages in piece:
             batch, topic = messages.batch, messages.stream.topic
             rows = zip(batch.start.tolist(), batch.length.tolist(), batch.log_time.tolist(), strict=True)

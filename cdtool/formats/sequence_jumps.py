@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.findings import Finding
-from cdtool.formats.mcap.log import Messages
+from cdtool.messages.batch import Batch, Stream
 
 Numbers = npt.NDArray[np.uint32]
 
@@ -29,11 +29,10 @@ class SequenceJumps:
         self._all = _SequenceCount("")
         self._shared = True  # until a piece shows that the channels are not counted together
 
-    def add(self, piece: Sequence[Messages], origin: int) -> None:
+    def add(self, piece: Sequence[tuple[Stream, Batch, bool]], origin: int) -> None:
         """Add the messages of a piece; times in findings are relative to `origin` [ns]."""
         numbers, stamps = [], []
-        for messages in piece:
-            channel, batch = messages.stream, messages.batch
+        for channel, batch, _ in piece:
             sequence = batch.sequence
             if sequence.any():
                 count = self._counts.setdefault(channel.id, _SequenceCount(channel.topic))
