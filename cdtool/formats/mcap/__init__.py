@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import ClassVar
 
 from cdtool.channels import ChannelMap
-from cdtool.columns import Column, Piece
+from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
-from cdtool.formats.mcap.exact_times import EXACT_TIME, exact_times, with_exact_pieces, with_exact_times
+from cdtool.formats.mcap.exact_times import with_exact_pieces, with_exact_times
 from cdtool.formats.mcap.log import Log
 from cdtool.formats.mcap.messages import NO_DATE
 from cdtool.formats.mcap.records import MAGIC
@@ -21,7 +21,7 @@ from cdtool.formats.mcap.sequence_jumps import SequenceJumps
 from cdtool.formats.pieces import Pieces, join_pieces
 from cdtool.formats.source import Source
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.topic import BatchValues, Topic, sort_times, wanted_columns, wanted_topics
+from cdtool.messages.topic import wanted_columns, wanted_topics
 from cdtool.messages.topic_columns import TopicColumns
 from cdtool.messages.topic_survey import TopicSurvey
 
@@ -72,10 +72,6 @@ class Mcap:
         """Yield the same as `pieces`; for a log that cdtool converted, with the exact times that were written."""
         return with_exact_pieces(self.pieces(path), path)
 
-    def mapped(self, path: Path, wanted: ChannelMap) -> MappedFields:
-        """Return the fields that `wanted` names, to be read piece by piece; raises RecordingError."""
-        return MappedFields(path, wanted)
-
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """Return the names of array elements in a topic's first decodable message; () if it has none."""
         decoders = Decoders()
@@ -97,7 +93,9 @@ def _read_wanted(path: Path, wanted: ChannelMap) -> Source:
     for piece in log.pieces():
         for messages in piece:
             topics[messages.stream.topic].add(messages.stream, messages.batch)
-    return mapped_source_of(log, wanted, topics)[0]
+    logged = [topic.name for topic in log.topics.values() if topic.count]
+    columns, findings, origin = wanted_columns(log.path, wanted, topics, logged, log.origin)
+    return source_of(log, columns, log.findings() + findings, origin)
 
 
 def _origin(path: Path, log: Log) -> int:
@@ -109,69 +107,6 @@ def _origin(path: Path, log: Log) -> int:
             pass
         return log.origin
     return first
-
-
-@dataclass
-class MappedFields:
-    """An MCAP file that can be read piece by piece repeatedly; each field has a clock of its own.
-
-    The times are relative to the `origin` [ns] that the previous pass has determined; `settled`: the times of the last
-    pass were relative to the final origin.
-    """
-
-    path: Path
-    wanted: ChannelMap
-    origin: int | None = None
-    settled: bool = False
-
-    def __post_init__(self) -> None:
-        self._converted = exact_times(self.path)
-        self._fields = {source.described for source in self.wanted.sources}
-
-    def pieces(self) -> Pieces:
-        """Yield the fields that `wanted` names, some MiB of the file at a time; raises RecordingError."""
-        topics = wanted_topics(self.path, self.wanted, Topic, () if self._converted is None else (EXACT_TIME,))
-        log = Log(self.path, topics.__contains__)
-        start = self.origin
-        for piece in log.pieces():
-            first = log.section.first_time
-            if start is None and self.wanted.time.clock == "log" and first is not None and first < NO_DATE:
-                start = first
-            for messages in piece:
-                topic = topics[messages.stream.topic]
-                decoded = topic.decode(messages.stream, messages.batch)
-                if decoded is None or not len(decoded[0]):
-                    continue
-                start = int(decoded[0][0]) if start is None else start
-                for text in decoded[1]:
-                    if (name := f"{topic.topic} {text}") in self._fields:
-                        of_field = self._piece(name, text, decoded, start)
-                        if of_field.rows:
-                            yield of_field
-        source, self.origin = mapped_source_of(log, self.wanted, topics)
-        self.settled = self.origin == start
-        if self._converted is None:
-            return source
-        return replace(source, origin=float(self._converted.get("cdtool.origin_s", "0")))
-
-    def _piece(self, name: str, text: str, decoded: BatchValues, origin: int) -> Piece:
-        """Return one field of a batch's messages, without the messages that do not name its joints."""
-        stamps, (values, other) = decoded[0], decoded[1][text]
-        exact = None if self._converted is None else decoded[1][EXACT_TIME][0]
-        if other is not None:
-            stamps = stamps[~other]
-            values, exact = (None if each is None else each[~other] for each in (values, exact))
-        time, order = sort_times(stamps, origin)
-        time = time if exact is None else exact if order is None else exact[order]
-        rows = {} if values is None else {name: values if order is None else values[order]}
-        return Piece(name, time, rows, len(time))
-
-
-def mapped_source_of(log: Log, wanted: ChannelMap, topics: Mapping[str, Topic]) -> tuple[Source, int]:
-    """Return the columns of a channel map, after all pieces were read, and the origin [ns] of their times."""
-    logged = [topic.name for topic in log.topics.values() if topic.count]
-    columns, findings, origin = wanted_columns(log.path, wanted, topics, logged, log.origin)
-    return source_of(log, columns, log.findings() + findings, origin), origin
 
 
 def source_of(log: Log, columns: Mapping[str, Column], findings: Sequence[Finding], origin: int) -> Source:
