@@ -121,37 +121,24 @@ class ClockCleaner:
     """Cleans time stamps [s] piece by piece; drops those that are missing, stray, repeated or run backward.
 
     The last rows of a piece are returned with the next one, or with `final`, as later rows determine whether they are
-    stray. A coarse clock, whose time stamps repeat, is not regularised as in clean_time; `is_coarse` reports it.
+    stray. A coarse clock, whose time stamps repeat, is not regularised as in clean_time.
     """
 
     def __init__(self) -> None:
         self._dropped, self._restart = _DroppedStampCounts(), _RestartDetector()
         self._stray_marker = StrayStampMarker()
         self._steps, self._last = Distribution(), np.empty(0)
-        self._waiting: tuple[FloatArray, FloatArray, FloatArray] | None = None
+        self._waiting = np.empty(0), np.empty(0)
 
     def times(self, stamps: FloatArray, counted: FloatArray, final: bool = False) -> FloatArray:
         """Return the times of the rows that are decided and kept; `counted` are the time stamps as in the file."""
-        return self.rows(stamps, counted, np.empty((len(stamps), 0)), final)[0]
-
-    def rows(
-        self, stamps: FloatArray, counted: FloatArray, values: FloatArray, final: bool = False
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the times of the rows that are decided and kept, and their values (n, J)."""
         is_stray = self._stray_marker.add(stamps[np.isfinite(stamps)], final)
-        if self._waiting is not None:
-            waiting = self._waiting
-            stamps, counted = np.concatenate((waiting[0], stamps)), np.concatenate((waiting[1], counted))
-            values = np.concatenate((waiting[2], values))
+        stamps, counted = np.concatenate((self._waiting[0], stamps)), np.concatenate((self._waiting[1], counted))
         known = np.flatnonzero(np.isfinite(stamps))
         decided = len(stamps) if len(is_stray) == len(known) else int(known[len(is_stray)])
-        if final:
-            self._waiting = None
-        else:  # copies, as a view would keep the whole piece in memory
-            self._waiting = stamps[decided:].copy(), counted[decided:].copy(), values[decided:].copy()
-        stamps, values = stamps[:decided], values[:decided]
-        keep = self._keep(stamps, counted[:decided], is_stray)
-        return stamps[keep], values if keep.all() else values[keep]
+        # Copies, as a view would keep the whole piece in memory.
+        self._waiting = stamps[decided:].copy(), counted[decided:].copy()
+        return stamps[:decided][self._keep(stamps[:decided], counted[:decided], is_stray)]
 
     def _keep(self, stamps: FloatArray, counted: FloatArray, is_stray: BoolArray) -> BoolArray:
         """Return which of the decided rows are kept; `is_stray` is for the rows with a finite time stamp."""
@@ -164,11 +151,6 @@ class ClockCleaner:
         keep = np.zeros(len(stamps), dtype=bool)
         keep[index[~(backward | repeated)]] = True
         return keep
-
-    @property
-    def is_coarse(self) -> bool:
-        """True if so many time stamps repeat that clean_time would replace the clock by a straight line."""
-        return self._dropped.is_coarse
 
     def findings(self, first_row: int) -> list[Finding]:
         """Return the findings on dropped rows; `first_row` is the file's line of the first sample (0: unknown)."""

@@ -20,13 +20,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
@@ -38,10 +40,8 @@ from cdtool.formats.csv.cells import kind, number
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
 from cdtool.formats.csv.foreign_heads import LABVIEW, is_measurement
 from cdtool.formats.csv.text import Text, read_sample
-from cdtool.formats.csv.timed_table import ClockGroup, RowCells, RowClock, StampClock
-from cdtool.formats.pieces import Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
-from cdtool.formats.timed_text import Segment, TimedText, details_of, dialect_of_rows, opened
+from cdtool.formats.timed_text import ClockGroup, Segment, TimedText, details_of, dialect_of_rows, opened
 from cdtool.recording import FloatArray
 
 _END, _X, _COMMENT = "***End_of_Header***", "X_Value", "Comment"
@@ -58,7 +58,7 @@ _EPOCH_1904, _ABSOLUTE = 2_082_844_800, 1e9
 
 
 @dataclass(frozen=True)
-class Lvm(PiecewiseFormat):
+class Lvm:
     """LabVIEW measurement files: each channel has the times of its `X_Value` column, or of its X0 and Delta_X."""
 
     name: ClassVar[str] = "lvm"
@@ -74,49 +74,10 @@ class Lvm(PiecewiseFormat):
 
         If the machine file names a column as the clock, or pins lines in `[csv]`, the file is a table with one clock.
         """
-        if wanted is not None and _is_of_table(wanted):
+        pins, clock = (TablePins(), None) if wanted is None else (wanted.pins, wanted.time.column)
+        if clock not in (None, OWN_CLOCK) or pins.header is not None or pins.skip_lines > 0:
             return Csv().columns(path, wanted)
-        return super().columns(path, wanted)
-
-    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        log = _read_heads(path, TablePins() if wanted is None else wanted.pins)
-        return (yield from log.pieces(path, self.name, wanted, some))
-
-
-def _is_of_table(wanted: ChannelMap) -> bool:
-    column = wanted.time.column
-    return column not in (None, OWN_CLOCK) or wanted.pins.header is not None or wanted.pins.skip_lines > 0
-
-
-@dataclass(frozen=True)
-class _PacketClock:
-    """The times of a channel that is written in packets of `rows` rows, with `samples` in the first rows of each.
-
-    Samples are `step` [s] apart, the first is at `start` [s]. With a `column`, its stamps are the times of another
-    channel, `first_step` [s] apart.
-    """
-
-    rows: int
-    samples: int
-    step: float
-    start: float
-    column: int | None = None
-    first_step: float = 0.0
-    whole: tuple[int, ...] = ()
-
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """The column of times."""
-        return () if self.column is None else (self.column,)
-
-    def times(self, rows: RowCells) -> FloatArray:
-        """Return the times of the rows in which the channel has a sample."""
-        packet, row = np.divmod(np.arange(rows.first, rows.first + rows.count), self.rows)
-        if self.column is None:
-            times = self.start + (packet * self.samples + row) * self.step
-        else:
-            times = rows.numbers[self.column] + row * (self.step - self.first_step) + self.start
-        return np.where(row < self.samples, times, np.nan)
+        return _read_heads(path, pins).source(path, self.name, wanted)
 
 
 @dataclass(frozen=True)
@@ -213,7 +174,7 @@ def _read_heads(path: Path, pins: TablePins) -> TimedText:
     findings += [left_out_finding(key, "empty") for key in empty if key not in units]
     details = details_of(text, style.separator, style.decimal) | {"segments": str(len(segments))}
     start = absolute - _EPOCH_1904 if absolute else float(origin)
-    return TimedText(_with_common_clocks(segments), units, start, details, tuple(findings))
+    return TimedText(tuple(segments), units, start, details, tuple(findings))
 
 
 def _style(path: Path, lines: Sequence[str], pins: TablePins) -> _Style:
@@ -342,27 +303,28 @@ def _groups(
         alike.setdefault((beside, offsets[at], *stated), {})[key] = at
     lead = next(iter(channels), 0)
     for i, ((column, offset, step, first, _), columns) in enumerate(alike.items()):
-        at = next(iter(columns.values()))
-        clock: RowClock = StampClock(int(column), 1.0, -absolute if absolute else offset)
+        of_packet = samples[next(iter(columns.values()))]
+        clock: int | None = int(column)
+        times = partial(np.add, -absolute if absolute else offset)
         if style.counted and len(clocks) < 2:
-            clock = _PacketClock(rows or 1, samples[at] or rows or 1, step or 1.0, offset + first)
+            clock, times = None, partial(_counted, rows or 1, of_packet or rows or 1, step or 1.0, offset + first)
         elif len(clocks) < 2 and i and rows:  # the column of times is that of the first channel only
             findings.append(Finding("derived_times", "", {"channels": tuple(columns)}))
-            lead_step, lead_first = head.number("Delta_X", lead), head.number("X0", lead)
-            start = (offset - offsets[lead] - absolute if absolute else offset) + first - lead_first
-            clock = _PacketClock(rows, samples[at] or rows, step, start, 0, lead_step)
-        yield ClockGroup(f"{_X} {i}", columns, clock, sparse=True)
+            start = (offset - offsets[lead] - absolute if absolute else offset) + first - head.number("X0", lead)
+            clock, times = 0, partial(_derived, rows, of_packet or rows, step - head.number("Delta_X", lead), start)
+        yield ClockGroup(columns, clock, times, sparse=True)
 
 
-def _with_common_clocks(segments: Sequence[Segment]) -> tuple[Segment, ...]:
-    """Return segments in which equal names of clocks mean the same channels: otherwise each channel has its own."""
-    if len({tuple((group.name, *group.columns) for group in segment.groups) for segment in segments}) == 1:
-        return tuple(segments)
+def _counted(rows: int, samples: int, step: float, start: float, numbers: npt.NDArray[Any]) -> FloatArray:
+    """Return the times of rows, by their numbers: packets of `rows` rows, in the first of which are `samples`."""
+    packet, row = np.divmod(numbers, rows)
+    return np.where(row < samples, start + (packet * samples + row) * step, np.nan)
 
-    def alone(groups: Sequence[ClockGroup]) -> tuple[ClockGroup, ...]:
-        return tuple(replace(each, name=key, columns={key: at}) for each in groups for key, at in each.columns.items())
 
-    return tuple(replace(segment, groups=alone(segment.groups)) for segment in segments)
+def _derived(rows: int, samples: int, longer: float, start: float, stamps: npt.NDArray[Any]) -> FloatArray:
+    """Return the times of rows from the stamps of another channel, whose step is by `longer` [s] shorter."""
+    row = np.arange(len(stamps)) % rows
+    return np.where(row < samples, stamps + row * longer + start, np.nan)
 
 
 def _instant(date: str, time: str) -> Fraction | None:

@@ -9,7 +9,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -24,25 +23,6 @@ VALUES_PER_PIECE = 1 << 20
 
 # The generator's return value is the source, whose columns have names, units and widths, but no rows.
 Pieces = Generator[Piece, None, Source]
-
-
-class MappedLog(Protocol):
-    """The columns of a channel map, which can be read piece by piece repeatedly; each column has a clock of its own.
-
-    `settled`: the times of the last pass are relative to the origin of its source.
-    """
-
-    settled: bool
-
-    def pieces(self) -> Pieces:
-        """Yield the columns from the first row to the last; raises RecordingError."""
-        ...
-
-
-def open_mapped_log(file_format: Format, path: Path, wanted: ChannelMap) -> MappedLog | None:
-    """Return the columns that `wanted` names, to be read piece by piece; None if the format does not support it."""
-    opener: Callable[[Path, ChannelMap], MappedLog] | None = getattr(file_format, "mapped", None)
-    return None if opener is None else opener(path, wanted)
 
 
 class PiecewiseFormat(ABC):

@@ -62,12 +62,12 @@ class TopicLog(ABC):
         names, details = tuple(columns), self.topic_details
         return Source(self.path, self.format, columns, start, tuple(findings), names=names, topics=details)
 
-    def mapped_source(self, wanted: ChannelMap, topics: Mapping[str, Topic]) -> tuple[Source, int]:
-        """Return the columns of a channel map, after all blocks were read, and the origin [ns] of their stamps."""
+    def mapped_source(self, wanted: ChannelMap, topics: Mapping[str, Topic]) -> Source:
+        """Return the columns of a channel map, after all blocks were read."""
         logged = [name for name, topic in self.topic_details.items() if topic.messages]
         columns, findings, origin = wanted_columns(self.path, wanted, topics, logged, self.origin)
         start = self.exact_origin if self.exact else origin / 1e9
-        return self.source(columns, self.findings() + findings, start), origin
+        return self.source(columns, self.findings() + findings, start)
 
 
 class TopicFormat(ABC):
@@ -90,7 +90,7 @@ class TopicFormat(ABC):
         topics = wanted_topics(path, wanted, TopicColumns, log.exact)
         for stream, batch, *_ in chain.from_iterable(log.blocks()):
             topics[stream.topic].add(stream, batch)
-        return log.mapped_source(wanted, topics)[0]
+        return log.mapped_source(wanted, topics)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:  # noqa: ARG002  all keys
         """Yield all numeric fields, some MiB of the file at a time; raises RecordingError."""

@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
 from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
@@ -29,11 +30,10 @@ from cdtool.formats.csv.cells import kind, number, split_line
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
 from cdtool.formats.csv.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
 from cdtool.formats.csv.text import Text, read_sample
-from cdtool.formats.csv.timed_table import ClockGroup, RowClock, StampClock, TickClock
-from cdtool.formats.pieces import Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
-from cdtool.formats.timed_text import Segment, TimedText, details_of, dialect_of_rows, opened
+from cdtool.formats.timed_text import ClockGroup, Segment, TimedText, details_of, dialect_of_rows, opened
 from cdtool.plain_text import counted
+from cdtool.recording import FloatArray
 
 # The keys of lines about the file: of Scope View in TwinCAT 3 and in TwinCAT 2.
 _FILE_KEYS = ("File", *SCOPE_STARTS, "Endtime of export", "EndRecord")
@@ -48,8 +48,8 @@ _CHANNEL_KEYS = (
 _MOST_HEAD, _MOST_FILE_LINES = 1 << 22, 20
 _SAMPLE_ROWS = 50
 _TICKS_PER_S, _TICKS_1970 = 1e7, 116_444_736_000_000_000
-# Ticks have 18 digits; no export is long enough for as many milliseconds.
-_FEWEST_TICKS = 10**16
+# Ticks since 1917 have 18 digits: fewer are damaged. No export is long enough for as many milliseconds.
+_FEWEST_TICKS = 10**17
 _EXPORT_AGAIN = "export it again with 'Timelines' set to 'For each sampletime' or 'All'"
 _NAME = re.compile(rf"(?<![^ ]){NAME}(?![^ ])")
 # A unit with its quantity in parentheses, `(None)`, or any other word.
@@ -58,7 +58,7 @@ _WORDED_UNIT = re.compile(r"(?P<unit>[^(]*?)\s*\([^()]*\)")
 
 
 @dataclass(frozen=True)
-class TwincatScope(PiecewiseFormat):
+class TwincatScope:
     """Text exports of TwinCAT Scope: each channel has the times beside it, in s since the start of the export."""
 
     name: ClassVar[str] = "twincat_scope"
@@ -74,12 +74,10 @@ class TwincatScope(PiecewiseFormat):
 
         Lines that the machine file pins in `[csv]` are those of a table of any kind.
         """
-        pinned = wanted is not None and (wanted.pins.header is not None or wanted.pins.skip_lines > 0)
-        return Csv().columns(path, wanted) if pinned else super().columns(path, wanted)
-
-    def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
-        log = _read_export(path, TablePins() if wanted is None else wanted.pins)
-        return (yield from log.pieces(path, self.name, wanted, some))
+        pins = TablePins() if wanted is None else wanted.pins
+        if pins.header is not None or pins.skip_lines > 0:
+            return Csv().columns(path, wanted)
+        return _read_export(path, pins).source(path, self.name, wanted)
 
 
 @dataclass(frozen=True)
@@ -137,21 +135,25 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
     named = [columns.get(at, "") for at in range(width)]
     dialect = dialect_of_rows(text, pins, (head.separator, decimal), (head.line, head.start), named, head.rows)
     ticks = [int(row[at]) for row in head.rows for at in clocks if _is_tick(row, at)]
-    groups = []
+    first, groups = min(ticks, default=0), list[ClockGroup]()
+
+    def times(stamps: npt.NDArray[Any]) -> FloatArray:
+        # The difference of ticks is exact before it is rounded; missing ones are negative.
+        return np.where(stamps < _FEWEST_TICKS, np.nan, (stamps - first) / _TICKS_PER_S) if ticks else stamps / 1000.0
+
     for at, end in zip(clocks, [*clocks[1:], width], strict=True):
         members = {columns[i]: i for i in range(at + 1, end) if i in columns}
         stated = {_number(head.cell((_PERIOD, "SampleTime"), i)) for i in members.values()}
         period = stated.pop() / 1000.0 if len(stated) == 1 else 0.0
-        clock: RowClock = TickClock(at, _TICKS_PER_S, min(ticks)) if ticks else StampClock(at, 1000.0)
         if members:
-            groups.append(ClockGroup(f"time {at}", members, clock, held=True, period=period))
+            groups.append(ClockGroup(members, at, times, ticks=bool(ticks), held=True, period=period))
     details = details_of(text, head.separator, decimal) | {
         "times": "FILETIME" if ticks else "ms since the start of the export",
         "columns of times": str(len(groups)),
     }
     of_groups = {key: at for group in groups for key, at in group.columns.items()}
     units = {key: _unit(head.cell((_UNIT,), at)) for key, at in of_groups.items()}
-    origin = (min(ticks) - _TICKS_1970) / _TICKS_PER_S if ticks else _start(head)
+    origin = (first - _TICKS_1970) / _TICKS_PER_S if ticks else _start(head)
     return TimedText((Segment(dialect, tuple(groups)),), units, origin, details, tuple(findings))
 
 
@@ -248,7 +250,7 @@ def _start(head: _Head) -> float:
 
 def _is_tick(row: Sequence[str], at: int) -> bool:
     cell = row[at] if at < len(row) else ""
-    return cell.isascii() and cell.isdigit() and len(cell) <= len(str(_TICKS_1970)) and int(cell) > _FEWEST_TICKS
+    return cell.isascii() and cell.isdigit() and len(cell) <= len(str(_TICKS_1970)) and int(cell) >= _FEWEST_TICKS
 
 
 def _decimal_mark(text: Text, head: _Head) -> str:

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 import cdtool
 from cdtool.errors import RecordingError
 from cdtool.formats.lvm import Lvm
-from cdtool.formats.pieces import join_pieces
 from cdtool.ingest.reading import choose_format, read_recording, survey
 from tests.findings.facts import fact_of
 from tests.formats.lvm_files import START_S, Channel, Style, measurement
@@ -56,8 +55,6 @@ def test_each_channel_has_its_values_unit_and_times(log, style):
     source = survey(path)
     assert_read(source, FORCE, TORQUE)
     assert source.origin == START_S and not source.findings
-    assert_read(join_pieces(Lvm().pieces(path), sort=False), FORCE, TORQUE)
-    assert_read(join_pieces(Lvm().pieces(path, ["Torque"]), sort=False), TORQUE)
 
 
 def test_the_content_decides_whatever_the_suffix(log):

@@ -25,8 +25,7 @@ from cdtool.formats.epoch_clock import EpochClock, common_origin
 from cdtool.formats.mat import version_5, version_73
 from cdtool.formats.mat.datenum import DAY_1970, DAY_S, is_datenum, since_first
 from cdtool.formats.mat.layout import Layout, arrange_columns
-from cdtool.formats.mat.leaves import MatColumn
-from cdtool.formats.mat.variables import Variables
+from cdtool.formats.mat.variables import MatColumn, Variables
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import FloatArray
@@ -118,10 +117,8 @@ class _Reader:
 
     def _check_sizes(self, columns: list[MatColumn]) -> None:
         """Raise RecordingError if the columns are far larger than the file: it is a decompression bomb."""
-        sections = [section for column in columns for section in column.sections]
-        whole = {id(section.numbers): section.numbers for section in sections if section.numbers is not None}
-        declared = sum(math.prod(each.shape) * (1 + each.is_complex) for each in whole.values())
-        check_size(self._path, declared + sum(section.rows for section in sections))
+        whole = {id(section.numbers): section.numbers for column in columns for section in column.sections}
+        check_size(self._path, sum(math.prod(each.shape) * (1 + each.is_complex) for each in whole.values()))
 
     def _column(self, key: str, values: npt.NDArray[Any], time: FloatArray | None) -> Column:
         """Return a column; a clock that counts days is read in seconds."""
@@ -149,15 +146,14 @@ class _Reader:
     def _values(self, key: str, column: MatColumn) -> npt.NDArray[Any] | None:
         """Return the values of a column as the file has them; None for a complex column."""
         for section in column.sections:
-            if section.numbers is not None and section.numbers.is_complex:
+            if section.numbers.is_complex:
                 self.complex.append(key)
-                self.findings.append(
-                    Finding("variable_left_out", "", {"variable": section.name, "what": "complex", "advice": ""})
-                )
+                fact = {"variable": section.variable, "what": "complex", "advice": ""}
+                self.findings.append(Finding("variable_left_out", "", fact))
                 return None
-            if section.numbers is not None and section.numbers.is_across:
+            if section.numbers.is_across:
                 rows, columns = section.numbers.shape
-                shape = {"thing": "variable", "name": section.name, "rows": rows, "columns": columns}
+                shape = {"thing": "variable", "name": section.variable, "rows": rows, "columns": columns}
                 self.findings.append(Finding("rows_as_columns", "", shape))
         parts = [section.values() for section in column.sections]
         values = parts[0] if len(parts) == 1 else np.concatenate(parts)

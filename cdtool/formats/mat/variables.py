@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from cdtool.errors import RecordingError
@@ -48,6 +49,31 @@ class Numbers:
     def table(self) -> npt.NDArray[Any]:
         """Return a vector or matrix as a table (n, k), its rows along the longer dimension."""
         return (self.read() if self.shape[0] >= self.shape[1] else self.read().T).reshape(max(self.shape), -1)
+
+    def repeated(self, rows: int) -> Numbers:
+        """Return a single number in each of so many rows."""
+        return Numbers((rows, 1), lambda: np.repeat(self.table, rows, axis=0), self.is_complex)
+
+
+@dataclass(frozen=True)
+class Section:
+    """The rows of a column that a variable contains: column `index` of its table."""
+
+    variable: str
+    numbers: Numbers
+    index: int = 0
+
+    def values(self) -> npt.NDArray[Any]:
+        """Return its values (n,)."""
+        return self.numbers.table[:, self.index]
+
+
+@dataclass(frozen=True)
+class MatColumn:
+    """A column: its sections, one after the other, and the name of the column that is its clock; empty if unknown."""
+
+    sections: tuple[Section, ...]
+    clock: str = ""
 
 
 @dataclass(frozen=True)
