@@ -30,6 +30,8 @@ _STEPS = 2048
 _SETTLED = 3.0
 # x - x^2/2! + x^3/3! ..., four powers in a row: 1 - exp(-x) up to x = 0.3, where the first term left out is 1e-17.
 _SERIES = np.array([-((-1.0) ** k) / math.factorial(k) for k in range(1, 13)]).reshape(3, 4)
+# A mode is not faster than the slowest by more: its time constant is 0 up to rounding.
+_ROUNDING = np.finfo(np.float64).eps
 
 
 @dataclass(frozen=True)
@@ -167,8 +169,11 @@ def relaxations(scaled: FloatArray, elapsed: FloatArray, by_modes: BoolArray) ->
     A series of X, as far as X is small, which has no time constant (1 s). Where that is needed (`by_modes`), and where
     X is not small, each mode of S has its own factor.
     """
-    x = np.linalg.solve(scaled, elapsed[:, np.newaxis, np.newaxis] * np.eye(scaled.shape[1]))
-    by_modes = by_modes | ~(np.linalg.norm(x, axis=(1, 2)) <= 0.3)
+    try:
+        x = np.linalg.solve(scaled, elapsed[:, np.newaxis, np.newaxis] * np.eye(scaled.shape[1]))
+        by_modes = by_modes | ~(np.linalg.norm(x, axis=(1, 2)) <= 0.3)
+    except np.linalg.LinAlgError:  # a motion without inertia, as that of a stretched arm of point masses
+        x, by_modes = np.zeros_like(scaled), np.ones_like(by_modes)
     square = x @ x
     powers = np.stack((x, square, square @ x, square @ square))
     groups = np.tensordot(_SERIES, powers, 1)
@@ -176,6 +181,7 @@ def relaxations(scaled: FloatArray, elapsed: FloatArray, by_modes: BoolArray) ->
     for group in groups[-2::-1]:
         shares = group + powers[-1] @ shares
     constants, modes = np.linalg.eigh(scaled[by_modes])
+    constants = np.maximum(constants, _ROUNDING * constants[:, -1:])
     own = -np.expm1(-elapsed[by_modes, np.newaxis] / constants)
     shares[by_modes], slowest[by_modes] = (modes * own[:, np.newaxis]) @ modes.transpose(0, 2, 1), constants[:, -1]
     return shares, slowest

@@ -47,7 +47,7 @@ class PlanarArm(CoupledMachine):
         keys = cls.drive_keys(table, cls.link_names)
         if len(keys["joints"]) != _LINKS:
             raise table.fault("joints", f"names {len(keys['joints'])} joints", "a planar arm has 2: arm and forearm")
-        return cls(
+        arm = cls(
             **keys,
             link_mass=table.numbers("link_mass", _LINKS, above=0.0),
             link_length=table.number("link_length", above=0.0),
@@ -56,6 +56,10 @@ class PlanarArm(CoupledMachine):
             imu_position=table.numbers("imu_position", _LINKS, 0.0, minimum=0.0),
             gravity_acceleration=table.number("gravity", 9.81, minimum=0.0),
         )
+        if not arm.nominal_inertia[1] > 0.0:
+            problem = f"joint '{arm.joints[1]}' moves no inertia"
+            raise table.fault("link_inertia", problem, "give it, its centre_of_mass, or motor_inertia")
+        return arm
 
     @property
     def nominal_inertia(self) -> FloatArray:

@@ -61,6 +61,15 @@ def test_a_relaxation_has_the_50_digits_of_its_matrix_up_to_rounding(size, condi
     np.testing.assert_allclose(slowest, 0.1, rtol=1e-14)
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-15])
+def test_a_motion_without_inertia_relaxes_at_once_and_the_others_as_slowly_as_ever(off):
+    matrix = np.array([[[0.1, 0.1 + off], [0.1 + off, 0.1]]])
+    found, _ = relaxations(matrix, np.array([0.01]), np.zeros(1, dtype=bool))
+    together = -np.expm1(-0.01 / 0.2)
+    expected = 0.5 * np.array([[together + 1, together - 1], [together - 1, together + 1]])
+    np.testing.assert_allclose(found[0], expected, rtol=1e-12)
+
+
 def observed_by_modes(time, balance, speed, inertia, missing, motion_missing, gains):
     """The same recursion in plain Python, with the eigenvalues of every step."""
     root, value, settled, last = np.sqrt(gains), np.zeros(len(gains)), 0.0, -1

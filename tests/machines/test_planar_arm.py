@@ -204,6 +204,12 @@ def test_parameters_that_cannot_be_are_refused_by_name(key, value, message):
         arm_of(values)
 
 
+def test_a_forearm_without_inertia_is_refused():
+    values = ARM | {"centre_of_mass": [0.1, 0.0], "link_inertia": 0.0, "motor_inertia": 0.0}
+    with pytest.raises(ConfigurationError, match=r"machine.link_inertia: joint 'forearm' moves no inertia"):
+        arm_of(values)
+
+
 POINTS = [("arm", (0.28, 0.0, 0.0)), ("forearm", (0.2, 0.0, 0.05))]
 
 
