@@ -23,7 +23,7 @@ from cdtool.messages.fields import Field, FieldMissingError
 from cdtool.messages.layout import Schema
 from cdtool.recording import FloatArray
 
-# Layouts that are kept for the next batch: writers have a few, such as one for each length of a varint.
+# Layouts that others are compared with: writers have a few, such as one for each length of a varint.
 _MOST_LAYOUTS = 64
 Found = float | list[float] | FieldMissingError | None
 
@@ -179,26 +179,20 @@ class SchemaDecoder(Decoder):
         remaining = np.arange(len(batch))
         for example in self._known:
             remaining = _take(batch, example, remaining, groups)
-        while len(remaining) and len(groups) <= _MOST_LAYOUTS:
+        while len(remaining):
             row = int(remaining[0])
             try:
                 example = self.walk(self.schema, batch.payload(row))
             except DamagedMessageError as fault:
                 reasons[row], remaining = str(fault), remaining[1:]
                 continue
-            remaining = _take(batch, example, remaining, groups)
+            if len(groups) > _MOST_LAYOUTS:  # comparing would take longer than walking
+                _take(batch, example, remaining[:1], groups)
+                remaining = remaining[1:]
+            else:
+                remaining = _take(batch, example, remaining, groups)
         used = [group.example for group in groups if isinstance(group, _Alike)]
         self._known = (used + [each for each in self._known if each not in used])[:_MOST_LAYOUTS]
-        for k, row in enumerate(remaining.tolist()):  # so many layouts that comparing takes longer than walking
-            payload = batch.payload(row)
-            try:
-                example = self.walk(self.schema, payload)
-            except DamagedMessageError as fault:
-                reasons[row] = str(fault)
-            else:
-                groups.append(
-                    _Alike(remaining[k : k + 1], example.content, example, np.frombuffer(payload, np.uint8)[None])
-                )
         return groups, reasons
 
 
