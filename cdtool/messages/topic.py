@@ -18,7 +18,7 @@ from cdtool.findings import Finding
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch, FieldValues
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.fields import FieldMissingError, missing_field, parse_field
+from cdtool.messages.fields import FieldMissingError, element_names, missing_field, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps
 from cdtool.recording import GROUND_TRUTH, BoolArray, FloatArray
 
@@ -118,7 +118,7 @@ class Topic:
             if each.elsewhere and not each.names:
                 first = batch.rows(slice(_FIRST))
                 contents = self.decoders.attempt(stream, first, lambda decoder, first=first: decoder.contents(first))  # type: ignore[misc]
-                each.names = sorted({name for content in contents or () for name in each.field.names_in(content)})
+                each.names = sorted({name for content in contents or () for name in element_names(content)})
         return BatchValues(stamps, values)
 
     def rows_of(self, decoded: BatchValues, text: str) -> FieldRows:

@@ -38,7 +38,7 @@ from cdtool.messages.batch import Batch
 # Chunks are joined up to this size [bytes]: messages of many small ones are then decoded together.
 JOINED = 1 << 23
 _SPARE = 8  # bytes after the last message in memory, so that all messages can be gathered in whole words
-_SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
+_WINDOW = 1 << 20  # bytes of records outside of chunks that are read at once
 _SEARCHED = 1 << 20  # bytes that are searched at once for the next chunk
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 _INDEX_HEAD = PREFIX + 6  # before the entries of a message index: prefix, channel id, length of the entries
@@ -78,7 +78,6 @@ class DataSection:
         self._size, self._covered = 0, False  # of what is in memory
         self._found: list[Positions] = []
         self._cuts: dict[int, int] = {}
-        self._window = _SMALLEST_WINDOW
         self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
@@ -237,14 +236,13 @@ class DataSection:
         """Yield the records outside of chunks that fit into a window, and return the byte after them."""
         if length > LARGEST:
             raise DamageError(f"a record declares {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
-        size = min(max(self._window, length), self._file.size - at)
+        size = min(max(_WINDOW, length), self._file.size - at)
         yield from self._make_room(size, covered=False)
         window = self._memory[self._size : self._size + size]
         self._file.read_into(at, window)
         walked = messages.walk(window, top_level=True)
         self._add(window[: walked.end], walked, at)
         self._resync.verified_to = at + walked.end
-        self._window = min(4 * self._window, _LARGEST_WINDOW) if 2 * walked.end > len(window) else _SMALLEST_WINDOW
         if walked.reason == messages.SHORT_MESSAGE:
             return self._resume(at + walked.end, walked.reason)
         return at + walked.end
