@@ -15,6 +15,7 @@ from cdtool.findings import Finding
 from cdtool.messages.batch import Batch, Stream
 
 Numbers = npt.NDArray[np.uint32]
+Times = npt.NDArray[np.uint64]
 
 # Numbers are a count if at least this share of the steps is 1, and at most this share is backward. A log from which
 # messages were removed regularly has other steps.
@@ -60,41 +61,33 @@ class _SequenceCount:
     def __init__(self, topic: str) -> None:
         self._topic = topic
         self._last: Numbers = np.empty(0, np.uint32)
-        self._last_time = self._jump_time = 0.0
+        self._last_time: Times = np.empty(0, np.uint64)
+        self._jump_time: float | None = None
         self._steps = self._ones = self._back = self._jumps = self._missing = 0
 
     def is_continued_by(self, numbers: Numbers) -> bool:
         """Return whether the numbers of the next piece can continue this count: they are not far behind it."""
         return not len(self._last) or int(numbers[0]) + len(numbers) // 2 > int(self._last[0])
 
-    def add(self, numbers: Numbers, stamps: npt.NDArray[np.uint64], origin: int) -> None:
-        known = np.concatenate((self._last, numbers))
+    def add(self, numbers: Numbers, stamps: Times, origin: int) -> None:
+        known, times = np.concatenate((self._last, numbers)), np.concatenate((self._last_time, stamps))
         steps = np.diff(known).view(np.int32)  # modulo 2^32, where the count overflows
         jumps = np.flatnonzero(steps > 1)
         self._steps += len(steps)
         self._ones += int(np.count_nonzero(steps == 1))
         self._back += int(np.count_nonzero(steps < 1))
-        if len(jumps):
-            if not self._jumps:
-                before = int(jumps[0]) - len(self._last)
-                self._jump_time = (int(stamps[before]) - origin) / 1e9 if before >= 0 else self._last_time
-            self._jumps += len(jumps)
-            self._missing += int(np.sum(steps[jumps].astype(np.int64) - 1))
-        self._last, self._last_time = known[-1:].copy(), (int(stamps[-1]) - origin) / 1e9
+        self._jumps += len(jumps)
+        self._missing += int(np.sum(steps[jumps].astype(np.int64) - 1))
+        if len(jumps) and self._jump_time is None:
+            self._jump_time = (int(times[jumps[0]]) - origin) / 1e9
+        self._last, self._last_time = known[-1:].copy(), times[-1:].copy()
 
     def findings(self) -> list[Finding]:
         is_count = self._ones >= _ONES * self._steps and self._back <= _BACK * self._steps
-        if not self._jumps or not is_count:
-            return []
-        return [
-            Finding(
-                "missing_messages",
-                self._topic,
-                {
-                    "jumps": self._jumps,
-                    "missing": self._missing,
-                    "after": self._jump_time,
-                    "of_topic": bool(self._topic),
-                },
-            )
-        ]
+        fact = {
+            "jumps": self._jumps,
+            "missing": self._missing,
+            "after": self._jump_time,
+            "of_topic": bool(self._topic),
+        }
+        return [Finding("missing_messages", self._topic, fact)] if self._jumps and is_count else []

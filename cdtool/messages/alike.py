@@ -18,20 +18,12 @@ import numpy.typing as npt
 
 from cdtool.columns import as_float64
 from cdtool.messages.batch import Batch
-from cdtool.messages.decoded_batch import (
-    MOST_FIELDS,
-    ByteArray,
-    DecodedBatch,
-    IntArray,
-    absent_field,
-    decoded_batch,
-    field_values,
-)
+from cdtool.messages.decoded_batch import MOST_FIELDS, ByteArray, Decoder, Group, IntArray
 from cdtool.messages.fields import Field, FieldMissingError
 from cdtool.messages.layout import Schema
 from cdtool.recording import FloatArray
 
-# Layouts that are kept for the next batch: writers have a few, such as one for each length of a varint.
+# Layouts that others are compared with: writers have a few, such as one for each length of a varint.
 _MOST_LAYOUTS = 64
 Found = float | list[float] | FieldMissingError | None
 
@@ -147,17 +139,12 @@ def _numbers(content: ByteArray, run: _Run) -> FloatArray | float:
     return as_float64(words.astype(types.get(run.code, np.int64)))[:, None]
 
 
-@dataclass(frozen=True, eq=False)
-class _Alike:
-    """The messages `rows` of a batch that are alike: a Group (decoded_batch.py)."""
+@dataclass(eq=False)
+class _Alike(Group):
+    """Messages with the layout of an example."""
 
-    rows: IntArray
     example: Example
     table: ByteArray
-
-    @property
-    def content(self) -> dict[str, Any]:
-        return self.example.content
 
     def find(self, field: Field, joints: Sequence[str]) -> Found:
         return self.example.find(field, tuple(joints))
@@ -167,8 +154,8 @@ class _Alike:
 
 
 @dataclass
-class SchemaDecoder:
-    """A Decoder (decoded_batch.py) for messages whose schema defines every field; `walk` reads one of them."""
+class SchemaDecoder(Decoder):
+    """Decoder of messages whose schema defines every field; `walk` reads one of them."""
 
     schema: Schema
     walk: Callable[[Schema, bytes], Example]
@@ -179,57 +166,37 @@ class SchemaDecoder:
         """Return every numeric field except the header's stamp, in schema order; arrays only if they may be short."""
         return list(islice(self.schema.numeric_names(), MOST_FIELDS))
 
-    def contents(self, batch: Batch) -> list[dict[str, Any]]:
-        """Return the messages of a batch that can be decoded, as objects of the field language."""
-        groups, _ = self._groups(batch)
-        return [group.content for group in sorted(groups, key=lambda group: int(group.rows[0]))]
-
-    def decode(
-        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
-    ) -> DecodedBatch:
-        """Decode the wanted fields of all messages; one that the schema does not have is absent in all."""
-        groups, reasons = self._groups(batch)
-        n = len(batch)
-        fields = tuple(
-            field_values(n, groups, each, joints) if (fault := self._fault(each)) is None else absent_field(n, fault)
-            for each in wanted
-        )
-        return decoded_batch(n, fields, reasons, groups if stamps else None)
-
-    def _fault(self, field: Field) -> FieldMissingError | None:
+    def absent(self, field: Field) -> FieldMissingError | None:
+        """Return why no message can have a field."""
         if field not in self._faults:
             self._faults[field] = self.schema.missing(field)
         return self._faults[field]
 
-    def _groups(self, batch: Batch) -> tuple[list[_Alike], dict[int, str]]:
+    def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
         """Return the messages that are alike, and the reasons for those that are damaged by row."""
-        groups: list[_Alike] = []
+        groups: list[Group] = []
         reasons: dict[int, str] = {}
         remaining = np.arange(len(batch))
         for example in self._known:
             remaining = _take(batch, example, remaining, groups)
-        while len(remaining) and len(groups) <= _MOST_LAYOUTS:
+        while len(remaining):
             row = int(remaining[0])
             try:
                 example = self.walk(self.schema, batch.payload(row))
             except DamagedMessageError as fault:
                 reasons[row], remaining = str(fault), remaining[1:]
                 continue
-            remaining = _take(batch, example, remaining, groups)
-        used = [group.example for group in groups]
-        self._known = (used + [each for each in self._known if each not in used])[:_MOST_LAYOUTS]
-        for k, row in enumerate(remaining.tolist()):  # so many layouts that comparing takes longer than walking
-            payload = batch.payload(row)
-            try:
-                example = self.walk(self.schema, payload)
-            except DamagedMessageError as fault:
-                reasons[row] = str(fault)
+            if len(groups) > _MOST_LAYOUTS:  # comparing would take longer than walking
+                _take(batch, example, remaining[:1], groups)
+                remaining = remaining[1:]
             else:
-                groups.append(_Alike(remaining[k : k + 1], example, np.frombuffer(payload, np.uint8)[None]))
+                remaining = _take(batch, example, remaining, groups)
+        used = [group.example for group in groups if isinstance(group, _Alike)]
+        self._known = (used + [each for each in self._known if each not in used])[:_MOST_LAYOUTS]
         return groups, reasons
 
 
-def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[_Alike]) -> IntArray:
+def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[Group]) -> IntArray:
     """Add the messages that are like the example to the groups, and return the others."""
     size = len(example.payload)
     fits: npt.NDArray[np.bool_] = batch.length[remaining] == size
@@ -244,9 +211,9 @@ def _take(batch: Batch, example: Example, remaining: IntArray, groups: list[_Ali
     )
     alike = example.alike(table)
     if alike.all():
-        groups.append(_Alike(rows, example, table))
+        groups.append(_Alike(rows, example.content, example, table))
         return remaining[~fits]
     if alike.any():
-        groups.append(_Alike(rows[alike], example, table[alike]))
+        groups.append(_Alike(rows[alike], example.content, example, table[alike]))
     fits[fits] = alike
     return remaining[~fits]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -61,57 +62,64 @@ class DecodedBatch:
     has_stamp: npt.NDArray[np.bool_] | None = None
 
 
-class Decoder(Protocol):
+@dataclass(eq=False)
+class Group(ABC):
+    """Messages `rows` of a batch that one object of the field language describes.
+
+    The object has a number, or in place of each number what `read` needs to return those of all messages.
+    """
+
+    rows: IntArray
+    content: Any
+
+    @abstractmethod
+    def find(self, field: Field, joints: Sequence[str]) -> float | list[float] | FieldMissingError | None:
+        """Return what the field language finds in the object."""
+
+    @abstractmethod
+    def read(self, found: Sequence[float]) -> FloatArray:
+        """Return the numbers (rows, k) of k found ones; NaN for NaN."""
+
+
+class Decoder(ABC):
     """Decodes messages of one schema, batch after batch."""
 
+    @abstractmethod
     def fields(self, batch: Batch) -> list[str]:
         """Return every numeric field except the header's time stamp, as `wrench.force.z`, `position[:]`."""
-        ...
+
+    @abstractmethod
+    def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
+        """Return the messages that can be decoded, and the reasons why the others cannot, by row."""
+
+    def absent(self, field: Field) -> FieldMissingError | None:  # noqa: ARG002  unknown without a schema
+        """Return why no message can have a field."""
+        return None
+
+    def contents(self, batch: Batch) -> list[dict[str, Any]]:
+        """Return the messages of a batch that can be decoded, as objects of the field language."""
+        return [group.content for group in sorted(self.groups(batch)[0], key=lambda group: int(group.rows[0]))]
 
     def decode(
         self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
     ) -> DecodedBatch:
         """Decode the wanted fields of all messages; whole arrays with named elements are in the order of `joints`."""
-        ...
+        groups, reasons = self.groups(batch)
+        n = len(batch)
+        fields = tuple(
+            absent_field(n, fault)
+            if (fault := self.absent(each))
+            else field_values(n, self.of_field(groups, each, joints), each, joints)
+            for each in wanted
+        )
+        status = np.zeros(n, np.uint8)
+        status[list(reasons)] = DAMAGED
+        reason = reasons[min(reasons)] if reasons else ""
+        return DecodedBatch(fields, status, reason, *(_header_times(n, groups) if stamps else ()))
 
-    def contents(self, batch: Batch) -> list[dict[str, Any]]:
-        """Return the messages of a batch that can be decoded, as objects of the field language."""
-        ...
-
-
-class Group(Protocol):
-    """Messages `rows` of a batch that one object of the field language describes.
-
-    It has a number, or in place of each number what `read` needs to return those of all messages.
-    """
-
-    @property
-    def rows(self) -> IntArray:
-        """The messages, by their numbers in the batch."""
-        ...
-
-    def find(self, field: Field, joints: Sequence[str]) -> float | list[float] | FieldMissingError | None:
-        """Return what the field language finds in the object."""
-        ...
-
-    def read(self, found: Sequence[float]) -> FloatArray:
-        """Return the numbers (rows, k) of k found ones; NaN for NaN."""
-        ...
-
-    @property
-    def content(self) -> Any:
-        """The object."""
-        ...
-
-
-def decoded_batch(
-    n: int, fields: tuple[FieldValues, ...], reasons: dict[int, str], stamped: Sequence[Group] | None
-) -> DecodedBatch:
-    """Return fields of n messages with the damaged ones, and with the stamps of the groups `stamped`."""
-    status = np.zeros(n, np.uint8)
-    status[list(reasons)] = DAMAGED
-    reason = reasons[min(reasons)] if reasons else ""
-    return DecodedBatch(fields, status, reason, *(() if stamped is None else _header_times(n, stamped)))
+    def of_field(self, groups: list[Group], field: Field, joints: Sequence[str]) -> list[Group]:  # noqa: ARG002
+        """Return groups that are faster to read for one field."""
+        return groups
 
 
 def absent_field(n: int, fault: FieldMissingError) -> FieldValues:

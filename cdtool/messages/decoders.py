@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,9 @@ from cdtool.findings import Finding
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoded_batch import DECODED, DecodedBatch, Decoder, UndecodableError
 from cdtool.messages.encodings import decoder_for
-from cdtool.messages.fields import Field, element_names
+from cdtool.messages.fields import element_names
+
+Result = TypeVar("Result")
 
 
 class Decoders:
@@ -27,56 +30,26 @@ class Decoders:
         self.failed = 0
         self.reason = ""
 
-    def of(self, stream: Stream, batch: Batch) -> Decoder | None:
-        """Return the decoder of a channel; if the channel has no decoder, count the batch as failed and return None."""
-        if stream.id not in self._by_channel:
-            try:
+    def attempt(self, stream: Stream, batch: Batch, read: Callable[[Decoder], Result]) -> Result | None:
+        """Return what `read` returns; if the channel has no decoder, count the batch as failed and return None."""
+        try:
+            if stream.id not in self._by_channel:
                 self._by_channel[stream.id] = decoder_for(stream.encoding, *stream.definition)
-            except UndecodableError as fault:
-                self._by_channel[stream.id] = fault
-        decoder = self._by_channel[stream.id]
-        if isinstance(decoder, UndecodableError):
-            self._fail(len(batch), str(decoder))
+            decoder = self._by_channel[stream.id]
+            if isinstance(decoder, UndecodableError):
+                raise decoder
+            return read(decoder)
+        except UndecodableError as fault:  # `read` may raise it for a reason that only its messages reveal
+            self._by_channel[stream.id] = fault
+            self._fail(len(batch), str(fault))
             return None
-        return decoder
-
-    def decode(
-        self, stream: Stream, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
-    ) -> DecodedBatch | None:
-        """Return the decoded batch, with the time stamps of the headers if `stamps`; None if it cannot be decoded."""
-        decoder = self._by_channel[stream.id]
-        if isinstance(decoder, UndecodableError):
-            return None
-        try:
-            return decoder.decode(batch, wanted, joints, stamps)
-        except UndecodableError as fault:  # for a reason that only its messages reveal
-            self._give_up(stream, batch, fault)
-            return None
-
-    def fields(self, stream: Stream, batch: Batch) -> list[str]:
-        """Return the fields of a channel whose `decoder` exists; if they are too many, it can no more be decoded."""
-        decoder = self._by_channel[stream.id]
-        if isinstance(decoder, UndecodableError):
-            return []
-        try:
-            return decoder.fields(batch)
-        except UndecodableError as fault:
-            self._give_up(stream, batch, fault)
-            return []
-
-    def _give_up(self, stream: Stream, batch: Batch, fault: UndecodableError) -> None:
-        self._by_channel[stream.id] = fault
-        self._fail(len(batch), str(fault))
 
     def element_names(self, stream: Stream, batch: Batch) -> tuple[str, ...] | None:
         """Return the texts of the array `name` of the first decodable message; None if no message is decodable."""
-        decoder = self.of(stream, batch)
-        if decoder is None:
-            return None
         for row in range(len(batch)):
-            try:
-                contents = decoder.contents(batch.rows(slice(row, row + 1)))
-            except UndecodableError:
+            one = batch.rows(slice(row, row + 1))
+            contents = self.attempt(stream, one, lambda decoder, one=one: decoder.contents(one))  # type: ignore[misc]
+            if contents is None:
                 return None
             if contents:
                 return tuple(element_names(contents[0]))

@@ -72,18 +72,6 @@ class Field:
             raise FieldMissingError(f"'{self.text}' is an array", [f"{self.text}[0]", f"{self.text}[:]"])
         return math.nan if value is NO_MESSAGE else _number(value, self.text)
 
-    def names_in(self, message: Any) -> list[str]:
-        """Return the names of the elements of the field's array in one message."""
-        value: Any = message
-        for name, index in self.steps:
-            parent = value if isinstance(value, dict) else {}
-            value = parent.get(name)
-            if index is not None and not is_element_number(index):
-                return element_names(parent)
-            if index is not None:
-                value = value[int(index)] if _is_array(value) and int(index) < len(value) else None
-        return []
-
     def _in_order(self, array: Any, names: Sequence[str], joints: Sequence[str]) -> list[float]:
         """Return a whole array's numbers, in the order of the joints if its elements are named."""
         numbers = [_number(item, self.text) for item in array]

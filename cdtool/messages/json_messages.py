@@ -15,14 +15,7 @@ from typing import Any
 import numpy as np
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.decoded_batch import (
-    MOST_FIELDS,
-    DecodedBatch,
-    IntArray,
-    UndecodableError,
-    decoded_batch,
-    field_values,
-)
+from cdtool.messages.decoded_batch import MOST_FIELDS, Decoder, Group, IntArray, UndecodableError
 from cdtool.messages.fields import (
     Field,
     FieldMissingError,
@@ -39,45 +32,34 @@ Messages = dict[int, dict[str, Any]]  # by row
 
 
 @dataclass
-class JsonDecoder:
-    """A Decoder (decoded_batch.py) for JSON."""
+class JsonDecoder(Decoder):
+    """Decoder of JSON."""
 
     _fields: dict[str, None] = field(default_factory=dict)
+    _rows: IntArray = field(default_factory=lambda: np.empty(0, np.int64))  # of the objects of the last batch
 
     def fields(self, batch: Batch) -> list[str]:
         """Return every numeric field of the messages so far, in order of first appearance."""
-        for message in self.contents(batch):
+        for message in _load(batch)[0].values():
             self._fields.update(dict.fromkeys(numeric_fields(message)))
             if len(self._fields) > MOST_FIELDS:
                 raise UndecodableError(f"its messages have more than {MOST_FIELDS} different fields")
         return list(self._fields)
 
-    def contents(self, batch: Batch) -> list[dict[str, Any]]:
-        """Return the messages of a batch that are objects."""
-        return list(_load(batch)[0].values())
-
-    def decode(
-        self, batch: Batch, wanted: Sequence[Field], joints: Sequence[str] = (), stamps: bool = False
-    ) -> DecodedBatch:
-        """Decode the wanted fields of all messages."""
+    def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
+        """Return the messages of a batch that are objects, and the reasons why the others are not, by row."""
         messages, reasons = _load(batch)
-        rows, objects = np.array(list(messages)), list(messages.values())
-        tables = [_together(objects, each, joints) for each in wanted]
-        is_single = stamps or any(table is None for table in tables)
-        singles = [_Single(rows[k : k + 1], message) for k, message in enumerate(objects)] if is_single else []
-        fields = tuple(
-            field_values(len(batch), singles if table is None else [_Together(rows, table)], each, joints)
-            for each, table in zip(wanted, tables, strict=True)
-        )
-        return decoded_batch(len(batch), fields, reasons, singles if stamps else None)
+        self._rows = rows = np.array(list(messages), np.int64)
+        return [_Single(rows[k : k + 1], message) for k, message in enumerate(messages.values())], reasons
+
+    def of_field(self, groups: list[Group], field: Field, joints: Sequence[str]) -> list[Group]:
+        """Return all messages as one group, if no message needs the rules of the field language."""
+        table = _together([group.content for group in groups], field, joints)
+        return groups if table is None else [_Together(self._rows, None, table)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Single:
-    """One message: a Group (decoded_batch.py)."""
-
-    rows: IntArray
-    content: dict[str, Any]
+class _Single(Group):
+    """One message."""
 
     def find(self, field: Field, joints: Sequence[str]) -> float | list[float] | FieldMissingError | None:
         try:
@@ -89,13 +71,11 @@ class _Single:
         return np.array([found], dtype=np.float64)
 
 
-@dataclass(frozen=True, eq=False)
-class _Together:
-    """All messages: a Group for one field, whose numbers are in a `table` (rows, k)."""
+@dataclass(eq=False)
+class _Together(Group):
+    """All messages, for one field, whose numbers are in a `table` (rows, k)."""
 
-    rows: IntArray
     table: FloatArray
-    content: Any = None
 
     def find(self, field: Field, joints: Sequence[str]) -> float | list[float]:  # noqa: ARG002  it is in the table
         return list(range(self.table.shape[1])) if field.whole else 0

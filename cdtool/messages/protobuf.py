@@ -3,12 +3,14 @@
 The package `protobuf` reads the descriptors. A number that is not written is 0 if its schema does not track presence
 (proto3, neither `optional` nor in a `oneof`) and the message that contains it is present. Otherwise it is NaN: an
 `optional` field, a member of a `oneof` other than the chosen one, any field of proto2, and all fields of an absent
-nested message. A field written as another type, a truncated field and a varint without an end damage the message.
+nested message. A field written as another type, a truncated field, a varint without an end, and a group (which no
+writer has used since 2008) damage the message.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from cdtool.errors import installing
@@ -22,7 +24,7 @@ _TYPES = ("double", "float", "int64", "uint64", "int32", "fixed64", "fixed32", "
 _MORE_TYPES = ("bytes", "uint32", "enum", "sfixed32", "sfixed64", "sint32", "sint64")
 _FIXED = {"double": "<f8", "fixed64": "<u8", "sfixed64": "<i8", "float": "<f4", "fixed32": "<u4", "sfixed32": "<i4"}
 # Wire types.
-_VARINT, _EIGHT, _BLOCK, _GROUP, _END, _FOUR = range(6)
+_VARINT, _EIGHT, _BLOCK, _FOUR = 0, 1, 2, 5
 _DEEPEST, _LONGEST_VARINT = 100, 10  # as in the package
 
 
@@ -107,112 +109,77 @@ class _Walk:
             return math.nan if member.tag is None or member.tag.presence else 0
         return NO_MESSAGE if isinstance(member.kind, Message) else ""
 
-    def message(self, layout: Layout | None, content: dict[str, Any], end: int, depth: int, group: int = 0) -> None:
-        """Read fields up to byte `end`, or to the end of the group of this number, into `content`."""
+    def message(self, layout: Layout, content: dict[str, Any], end: int, depth: int) -> None:
+        """Read fields up to byte `end` into `content`."""
         if depth > _DEEPEST:
             raise self._not_protobuf()
-        while self._at < end or group:
+        while self._at < end:
             key = self._varint(end)
-            number, wire = key >> 3, key & 7
-            if wire == _END and number == group:
-                return
-            if not number or wire in (_END, 6, 7):
-                raise self._not_protobuf()
-            member = layout.by_number.get(number) if layout is not None else None
-            if layout is None or member is None or member.tag is None:
-                self._skip(wire, number, end, depth)
+            begin, size = self._value(key & 7 if key >> 3 else -1, end)
+            member = layout.by_number.get(key >> 3)
+            if member is None or member.tag is None:
                 continue
             for other in member.tag.oneof:
                 content[other] = self._absent(next(each for each in layout.members if each.name == other))
             if isinstance(member.kind, Number):
-                self._number(member, wire, content, end)
-            elif isinstance(member.kind, Text):
-                self._text(member, wire, content, end)
+                found = self._numbers(member.tag.wire, member.array is not None, key & 7, begin, size)
+                before = content[member.name] if member.array is not None else None
+                content[member.name] = found[0] if before is None else [*before, *found] if before else found
+            elif key & 7 != _BLOCK:
+                raise self._other_type()
+            elif isinstance(member.kind, Message):
+                self._nested(member, self._schema.layouts[member.kind.name], content, begin, size, depth)
+            elif member.array is None:
+                content[member.name] = self._payload[begin : self._at].decode(errors="replace")
             else:
-                self._nested(member, member.kind, wire, content, end, depth)
+                content[member.name].append(self._payload[begin : self._at].decode(errors="replace"))
+                if member.name == "name":  # it may name the elements of an array
+                    self.example.share(begin, size)
 
-    def _number(self, member: Member, wire: int, content: dict[str, Any], end: int) -> None:
-        assert member.tag is not None
-        is_packed = wire == _BLOCK and member.array is not None
-        if is_packed:
-            found: range | list[int] = self._packed(member.tag.wire, self._block(end)[1])
-        else:
-            found = self._one(member.tag.wire, wire, end)
-        if member.array is None:
-            content[member.name] = found[0]
-        else:
-            content[member.name] = found if not content[member.name] else [*content[member.name], *found]
-
-    def _packed(self, kind: str, size: int) -> range | list[int]:
-        end = self._at + size
+    def _numbers(self, kind: str, is_array: bool, wire: int, begin: int, size: int) -> Sequence[int]:
         code = _FIXED.get(kind)
+        if wire == (_VARINT if code is None else _EIGHT if code[2] == "8" else _FOUR):
+            return self.example.numbers(begin, 1, code or kind, size)
+        if wire != _BLOCK or not is_array:
+            raise self._other_type()
+        end = self._at
         if code is None:
             found: list[int] = []
+            self._at = begin
             while self._at < end:
-                found += self._one(kind, _VARINT, end)
+                at, length = self._value(_VARINT, end)
+                found += self.example.numbers(at, 1, kind, length)
             return found
-        width = int(code[2])
-        if size % width:
+        if size % int(code[2]):
             raise self._not_protobuf()
-        begin, self._at = self._at, end
-        return self.example.numbers(begin, size // width, code, width) if size else range(0)
+        return self.example.numbers(begin, size // int(code[2]), code, int(code[2])) if size else ()
 
-    def _one(self, kind: str, wire: int, end: int) -> range:
-        code, begin = _FIXED.get(kind), self._at
-        if wire != (_VARINT if code is None else _EIGHT if code[2] == "8" else _FOUR):
-            raise self._other_type()
-        if code is None:
-            self._varint(end, 0x80)
-        else:
-            self._advance(int(code[2]), end)
-        return self.example.numbers(begin, 1, code or kind, self._at - begin)
-
-    def _text(self, member: Member, wire: int, content: dict[str, Any], end: int) -> None:
-        if wire != _BLOCK:
-            raise self._other_type()
-        begin, size = self._block(end)
-        self._at += size
-        text = self._payload[begin : self._at].decode(errors="replace")
-        if member.array is None:
-            content[member.name] = text
-        else:
-            content[member.name].append(text)
-            if member.name == "name":  # it may name the elements of an array
-                self.example.share(begin, size)
-
-    def _nested(self, member: Member, kind: Message, wire: int, content: dict[str, Any], end: int, depth: int) -> None:
-        assert member.tag is not None
-        layout = self._schema.layouts[kind.name]
-        if wire != (_GROUP if member.tag.wire == "group" else _BLOCK):
-            raise self._other_type()
-        if member.array is None:
-            if content[member.name] is NO_MESSAGE:
-                content[member.name] = self.empty(layout)
-            inner = content[member.name]
-        else:
+    def _nested(
+        self, member: Member, layout: Layout, content: dict[str, Any], begin: int, size: int, depth: int
+    ) -> None:
+        inner = content[member.name]
+        if member.array is not None or inner is NO_MESSAGE:
             inner = self.empty(layout)
-            if not layout.entry:
+            if member.array is None:
+                content[member.name] = inner
+            elif not layout.entry:
                 content[member.name].append(inner)
-        if wire == _GROUP:
-            self.message(layout, inner, end, depth + 1, member.tag.number)
-        else:
-            begin, size = self._block(end)
-            self.message(layout, inner, begin + size, depth + 1)
+        self._at = begin
+        self.message(layout, inner, begin + size, depth + 1)
 
-    def _skip(self, wire: int, number: int, end: int, depth: int) -> None:
+    def _value(self, wire: int, end: int) -> tuple[int, int]:
+        """Return first byte and size of a value, and go to the byte after it."""
+        begin, size = self._at, {_EIGHT: 8, _FOUR: 4}.get(wire)
         if wire == _VARINT:
             self._varint(end, 0x80)
-        elif wire == _GROUP:
-            self.message(None, {}, end, depth + 1, number)
-        else:
-            self._advance({_EIGHT: 8, _FOUR: 4}.get(wire) or self._block(end)[1], end)
-
-    def _block(self, end: int) -> tuple[int, int]:
-        """Read a length, and return first byte and size of what follows."""
-        size = self._varint(end)
-        if size > end - self._at:
+            return begin, self._at - begin
+        if wire == _BLOCK:
+            size = self._varint(end)
+            begin = self._at
+        if size is None or size > end - begin:
             raise self._not_protobuf()
-        return self._at, size
+        self._at = begin + size
+        return begin, size
 
     def _varint(self, end: int, shared_bits: int = 0xFF) -> int:
         value, begin = 0, self._at
@@ -223,11 +190,6 @@ class _Walk:
                 self.example.share(begin, k + 1, shared_bits)
                 return value
         raise self._not_protobuf()
-
-    def _advance(self, size: int, end: int) -> None:
-        self._at += size
-        if self._at > end:
-            raise self._not_protobuf()
 
     def _not_protobuf(self) -> DamagedMessageError:
         size = len(self._payload)

@@ -18,7 +18,7 @@ from cdtool.findings import Finding
 from cdtool.messages.batch import Batch, Stream
 from cdtool.messages.decoded_batch import ABSENT, OTHER_JOINTS, DecodedBatch, FieldValues
 from cdtool.messages.decoders import Decoders
-from cdtool.messages.fields import FieldMissingError, missing_field, parse_field
+from cdtool.messages.fields import FieldMissingError, element_names, missing_field, parse_field
 from cdtool.messages.stamp_order import StampOrders, Stamps
 from cdtool.recording import GROUND_TRUTH, BoolArray, FloatArray
 
@@ -98,9 +98,10 @@ class Topic:
         Raises RecordingError if a field or the header's time stamp is missing.
         """
         by_header = self.clock == "header"
-        decoder = self.decoders.of(stream, batch)
-        decoded = self.decoders.decode(stream, batch, self.wanted, self.joints, stamps=by_header)
-        if decoder is None or decoded is None:
+        decoded = self.decoders.attempt(
+            stream, batch, lambda decoder: decoder.decode(batch, self.wanted, self.joints, by_header)
+        )
+        if decoded is None:
             return None
         whole = self.decoders.keep(decoded)
         self._check(decoded, whole)
@@ -115,8 +116,9 @@ class Topic:
         for (text, each), field_values in zip(self.fields.items(), decoded.fields, strict=True):
             values[text] = each.add(field_values, whole)
             if each.elsewhere and not each.names:
-                contents = decoder.contents(batch.rows(slice(_FIRST)))
-                each.names = sorted({name for content in contents for name in each.field.names_in(content)})
+                first = batch.rows(slice(_FIRST))
+                contents = self.decoders.attempt(stream, first, lambda decoder, first=first: decoder.contents(first))  # type: ignore[misc]
+                each.names = sorted({name for content in contents or () for name in element_names(content)})
         return BatchValues(stamps, values)
 
     def rows_of(self, decoded: BatchValues, text: str) -> FieldRows:

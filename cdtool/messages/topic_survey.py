@@ -14,7 +14,7 @@ from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.messages.batch import Batch, Stream
-from cdtool.messages.decoded_batch import ABSENT, DecodedBatch, FieldValues
+from cdtool.messages.decoded_batch import ABSENT, DecodedBatch, Decoder, FieldValues
 from cdtool.messages.decoders import Decoders
 from cdtool.messages.fields import Field, parse_field
 from cdtool.messages.stamp_order import StampOrders
@@ -51,13 +51,13 @@ class TopicSurvey:
                 yield piece
 
     def _piece(self, stream: Stream, batch: Batch, origin: int) -> Piece | None:
-        if self.decoders.of(stream, batch) is None:
-            return None
         fields = dict(self._fields)
-        for name in self.decoders.fields(stream, batch):
-            if name not in fields and (parsed := _parsed(name)) is not None:
-                fields[name] = parsed
-        decoded = self.decoders.decode(stream, batch, list(fields.values()), stamps=True)
+
+        def read(decoder: Decoder) -> DecodedBatch:
+            fields.update({name: parsed for name in decoder.fields(batch) if (parsed := _parsed(name)) is not None})
+            return decoder.decode(batch, list(fields.values()), stamps=True)
+
+        decoded = self.decoders.attempt(stream, batch, read)
         if decoded is None:
             return None
         self._widths |= {name: Counter() for name in fields.keys() - self._fields.keys()}

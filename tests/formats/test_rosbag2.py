@@ -316,13 +316,11 @@ def test_rows_that_are_no_messages_are_counted(tmp_path, row, count):
         "DROP TABLE messages; CREATE VIEW messages AS SELECT 1 AS topic_id, 0 AS timestamp, zeroblob(10000) AS data",
         "DROP TABLE messages; CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i FROM n) "
         "SELECT 1 AS topic_id, i AS timestamp, x'00' AS data FROM n",
-        "DROP TABLE messages; CREATE TABLE messages(topic_id INTEGER, timestamp INTEGER, "
-        "data AS (zeroblob(20000000)) VIRTUAL); INSERT INTO messages VALUES(1, 1)",
         "DROP TABLE topics; CREATE TABLE topic(a); CREATE TABLE messagesx(a)",
     ],
-    ids=["view", "endless view", "computed column", "no topics"],
+    ids=["view", "endless view", "no topics"],
 )
-def test_a_hostile_schema_is_refused_in_one_line_without_being_evaluated(tmp_path, script):
+def test_a_view_in_place_of_a_table_is_refused_in_one_line_without_being_evaluated(tmp_path, script):
     path = write_bag(tmp_path / "log.db3")
     with closing(sqlite3.connect(path)) as base:
         base.executescript(script)

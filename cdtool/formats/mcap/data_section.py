@@ -7,8 +7,10 @@ cuts off a chunk, the part that can be decompressed is returned as not covered b
 
 from __future__ import annotations
 
+import struct
 from bisect import bisect_left, bisect_right
-from collections.abc import Container, Generator, Iterator, Mapping
+from collections import Counter
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,13 +32,13 @@ from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss, Losses
 from cdtool.formats.mcap.messages import Positions, Walk
 from cdtool.formats.mcap.records import LARGEST, MAGIC, PREFIX, DamageError, Opcode, RefusedError, parse, record_length
-from cdtool.formats.mcap.summary import Summary
+from cdtool.formats.mcap.summary import Summary, matches_header
 from cdtool.messages.batch import Batch
 
 # Chunks are joined up to this size [bytes]: messages of many small ones are then decoded together.
 JOINED = 1 << 23
 _SPARE = 8  # bytes after the last message in memory, so that all messages can be gathered in whole words
-_SMALLEST_WINDOW, _LARGEST_WINDOW = 1 << 16, 1 << 22
+_WINDOW = 1 << 20  # bytes of records outside of chunks that are read at once
 _SEARCHED = 1 << 20  # bytes that are searched at once for the next chunk
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 _INDEX_HEAD = PREFIX + 6  # before the entries of a message index: prefix, channel id, length of the entries
@@ -57,23 +59,25 @@ class Block:
 class DataSection:
     """Reader of the data section, with its chunks by byte, extras, the end record and losses.
 
-    `extras` are (opcode, byte, length) of complete attachments and metadata; `other_times` counts chunks whose header
-    has other times than their messages. `first_time` [ns] is the log time of the first message with a valid one.
+    Chunks without a wanted topic, at the bytes `unwanted`, are not read if what follows them agrees with the summary;
+    `skipped` are their messages by channel. `extras` are (opcode, byte, length) of complete attachments and metadata;
+    `other_times` counts chunks whose header has other times than their messages. `first_time` [ns] is the log time of
+    the first message with a valid one.
     """
 
-    def __init__(self, file: FileBytes, summary: Summary, definitions: Definitions, skip: Container[int]) -> None:
+    def __init__(self, file: FileBytes, summary: Summary, definitions: Definitions, unwanted: set[int]) -> None:
         self.losses = Losses()
         self.chunks: dict[int, ChunkHeader] = {}
         self.extras: dict[tuple[int, int, int], None] = {}
         self.data_crc = 0  # that the end record states
         self.end_at, self.is_ended, self.other_times = 0, False, 0
         self.first_time: int | None = None
-        self._file, self._summary, self._definitions, self._skip = file, summary, definitions, skip
+        self._file, self._summary, self._definitions, self._unwanted = file, summary, definitions, unwanted
+        self.skipped: Counter[int] = Counter()
         self._memory = np.empty(0, np.uint8)
         self._size, self._covered = 0, False  # of what is in memory
         self._found: list[Positions] = []
         self._cuts: dict[int, int] = {}
-        self._window = _SMALLEST_WINDOW
         self._claims = ClaimedSizes()
         self._resync = Resync(file, summary)
         self._lost: Loss | None = None  # a lost chunk whose message indexes may follow
@@ -86,7 +90,7 @@ class DataSection:
     @property
     def is_partly_read(self) -> bool:
         """Return whether parts of a file at a URL are not read: a checksum of more than a chunk is not checked."""
-        return self._file.remote is not None and bool(self._skip)
+        return self._file.remote is not None and bool(self._unwanted)
 
     def _records(self) -> Iterator[Block]:
         at = len(MAGIC)
@@ -138,9 +142,9 @@ class DataSection:
         self._lost = None
         self.chunks[header.at] = header
         end = header.at + header.length
-        if header.at in self._skip:
+        if header.at in self._unwanted and self._is_indexed(header):
             self._resync.verified_to = end
-            return self._indexed(end, None)[1]
+            return self._indexed(end, 0)[1]
         self._resync.verified_to = header.at + 1
         try:
             header.check()
@@ -164,24 +168,50 @@ class DataSection:
             self.other_times += (int(times.min()), int(times.max())) != span
         return end
 
-    def _indexed(self, at: int, chunk_size: int | None) -> tuple[Positions, int]:
-        """Return the bytes that the message indexes from byte `at` on state, and the byte after these indexes.
+    def _is_indexed(self, header: ChunkHeader) -> bool:
+        """Return whether header and message indexes of a chunk are those of the summary, and count its messages."""
+        index = self._summary.chunks[header.at]
+        found = list(self._indexes(header.at + header.length))
+        is_same = {channel: at for at, channel, _, _ in found} == index.message_index_offsets
+        if is_same and matches_header(index, header):
+            self.skipped.update({channel: size // 16 for _, channel, size, _ in found})
+            return True
+        return False
 
-        Without the chunk's size they are only skipped. An entry is smaller than its message: a longer index, and one
-        that overlaps the next chunk, is left to `_other`.
+    def _indexes(self, at: int) -> Iterator[tuple[int, int, int, int]]:
+        """Yield first byte, channel, size of the entries and length of the message indexes from byte `at` on.
+
+        One that overlaps the next chunk is left to `_other`.
         """
-        stated: list[Positions] = []
         limit = self._resync.following(at)
         while True:
             head = self._file.read(at, _INDEX_HEAD)
-            length, size = PREFIX + int.from_bytes(head[1:PREFIX], "little"), int.from_bytes(head[11:], "little")
-            is_index = len(head) == _INDEX_HEAD and head[0] == Opcode.MESSAGE_INDEX and at + length <= limit
-            if not is_index or _INDEX_HEAD + size > length or (chunk_size is not None and size > chunk_size):
-                return np.concatenate([np.empty(0, np.int64), *stated]), at
-            if chunk_size is not None:
-                entries = self._file.array(at + _INDEX_HEAD, size - size % 16).view("<u8").reshape(-1, 2)
-                stated.append(np.minimum(entries[:, 1], chunk_size).astype(np.int64))
+            if len(head) < _INDEX_HEAD or head[0] != Opcode.MESSAGE_INDEX:
+                return
+            length, channel, size = (
+                PREFIX + int.from_bytes(head[1:PREFIX], "little"),
+                *struct.unpack("<HI", head[PREFIX:]),
+            )
+            if at + length > limit or _INDEX_HEAD + size > length:
+                return
+            yield at, channel, size, length
             at += length
+
+    def _indexed(self, at: int, chunk_size: int) -> tuple[Positions, int]:
+        """Return the bytes that the message indexes from byte `at` on state, and the byte after these indexes.
+
+        Without the chunk's size they are only skipped. An entry is smaller than its message: a longer index is left to
+        `_other`.
+        """
+        stated: list[Positions] = []
+        for start, _, size, length in self._indexes(at):
+            if chunk_size:
+                if size > chunk_size:
+                    break
+                entries = self._file.array(start + _INDEX_HEAD, size - size % 16).view("<u8").reshape(-1, 2)
+                stated.append(np.minimum(entries[:, 1], chunk_size).astype(np.int64))
+            at = start + length
+        return np.concatenate([np.empty(0, np.int64), *stated]), at
 
     def _cut_chunk(self, header: ChunkHeader) -> Iterator[Block]:
         """Yield the messages before the cut of a chunk that the end of the file cuts off."""
@@ -206,14 +236,13 @@ class DataSection:
         """Yield the records outside of chunks that fit into a window, and return the byte after them."""
         if length > LARGEST:
             raise DamageError(f"a record declares {length - PREFIX} bytes, more than {LARGEST >> 20} MiB")
-        size = min(max(self._window, length), self._file.size - at)
+        size = min(max(_WINDOW, length), self._file.size - at)
         yield from self._make_room(size, covered=False)
         window = self._memory[self._size : self._size + size]
         self._file.read_into(at, window)
         walked = messages.walk(window, top_level=True)
         self._add(window[: walked.end], walked, at)
         self._resync.verified_to = at + walked.end
-        self._window = min(4 * self._window, _LARGEST_WINDOW) if 2 * walked.end > len(window) else _SMALLEST_WINDOW
         if walked.reason == messages.SHORT_MESSAGE:
             return self._resume(at + walked.end, walked.reason)
         return at + walked.end

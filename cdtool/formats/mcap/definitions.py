@@ -85,18 +85,12 @@ class Definitions:
 
     def redefined_topics(self) -> list[str]:
         """Return the topics whose channel or schema differs between the summary and the data section."""
-        known = {stream.id: stream for stream in self.streams()}
+        schemas, channels = self._fallback.schemas, self._fallback.channels.values()
         return [
             channel.topic
-            for channel in self._fallback.channels.values()
-            if channel.id in known
-            and (
-                known[channel.id].channel != channel
-                or (
-                    (schema := known[channel.id].schema) is not None
-                    and self._fallback.schemas.get(schema.id, schema) != schema
-                )
-            )
+            for channel in channels
+            if self._channels.get(channel.id, channel) != channel
+            or self._schemas.get(channel.schema_id) not in (None, schemas.get(channel.schema_id))
         ]
 
     def _find(self, channel_id: int) -> DefinedStream | DamageError:

@@ -5,7 +5,6 @@ If the file shrinks or the drive fails, this raises an error; with a memory-mapp
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
@@ -18,9 +17,8 @@ from cdtool.formats.mcap.records import DamageError, crc32
 from cdtool.remote.ranges import RangedBytes
 from cdtool.remote.remote_path import RemotePath
 
-_PIECE, _SMALL = 1 << 20, 1 << 12
+_PIECE = 1 << 20
 _MOST_AT_ONCE = 1 << 30  # macOS refuses to read 2 GiB and more in one call
-_POSITIONED = hasattr(os, "preadv")  # reading from a position without moving to it first; not on Windows
 
 
 class FileBytes:
@@ -62,12 +60,7 @@ class FileBytes:
 
     def read(self, at: int, length: int) -> memoryview:
         """Return up to `length` bytes from `at`, fewer only at the file's end."""
-        if length > _SMALL:
-            return self.array(at, length).data
-        # Several record prefixes are read per chunk; this is ten times faster than an array for each.
-        available = max(0, min(length, self.size - at))
-        content = self._read_small(available, at)
-        return memoryview(content) if len(content) == available else self.array(at, length).data
+        return self.array(at, length).data
 
     def array(self, at: int, length: int) -> Bytes:
         """Return the same as a new array."""
@@ -84,21 +77,11 @@ class FileBytes:
                 raise DamageError("the file became shorter while it was read")
             filled += count
 
-    def _read_small(self, length: int, at: int) -> bytes:
-        if self._file is None:
-            return self._ranges.read(at, length)
-        if _POSITIONED:
-            return os.pread(self._file.fileno(), length, at)
-        self._file.seek(at)
-        return self._file.read(length)
-
     def _fill(self, view: memoryview, at: int) -> int:
         if self._file is None:
             content = self._ranges.read(at, len(view))
             view[: len(content)] = content
             return len(content)
-        if _POSITIONED:
-            return os.preadv(self._file.fileno(), [view], at)
         self._file.seek(at)
         return self._file.readinto(view)
 

@@ -18,7 +18,7 @@ from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.losses import Loss
 from cdtool.formats.mcap.messages import NO_DATE
 from cdtool.formats.mcap.records import MAGIC, PREFIX, DamageError, Opcode, parse
-from cdtool.formats.mcap.summary import matches_header, read_summary, skippable_chunks
+from cdtool.formats.mcap.summary import between_chunks, matches_header, read_summary, unwanted_chunks
 from cdtool.formats.source import TopicDetails
 from cdtool.formats.topic_log import IsWanted, Messages, TopicLog
 from cdtool.messages.batch import Batch
@@ -30,26 +30,22 @@ class Log(TopicLog):
     """An MCAP file; `counts` are the messages by channel.
 
     `wanted` selects topics: messages of other topics are only counted, and chunks without wanted topics are skipped if
-    the summary is verified. Without `use_index` every chunk is read, from the start. If not `strict`, a file without
-    any readable message, or with values that are known to be wrong, is a finding instead of an error.
+    the summary is verified. If not `strict`, a file without any readable message, or with values that are known to be
+    wrong, is a finding instead of an error.
     """
 
     format = "mcap"
 
-    def __init__(
-        self,
-        path: Path,
-        wanted: IsWanted | None = None,
-        use_index: bool = True,
-        strict: bool = True,
-    ) -> None:
+    def __init__(self, path: Path, wanted: IsWanted | None = None, strict: bool = True) -> None:
         super().__init__(path, wanted)
         self._strict = strict
         self._file = FileBytes(path)
         self.summary = read_summary(self._file)
-        self._skip = skippable_chunks(self._file, self.summary, self.is_wanted) if use_index and wanted else {}
+        unwanted = unwanted_chunks(self.summary, wanted) if wanted else set()
+        if unwanted:
+            self._file.expect(between_chunks(self.summary))
         self._definitions = Definitions(self.summary)
-        self.section = DataSection(self._file, self.summary, self._definitions, self._skip)
+        self.section = DataSection(self._file, self.summary, self._definitions, unwanted)
         self.profile, after = header_of(self._file)
         origin = exact_origin(self._file, self.summary, after)
         if origin is not None:
@@ -114,8 +110,7 @@ class Log(TopicLog):
     def _finish(self) -> None:
         self._file.check_unchanged()
         section = self.section
-        for at in self._skip.keys() & section.chunks.keys():
-            self.counts.update(self._skip[at])
+        self.counts.update(section.skipped)
         details: dict[str, TopicDetails] = {}
         for stream in self._definitions.streams():
             schema = stream.schema.name if stream.schema is not None else "no schema"

@@ -16,18 +16,7 @@ try:  # ISA-L's function needs about a seventh of the time of zlib's, and return
 except ImportError:  # a platform without a wheel
     from zlib import crc32
 
-__all__ = [
-    "LARGEST",
-    "MAGIC",
-    "PREFIX",
-    "DamageError",
-    "Opcode",
-    "RefusedError",
-    "crc32",
-    "parse",
-    "parse_all",
-    "record_length",
-]
+__all__ = ["Opcode", "crc32"]  # of other packages
 
 MAGIC = b"\x89MCAP0\r\n"
 PREFIX = 9  # opcode (uint8) and content length (uint64)

@@ -5,13 +5,12 @@ Its CRC is checked here, and `log` compares it with the data. A summary without 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from mcap.records import Channel, ChunkIndex, Footer, MetadataIndex, Schema, Statistics
 
-from cdtool.formats.mcap.chunks import HEADER_LENGTH, ChunkHeader, chunk_header
+from cdtool.formats.mcap.chunks import HEADER_LENGTH, ChunkHeader
 from cdtool.formats.mcap.file_bytes import FileBytes
 from cdtool.formats.mcap.records import (
     LARGEST,
@@ -95,31 +94,22 @@ def _footer(file: FileBytes) -> tuple[Footer, int]:
     return parse(Opcode.FOOTER, end[PREFIX : -len(MAGIC)]), at
 
 
-def skippable_chunks(file: FileBytes, summary: Summary, wanted: Callable[[str], bool]) -> dict[int, dict[int, int]]:
-    """Return the messages per channel of chunks without wanted topics, by the chunk's byte; empty if not verified.
+def unwanted_chunks(summary: Summary, wanted: Callable[[str], bool]) -> set[int]:
+    """Return the chunks, by their bytes, that have no wanted topic by a summary whose CRC matches.
 
-    The summary is verified if its CRC matches, all chunks are at the bytes in the index and have the same header
-    values, no message is outside of chunks, and the sums of the message indexes are those of the statistics for each
-    channel. The first chunk is never skipped, because it has the log's start.
+    The first chunk is never one of them, because it has the log's start. A chunk without message indexes, or with an
+    undefined channel, may have a wanted topic.
     """
-    if not summary.verified or summary.statistics is None or not summary.chunks:
-        return {}
-    unwanted = {at for at, index in summary.chunks.items() if not _may_be_wanted(index, summary, wanted)}
-    unwanted.discard(min(summary.chunks))
-    if not unwanted:
-        return {}
-    file.expect(_between_chunks(summary))
-    indexed = _indexed_messages(file, summary)
-    if indexed is None:
-        return {}
-    total: Counter[int] = Counter()
-    for counts in indexed.values():
-        total.update(counts)
-    stated = {channel: count for channel, count in summary.statistics.channel_message_counts.items() if count}
-    return {at: indexed[at] for at in unwanted} if dict(total) == stated else {}
+
+    def is_unwanted(index: ChunkIndex) -> bool:
+        channels = [summary.channels.get(channel) for channel in index.message_index_offsets]
+        return bool(channels) and not any(channel is None or wanted(channel.topic) for channel in channels)
+
+    chunks = summary.chunks if summary.verified else {}
+    return {at for at, index in chunks.items() if is_unwanted(index)} - {min(chunks, default=0)}
 
 
-def _between_chunks(summary: Summary) -> Iterator[tuple[int, int]]:
+def between_chunks(summary: Summary) -> Iterator[tuple[int, int]]:
     """Yield the ranges that show what is between the data of the chunks: their headers, and the message indexes.
 
     Of a long message index only the beginning is needed. The end of the last one is followed by the end of the data.
@@ -133,38 +123,3 @@ def _between_chunks(summary: Summary) -> Iterator[tuple[int, int]]:
         for start in index.message_index_offsets.values():
             yield start, start + HEADER_LENGTH
         yield end + length, end + length + HEADER_LENGTH
-
-
-def _may_be_wanted(index: ChunkIndex, summary: Summary, wanted: Callable[[str], bool]) -> bool:
-    """Return whether a chunk may have a wanted topic: its index names one, or an undefined channel, or no channel."""
-    channels = [summary.channels.get(channel) for channel in index.message_index_offsets]
-    return not channels or any(channel is None or wanted(channel.topic) for channel in channels)
-
-
-def _indexed_messages(file: FileBytes, summary: Summary) -> dict[int, dict[int, int]] | None:
-    """Return the messages per channel of every chunk, from the message indexes after it; None for any inconsistency."""
-    indexed: dict[int, dict[int, int]] = {}
-    at, chunk = len(MAGIC), -1
-    while at < file.size:
-        head = file.read(at, HEADER_LENGTH)
-        if len(head) < PREFIX or head[0] in (0, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-            return None
-        length = PREFIX + int.from_bytes(head[1:PREFIX], "little")
-        header = chunk_header(at, head)
-        if head[0] == Opcode.DATA_END:
-            same = all(set(indexed[start]) == set(summary.chunks[start].message_index_offsets) for start in indexed)
-            return indexed if same and len(indexed) == len(summary.chunks) else None
-        if head[0] == Opcode.CHUNK:
-            index = summary.chunks.get(at)
-            if header is None or index is None or not matches_header(index, header):
-                return None
-            chunk = at
-            indexed[chunk] = {}
-        elif head[0] == Opcode.MESSAGE_INDEX:
-            channel, size = int.from_bytes(head[9:11], "little"), int.from_bytes(head[11:15], "little")
-            stated = summary.chunks[chunk].message_index_offsets.get(channel) if chunk >= 0 else None
-            if stated != at or length < PREFIX + 6 + size:
-                return None
-            indexed[chunk][channel] = size // 16
-        at += length
-    return None

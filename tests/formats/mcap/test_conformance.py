@@ -35,7 +35,7 @@ def test_the_messages_of_every_file_are_those_of_its_json(group, reader):
         fields = [dict(record["fields"]) for record in records if record["type"] == "Message"]
         expected = [(int(item["log_time"]), bytes(map(int, item["data"]))) for item in fields]
         if reader == "from the start":
-            found, findings, log = read(path, use_index=False)
+            found, findings, log = read(path)
         else:
             topics = {dict(item["fields"])["topic"] for item in records if item["type"] == "Channel"} or {"none"}
             found, findings = [], []

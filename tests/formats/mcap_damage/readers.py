@@ -70,7 +70,7 @@ def wanted(path: Path, topics: tuple[str, ...]) -> Reading:
 
 def streamed(path: Path, topics: tuple[str, ...]) -> Reading:
     """Read the payloads of all messages, from the start of the file."""
-    return _refusable(lambda: _of_log(Log(path, use_index=False)))
+    return _refusable(lambda: _of_log(Log(path)))
 
 
 def indexed(path: Path, topics: tuple[str, ...]) -> Reading:
