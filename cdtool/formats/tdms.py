@@ -53,8 +53,6 @@ class Tdms(PiecewiseFormat):
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         nptdms = library("nptdms", "tdms", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a TDMS file", "see cdtool list formats")
         findings: list[Finding] = []
         with (
             one_line_errors(path, "a TDMS file"),

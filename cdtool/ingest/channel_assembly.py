@@ -7,7 +7,6 @@ masked. All warnings are reported together. Nothing is resampled.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,8 +28,6 @@ from cdtool.plausible import IMPOSSIBLE
 from cdtool.recording import MEASURED, RIG_UNITS, UNITLESS, BoolArray, FloatArray, Recording, Series, TableRows
 from cdtool.remote.remote_path import RemotePath
 
-# A file of at most this many bytes is read at once for its digest.
-_READ_AT_ONCE = 1 << 20
 # A channel of a lower rate has empty cells in these first rows of a table.
 _FIRST_ROWS = 1 << 12
 Counts = npt.NDArray[np.int64]
@@ -92,8 +89,6 @@ def file_digest(path: Path) -> str:
     if isinstance(path, RemotePath) and path.is_read_by_ranges():
         return path.digest()
     with path.open("rb", buffering=0) as file:
-        if os.fstat(file.fileno()).st_size <= _READ_AT_ONCE:
-            return hashlib.sha256(file.readall()).hexdigest()
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
