@@ -144,8 +144,6 @@ class Hdf5(PiecewiseFormat):
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         h5py = library("h5py", "hdf5", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not an HDF5 file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "an HDF5 file"), h5py.File(path, "r") as file:
             tree = _Datasets(path, h5py, file, findings, wanted.worded if wanted is not None else ())

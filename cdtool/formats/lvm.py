@@ -18,10 +18,10 @@ The keys are those of the "Specification for the LabVIEW Measurement File" of Na
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -38,10 +38,18 @@ from cdtool.formats.container_checks import left_out_finding
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, number
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
-from cdtool.formats.csv.foreign_heads import LABVIEW, is_measurement
+from cdtool.formats.csv.foreign_heads import is_measurement
 from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.source import Source
-from cdtool.formats.timed_text import ClockGroup, Segment, TimedText, details_of, dialect_of_rows, opened
+from cdtool.formats.timed_text import (
+    ClockGroup,
+    Segment,
+    TimedText,
+    details_of,
+    dialect_of_rows,
+    number_in_head,
+    opened,
+)
 from cdtool.recording import FloatArray
 
 _END, _X, _COMMENT = "***End_of_Header***", "X_Value", "Comment"
@@ -51,8 +59,6 @@ _SEPARATOR_WORDS = {"tab": "\t", "comma": ","}
 _MOST_SEGMENTS = 10_000
 # Statements of more samples are no more precise, but may not fit into 64 bits.
 _MOST_SAMPLES = 1 << 40
-_DATE = re.compile(r"(?P<year>\d{4})/(?P<month>\d{1,2})/(?P<day>\d{1,2})")
-_TIME = re.compile(r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2})(?:[.,](?P<fraction>\d+))?")
 # Seconds from 1904, where LabVIEW's times begin, to 1970. Later stamps are absolute, others count from the start.
 _EPOCH_1904, _ABSOLUTE = 2_082_844_800, 1e9
 
@@ -122,9 +128,8 @@ class _Head:
 
     def number(self, key: str, column: int, default: float = 0.0) -> float:
         """Return the number that a key states about a channel."""
-        cell = self.cell(key, column)
-        value = number(cell, "," if "," in cell else ".") if cell else None
-        return value if value is not None and np.isfinite(value) else default
+        value = number_in_head(self.cell(key, column))
+        return default if value is None else value
 
     def samples(self, column: int, default: int = 0) -> int:
         """Return how many samples of a channel are stated."""
@@ -182,8 +187,6 @@ def _style(path: Path, lines: Sequence[str], pins: TablePins) -> _Style:
     end = next((i for i, line in enumerate(lines) if line.startswith(_END)), None)
     if end is None:
         raise RecordingError(f"{path}: its head has no end ({_END})", "was the copy cut off? copy it again")
-    if not lines[0].lstrip("\ufeff").startswith(LABVIEW):
-        raise RecordingError(f"{path}: is not a measurement file of LabVIEW", "see cdtool list formats")
     stated = next((line for line in lines[:end] if line.startswith("Separator")), "Separator\tTab")
     mark, word = stated[len("Separator") : len("Separator") + 1], stated[len("Separator") + 1 :].strip(" \t,").lower()
     separator = pins.separator or _SEPARATOR_WORDS.get(word, "")
@@ -329,15 +332,13 @@ def _derived(rows: int, samples: int, longer: float, start: float, stamps: npt.N
 
 def _instant(date: str, time: str) -> Fraction | None:
     """Return a date and a time of day since 1970 [s]; None if unknown: an empty stamp of LabVIEW is in 1903 or 1904."""
-    day, clock = _DATE.fullmatch(date.strip()), _TIME.fullmatch(time.strip())
-    if day is None or clock is None or int(day["year"]) < 1970:
-        return None
+    second, _, decimals = time.strip().replace(",", ".").partition(".")
     try:
-        days = np.datetime64(f"{day['year']}-{int(day['month']):02d}-{int(day['day']):02d}", "D").astype(int)
+        moment = datetime.strptime(f"{date.strip()} {second}", "%Y/%m/%d %H:%M:%S").replace(tzinfo=UTC)
+        seconds = int(moment.timestamp()) + Fraction(f"0.{decimals or 0}")
     except ValueError:
         return None
-    seconds = int(days) * 86400 + int(clock["hour"]) * 3600 + int(clock["minute"]) * 60 + int(clock["second"])
-    return seconds + Fraction(f"0.{clock['fraction'] or 0}")
+    return seconds if seconds >= 0 else None
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -56,8 +56,6 @@ class Mdf(PiecewiseFormat):
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         asammdf = _library(path)
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # its problems are reported as errors or findings
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not an MDF file", "see cdtool list formats")
         findings: list[Finding] = []
         with path.open("rb") as file:
             unfinished = file.read(8) == _MAGICS[1]

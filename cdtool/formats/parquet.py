@@ -43,8 +43,6 @@ class Parquet(PiecewiseFormat):
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         arrow = library("pyarrow", "parquet", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a Parquet or Feather file", "see cdtool list formats")
         findings: list[Finding] = []
         with one_line_errors(path, "a Parquet or Feather file"):
             table = _ArrowTable(path, arrow, findings, wanted.worded if wanted is not None else ())

@@ -53,8 +53,6 @@ class Tdms(PiecewiseFormat):
 
     def _read(self, path: Path, wanted: ChannelMap | None, some: Collection[str] | None) -> Pieces:
         nptdms = library("nptdms", "tdms", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a TDMS file", "see cdtool list formats")
         findings: list[Finding] = []
         with (
             one_line_errors(path, "a TDMS file"),
@@ -247,15 +245,6 @@ def _channel_rows(nptdms: Any, group: Group, part: Part | None) -> list[Any]:
     ]
 
 
-class _WarningCollector(logging.Handler):
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.lines: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.lines.append(" ".join(record.getMessage().split())[:200])
-
-
 @contextmanager
 def collect_warnings(library: str) -> Iterator[list[str]]:
     """Yield a list that collects the warnings of a library's loggers within the context; no handler prints them.
@@ -264,13 +253,16 @@ def collect_warnings(library: str) -> Iterator[list[str]]:
     warnings.
     """
     known = [name for name in logging.Logger.manager.loggerDict if name == library or name.startswith(f"{library}.")]
-    loggers = [logging.getLogger(name) for name in known]
-    before = [(logger.handlers, logger.propagate) for logger in loggers]
-    collector = _WarningCollector()
+    loggers, lines = [logging.getLogger(name) for name in known], list[str]()
+
+    def collect(record: logging.LogRecord) -> bool:
+        lines.append(" ".join(record.getMessage().split())[:200])
+        return False
+
     for logger in loggers:
-        logger.handlers, logger.propagate = [collector], False
+        logger.addFilter(collect)
     try:
-        yield collector.lines
+        yield lines
     finally:
-        for logger, (handlers, propagate) in zip(loggers, before, strict=True):
-            logger.handlers, logger.propagate = handlers, propagate
+        for logger in loggers:
+            logger.removeFilter(collect)

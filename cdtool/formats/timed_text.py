@@ -19,7 +19,7 @@ from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.formats.column_names import requested_keys
-from cdtool.formats.csv.cells import SEPARATORS, kind
+from cdtool.formats.csv.cells import SEPARATORS, kind, number
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.head_words import column_kinds
@@ -214,6 +214,12 @@ def dialect_of_rows(
         words=words,
         short_rows=True,
     )
+
+
+def number_in_head(cell: str) -> float | None:
+    """Return a number of the head, whose decimal mark may not be that of the rows; None for any other cell."""
+    value = number(cell, "," if "," in cell else ".") if cell else None
+    return value if value is not None and np.isfinite(value) else None
 
 
 def details_of(text: Text, separator: str, decimal: str) -> dict[str, str]:

@@ -26,12 +26,20 @@ from cdtool.channels import ChannelMap, TablePins
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.cells import kind, number, split_line
+from cdtool.formats.csv.cells import kind, split_line
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
 from cdtool.formats.csv.foreign_heads import NAME, SCOPE_STARTS, is_scope_export, scope_separator
 from cdtool.formats.csv.text import Text, read_sample
 from cdtool.formats.source import Source
-from cdtool.formats.timed_text import ClockGroup, Segment, TimedText, details_of, dialect_of_rows, opened
+from cdtool.formats.timed_text import (
+    ClockGroup,
+    Segment,
+    TimedText,
+    details_of,
+    dialect_of_rows,
+    number_in_head,
+    opened,
+)
 from cdtool.plain_text import counted
 from cdtool.recording import FloatArray
 
@@ -143,8 +151,8 @@ def _read_export(path: Path, pins: TablePins) -> TimedText:
 
     for at, end in zip(clocks, [*clocks[1:], width], strict=True):
         members = {columns[i]: i for i in range(at + 1, end) if i in columns}
-        stated = {_number(head.cell((_PERIOD, "SampleTime"), i)) for i in members.values()}
-        period = stated.pop() / 1000.0 if len(stated) == 1 else 0.0
+        stated = {number_in_head(head.cell((_PERIOD, "SampleTime"), i)) or 0.0 for i in members.values()}
+        period = max(stated.pop() / 1000.0, 0.0) if len(stated) == 1 else 0.0
         if members:
             groups.append(ClockGroup(members, at, times, ticks=bool(ticks), held=True, period=period))
     details = details_of(text, head.separator, decimal) | {
@@ -263,12 +271,6 @@ def _decimal_mark(text: Text, head: _Head) -> str:
         if seen:
             return min(seen, key=lambda mark: seen[mark]).decode()
     return "."
-
-
-def _number(cell: str) -> float:
-    """Return a positive number of the head, whose decimal mark may not be that of the rows; 0 for any other cell."""
-    value = number(cell, "," if "," in cell else ".") if cell else None
-    return value if value is not None and np.isfinite(value) and value > 0.0 else 0.0
 
 
 def _unit(cell: str) -> str | None:

@@ -48,8 +48,6 @@ class Ulog:
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all columns of numbers; raises RecordingError."""
         pyulog = library("pyulog", "ulog", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not a ULog file", "see cdtool list formats")
         with one_line_errors(path, "a ULog file"), redirect_stdout(StringIO()) as printed:
             _check_formats(path, pyulog)
             with path.open("rb") as file:

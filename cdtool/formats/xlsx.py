@@ -76,8 +76,6 @@ class Xlsx:
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError."""
         openpyxl = library("openpyxl", "xlsx", path)
-        if not self.sniff(path):
-            raise RecordingError(f"{path}: is not an Excel workbook", "see cdtool list formats")
         with one_line_errors(path, "an Excel workbook"), TemporaryDirectory(prefix="cdtool-") as folder:
             sheets = _read_sheets(path, openpyxl, Path(folder))
             tables = [sheet for sheet in sheets if sheet.rows_of_numbers > 1]

@@ -56,12 +56,11 @@ class TableClock:
     statistics: ClockStatistics
     findings: tuple[Finding, ...]
 
-    def times(self, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
-        """Yield strictly increasing times [s] for pieces of stamps; the last rows of a piece come with the next one."""
-        return self.clean(ClockCleaner(), stamps)
+    def times(self, stamps: Iterable[FloatArray], cleaner: ClockCleaner) -> Iterator[FloatArray]:
+        """Yield strictly increasing times [s] for pieces of stamps; the last rows of a piece come with the next one.
 
-    def clean(self, cleaner: ClockCleaner, stamps: Iterable[FloatArray]) -> Iterator[FloatArray]:
-        """Yield the same times as `times`, using a given cleaner, which then has the findings on dropped rows."""
+        The cleaner has the findings on dropped rows after the last piece.
+        """
         for piece in stamps:
             yield cleaner.times((piece - self.origin) * self.factor, piece)
         yield cleaner.times(np.empty(0), np.empty(0), final=True)
@@ -81,7 +80,7 @@ def guess_clock(source: Source) -> GuessedClock | None:
     clock = find_clock(source, statistics, lambda name: [source.columns[name].values])
     if clock is None:
         return None
-    times = np.concatenate(list(clock.times([source.columns[clock.column].values])))
+    times = np.concatenate(list(clock.times([source.columns[clock.column].values], ClockCleaner())))
     return GuessedClock(clock.column, times, clock.findings)
 
 
@@ -165,7 +164,7 @@ def _start(stamps: Iterable[FloatArray]) -> float:
 def _with_findings(clock: TableClock, first_row: int, stamps: Callable[[], Iterable[FloatArray]]) -> TableClock:
     """Return the clock with its statistics and all findings."""
     cleaner = ClockCleaner()
-    for times in clock.clean(cleaner, stamps()):
+    for times in clock.times(stamps(), cleaner):
         clock.statistics.add(times, len(times))
-    gaps = gaps_in(clock.times(stamps()), clock.statistics.steps.median, clock.column)
+    gaps = gaps_in(clock.times(stamps(), ClockCleaner()), clock.statistics.steps.median, clock.column)
     return replace(clock, findings=(*clock.findings, *cleaner.findings(first_row), *gaps))
