@@ -37,8 +37,9 @@ from cdtool.formats.csv import Csv
 from cdtool.formats.csv.cells import kind, number
 from cdtool.formats.csv.encoding import HEAD_BYTES, looks_like_text
 from cdtool.formats.csv.foreign_heads import LABVIEW, is_measurement
+from cdtool.formats.csv.rows import Rows
 from cdtool.formats.csv.text import Text, read_sample
-from cdtool.formats.csv.timed_table import ClockGroup, RowCells, RowClock, StampClock
+from cdtool.formats.csv.timed_table import ClockGroup, RowClock, StampClock
 from cdtool.formats.pieces import Pieces, PiecewiseFormat
 from cdtool.formats.source import Source
 from cdtool.formats.timed_text import Segment, TimedText, details_of, dialect_of_rows, opened
@@ -109,7 +110,7 @@ class _PacketClock:
         """The column of times."""
         return () if self.column is None else (self.column,)
 
-    def times(self, rows: RowCells) -> FloatArray:
+    def times(self, rows: Rows) -> FloatArray:
         """Return the times of the rows in which the channel has a sample."""
         packet, row = np.divmod(np.arange(rows.first, rows.first + rows.count), self.rows)
         if self.column is None:
@@ -270,8 +271,8 @@ def _lines_of_words(text: Text, separator: str) -> Iterator[tuple[list[_Line], _
     """Yield the lines from one that begins with a letter, as no row does, to the next row, and that row."""
     lines: list[_Line] = []
     number, start = 1, 0
-    for block, size in text.blocks(0):
-        for raw in bytes(memoryview(block)[:size]).removesuffix(text.line_end).split(text.line_end):
+    for block in text.blocks(0):
+        for raw in block.removesuffix(text.line_end).split(text.line_end):
             if lines or raw[:1].isalpha() or raw[:1] == b"*":
                 line = _Line(_cells(text.decode(raw), separator), number, start)
                 if lines and _is_row(line.cells):

@@ -143,16 +143,17 @@ def _end_apart(a: FloatArray, b: FloatArray) -> bool:
 
 def pieces_by_own_clock(
     dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None
-) -> Generator[Piece, None, tuple[Table, list[Finding] | None, float]]:
+) -> Generator[Piece, None, tuple[Table, list[Finding], float | None]]:
     """Yield the pieces of a table unchanged or, if its clocks have other rates, by clock with their times [s].
 
-    The first piece decides. The return value is that of `pieces`, the findings on the clocks (None: unchanged), and the
-    origin of the times [s].
+    The first piece decides. The return value is that of `pieces`, the findings on the clocks, and the origin of the
+    times [s] (None: unchanged).
     """
     piece = next(pieces)
     if not have_other_rates(dialect, clocks, piece.values):
+        findings = clock_findings(dialect, clocks, piece.values)
         yield piece
-        return (yield from pieces), None, 0.0
+        return (yield from pieces), findings, None
     names = dialect.names
     of_group = {
         k: [

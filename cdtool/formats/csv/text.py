@@ -113,14 +113,14 @@ class Text:
             last = piece[-1:] or last
         return total + (last != end)
 
-    def blocks(self, offset: int) -> Iterator[tuple[bytes, int]]:
-        """Yield blocks of complete lines after byte `offset` of the stream, and their size.
+    def blocks(self, offset: int) -> Iterator[bytes]:
+        """Yield blocks of complete lines after byte `offset` of the stream.
 
         Only the last line of the last block may be without a line end.
         """
         if self.content is not None and not self.recoded:
             if rows := self.content[self.mark + offset : self.size]:
-                yield rows, len(rows)
+                yield rows
             return
         rest = b""
         for piece in self.chunks(offset):
@@ -131,9 +131,9 @@ class Text:
             if len(rest) > BLOCK_BYTES // 2:
                 raise RecordingError(f"{self.path}: has a line of more than {BLOCK_BYTES >> 11} KB", "is it a table?")
             if cut:
-                yield block, len(block)
+                yield block
         if rest:
-            yield rest, len(rest)
+            yield rest
 
 
 def read_sample(path: Path, most: int = SAMPLE_BYTES) -> bytes:

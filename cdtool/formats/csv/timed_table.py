@@ -17,30 +17,15 @@ import numpy as np
 from cdtool.columns import Column, Piece
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
+from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
-from cdtool.formats.csv.row_arrays import LEFT, Rows
-from cdtool.formats.csv.rows import RowReader
-from cdtool.formats.csv.stamps import MISSING_STAMP, Integers
-from cdtool.formats.csv.table import RequestedColumns, end_of_rows
+from cdtool.formats.csv.rows import RowReader, Rows
+from cdtool.formats.csv.stamps import MISSING_STAMP
 from cdtool.large_integers import rounded_integers, rounding_finding
 from cdtool.recording import BoolArray, FloatArray
 
 # A clock's step may differ from the stated period by this share of it.
 _SAME_PERIOD = 0.01
-
-
-@dataclass(frozen=True)
-class RowCells:
-    """Rows of a table from row `first` (0: its first row): cells (n,) by the number of their column.
-
-    `numbers` are NaN where a cell is empty, `whole` (integers) are MISSING_STAMP there.
-    """
-
-    first: int
-    count: int
-    numbers: Mapping[int, FloatArray]
-    whole: Mapping[int, Integers]
 
 
 class RowClock(Protocol):
@@ -56,7 +41,7 @@ class RowClock(Protocol):
         """Columns of integers with more digits than float64 can represent."""
         ...
 
-    def times(self, rows: RowCells) -> FloatArray:
+    def times(self, rows: Rows) -> FloatArray:
         """Return the time [s] of each row (n,); NaN if it has none."""
         ...
 
@@ -75,7 +60,7 @@ class StampClock:
         """The column."""
         return (self.column,)
 
-    def times(self, rows: RowCells) -> FloatArray:
+    def times(self, rows: Rows) -> FloatArray:
         """Return the stamps in seconds."""
         times = rows.numbers[self.column] / self.per_second
         return times + self.offset if self.offset else times
@@ -95,7 +80,7 @@ class TickClock:
         """The column."""
         return (self.column,)
 
-    def times(self, rows: RowCells) -> FloatArray:
+    def times(self, rows: Rows) -> FloatArray:
         """Return the seconds since the first tick: differences are exact before they are rounded."""
         ticks = rows.whole[self.column]
         return np.where(ticks == MISSING_STAMP, np.nan, (ticks - self.first) / self.per_second)
@@ -154,69 +139,31 @@ def timed_pieces(
     RecordingError
         A line cannot be read, the words are those of a clock, or the rows would not fit into memory.
     """
-    reading = _TimedReader(path, dialect, groups, keys, survey)
-    last, before = reading.reader.allocate(0), 0
-    for rows in reading.reader.pieces(reading.irregular):
-        if rows.count:
-            if last.count:
-                yield from reading.pieces(last, before)
-            before += last.count
-            last = rows
-    findings = reading.end(last, before)
-    yield from reading.pieces(last, before)
-    return reading.table(before + last.count, findings)
-
-
-class _TimedReader:
-    """Reader of one table: its groups with the requested columns, and what was found so far."""
-
-    def __init__(
-        self, path: Path, dialect: Dialect, groups: Sequence[ClockGroup], keys: Collection[str], survey: bool
-    ) -> None:
-        self.path, self.dialect = path, dialect
-        left_out = {
-            column: not_numeric(key, dialect.words[column].line, dialect.words[column].text)
-            for group in groups
-            for key, column in group.columns.items()
-            if survey and key in keys and column in dialect.words
-        }
-        wanted = [
-            replace(group, columns={key: column for key, column in group.columns.items() if key in keys})
-            for group in groups
-        ]
-        self.groups = [_GroupRows(group) for group in wanted if group.columns]
-        needed = {column for group in wanted for column in group.columns.values()} - left_out.keys()
-        self.numeric = sorted(needed | {column for group in wanted if group.columns for column in group.clock.numbers})
-        self.whole = sorted({column for group in wanted if group.columns for column in group.clock.whole})
-        self.reader = RowReader(path, dialect, self.numeric, (), self.whole)
-        self.irregular = IrregularLines(path, dialect, survey, self.reader.targets, left_out=left_out)
-
-    def pieces(self, rows: Rows, first: int) -> list[Piece]:
-        """Return the next rows of each group, from row `first` of the table."""
-        cells = RowCells(
-            first,
-            rows.count,
-            dict(zip(self.numeric, rows.numbers, strict=True)),
-            dict(zip(self.whole, rows.stamps, strict=True)),
-        )
+    left_out = {
+        column: not_numeric(key, dialect.words[column].line, dialect.words[column].text)
+        for group in groups
+        for key, column in group.columns.items()
+        if survey and key in keys and column in dialect.words
+    }
+    wanted = [
+        replace(group, columns={k: column for k, column in group.columns.items() if k in keys}) for group in groups
+    ]
+    samples = [_GroupRows(group) for group in wanted if group.columns]
+    clocks = [each.group.clock for each in samples]
+    times = {column for clock in clocks for column in clock.numbers}
+    needed = {column for group in wanted for column in group.columns.values()} - left_out.keys() | times
+    whole = {column for clock in clocks for column in clock.whole}
+    reader = RowReader(dialect, RequestedColumns(sorted(needed), left_out=left_out, whole=sorted(whole)), survey)
+    for rows in reader.pieces():
+        for column in times - {*reader.values.numeric}:
+            raise RecordingError(f"{path}: {reader.values.left_out[column]}", "it is the clock of a channel")
         with np.errstate(over="ignore", invalid="ignore"):  # of damaged stamps, which are then no times
-            return [group.piece(cells) for group in self.groups]
-
-    def end(self, rows: Rows, before: int) -> list[Finding]:
-        """Return the findings on skipped lines and the end of the file, whose last row may be removed from `rows`."""
-        last = RequestedColumns((self.dialect.width - 1,), (), {}, {})
-        return end_of_rows(self.reader, self.irregular, rows, last, before)
-
-    def table(self, rows: int, findings: list[Finding]) -> TimedTable:
-        """Return what is known after the last row; raises RecordingError if a clock has words."""
-        lost = {column for column in self.irregular.left_out if self.reader.targets[column] == LEFT}
-        for group in self.groups:
-            for column in lost & {*group.group.clock.numbers}:
-                raise RecordingError(f"{self.path}: {self.irregular.left_out[column]}", "it is the clock of a channel")
-        left_out = {key for group in self.groups for key, column in group.group.columns.items() if column in lost}
-        for group in self.groups:
-            findings += group.findings(left_out)
-        return TimedTable(left_out, rows, findings)
+            yield from [each.piece(rows) for each in samples]
+    lost = {
+        key for each in samples for key, column in each.group.columns.items() if column not in reader.values.numeric
+    }
+    findings = [*reader.findings, *(found for each in samples for found in each.findings(lost))]
+    return TimedTable(lost, reader.lines.rows, findings)
 
 
 class _GroupRows:
@@ -230,12 +177,12 @@ class _GroupRows:
         self.last: tuple[float, dict[str, float]] | None = None
         self.step = 0.0  # in the first block
 
-    def piece(self, cells: RowCells) -> Piece:
+    def piece(self, rows: Rows) -> Piece:
         """Return the samples in the next rows of the table."""
         group = self.group
-        time = group.clock.times(cells)
-        empty = np.full(cells.count, np.nan)
-        values = {key: cells.numbers.get(column, empty) for key, column in group.columns.items()}
+        time = group.clock.times(rows)
+        empty = np.full(rows.count, np.nan)
+        values = {key: rows.numbers.get(column, empty) for key, column in group.columns.items()}
         timed = np.isfinite(time)
         if group.sparse:
             timed &= np.logical_or.reduce([np.isfinite(column) for column in values.values()])
