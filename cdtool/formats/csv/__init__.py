@@ -107,11 +107,12 @@ def _by_clock(
     clocks: Clocks,
     keys: Collection[str] | None,
     pieces: Generator[Piece, None, TextTable],
+    stated: bool = False,
 ) -> Pieces:
-    """Yield the columns of a table, by clock if it has several clocks whose rates differ."""
+    """Yield the columns of a table, by clock if it has several clocks whose rates differ, or if that is `stated`."""
     from cdtool.formats.csv.several_clocks import pieces_by_own_clock
 
-    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys)
+    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys, stated)
     table.findings += findings
     if origin is None:
         return _source(path, dialect, table)
@@ -124,7 +125,7 @@ def _by_clock(
 
 
 def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
-    from cdtool.formats.csv.several_clocks import HINT, Clocks, columns_by_own_clock, describe_other_clock
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, describe_other_clock
     from cdtool.formats.csv.table import read_table
 
     names, time = dialect.names, wanted.time
@@ -144,11 +145,10 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     if clock is not None:  # back to the file's values, which can be compared with the other clocks
         table.values[clock] = table.values[clock] + table.origin
     channels = [key for key in keys if key != clock]
-    columns, origin, findings = columns_by_own_clock(path, dialect, clocks, channels, table.values)
-    columns |= {key: replace(columns[key], words=words) for key, words in table.words.items()}
-    table.values, table.findings = {}, [*table.findings, *findings]
-    origin = origin or written_origin(path)
-    return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
+    for key in channels:
+        if dialect.names.index(key) not in clocks.of:
+            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
+    return join_pieces(_by_clock(path, dialect, clocks, channels, _as_piece(table), stated=True), sort=False)
 
 
 def _source(path: Path, dialect: Dialect, table: TextTable) -> Source:
