@@ -191,8 +191,6 @@ def _read_heads(path: Path, pins: TablePins) -> TimedText:
     heads, end = _heads(path, text, style)
     if not heads:
         raise RecordingError(f"{path}: has no row of numbers", "was the recording stopped immediately?")
-    if len(heads) > 1 and text.recoded:
-        raise RecordingError(f"{path}: has several segments in {text.encoding.upper()}", "save it again as UTF-8")
     for head in heads:
         _check_head(path, head)
     findings = [] if end is None else [Finding("last_segment_incomplete")]
@@ -205,7 +203,7 @@ def _read_heads(path: Path, pins: TablePins) -> TimedText:
         empty |= dict.fromkeys(key for at, key in head.channels.items() if at not in channels)
         for at, key in channels.items():
             units.setdefault(key, head.cell("Y_Unit_Label", at) or None)
-        rows = text if below is None or text.recoded else replace(text, size=text.mark + below, padding=0)
+        rows = text if below is None else replace(text, size=text.mark + below, padding=0)
         names = [head.channels.get(at, "") for at in range(len(head.names.cells))]
         place = head.row.number, head.row.start
         dialect = dialect_of_rows(rows, pins, (style.separator, style.decimal), place, names, [head.row.cells])
