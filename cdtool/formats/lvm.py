@@ -156,8 +156,6 @@ def _read_heads(path: Path, pins: TablePins) -> TimedText:
     heads, end = _heads(path, text, style)
     if not heads:
         raise RecordingError(f"{path}: has no row of numbers", "was the recording stopped immediately?")
-    if len(heads) > 1 and text.recoded:
-        raise RecordingError(f"{path}: has several segments in {text.encoding.upper()}", "save it again as UTF-8")
     for head in heads:
         _check_head(path, head)
     findings = [] if end is None else [Finding("last_segment_incomplete")]
@@ -170,7 +168,7 @@ def _read_heads(path: Path, pins: TablePins) -> TimedText:
         empty |= dict.fromkeys(key for at, key in head.channels.items() if at not in channels)
         for at, key in channels.items():
             units.setdefault(key, head.cell("Y_Unit_Label", at) or None)
-        rows = text if below is None or text.recoded else replace(text, size=text.mark + below, padding=0)
+        rows = text if below is None else replace(text, size=text.mark + below, padding=0)
         names = [head.channels.get(at, "") for at in range(len(head.names.cells))]
         place = head.row.number, head.row.start
         dialect = dialect_of_rows(rows, pins, (style.separator, style.decimal), place, names, [head.row.cells])
@@ -234,8 +232,8 @@ def _lines_of_words(text: Text, separator: str) -> Iterator[tuple[list[_Line], _
     """Yield the lines from one that begins with a letter, as no row does, to the next row, and that row."""
     lines: list[_Line] = []
     number, start = 1, 0
-    for block, size in text.blocks(0):
-        for raw in bytes(memoryview(block)[:size]).removesuffix(text.line_end).split(text.line_end):
+    for block in text.blocks(0):
+        for raw in block.removesuffix(text.line_end).split(text.line_end):
             if lines or raw[:1].isalpha() or raw[:1] == b"*":
                 line = _Line(_cells(text.decode(raw), separator), number, start)
                 if lines and _is_row(line.cells):

@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ VALUES_PER_PIECE = 1 << 20
 
 # The generator's return value is the source, whose columns have names, units and widths, but no rows.
 Pieces = Generator[Piece, None, Source]
+
+Returned = TypeVar("Returned")
 
 
 class PiecewiseFormat(ABC):
@@ -41,12 +44,12 @@ class PiecewiseFormat(ABC):
         """Yield the columns of a channel map, the columns `some`, or all columns."""
 
 
-class PieceRun:
-    """An iterator over pieces; `source` is set after the last piece."""
+class PieceRun(Generic[Returned]):
+    """An iterator over pieces; `source`, what their generator returns, is set after the last piece."""
 
-    def __init__(self, pieces: Pieces) -> None:
+    def __init__(self, pieces: Generator[Piece, None, Returned]) -> None:
         self._pieces = pieces
-        self.source: Source
+        self.source: Returned
 
     def __iter__(self) -> Iterator[Piece]:
         self.source = yield from self._pieces
@@ -98,6 +101,8 @@ def join_pieces(pieces: Pieces, sort: bool) -> Source:
 
 
 def _assemble(parts: list[tuple[int, FloatArray]], rows: int, shape: tuple[int, ...]) -> FloatArray:
+    if len(parts) == 1 and len(parts[0][1]) == rows:  # without a copy
+        return parts[0][1]
     values = np.full((rows, *shape), np.nan)
     for first, part in parts:
         values[first : first + len(part)] = part

@@ -19,15 +19,13 @@ from cdtool.columns import Column
 from cdtool.errors import RecordingError
 from cdtool.findings import Finding
 from cdtool.formats.column_names import requested_keys
+from cdtool.formats.csv.cell_values import RequestedColumns, not_numeric
 from cdtool.formats.csv.cells import SEPARATORS, kind, number
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.encoding import detect_text
 from cdtool.formats.csv.head_words import column_kinds
-from cdtool.formats.csv.irregular_lines import IrregularLines, not_numeric
 from cdtool.formats.csv.marks import Marks, SampleCell
-from cdtool.formats.csv.row_arrays import LEFT
 from cdtool.formats.csv.rows import RowReader
-from cdtool.formats.csv.table import RequestedColumns, end_of_rows
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text, read_sample, read_small
 from cdtool.formats.source import Source
 from cdtool.large_integers import rounded_integers, rounding_finding
@@ -116,20 +114,20 @@ class Segment:
         clocks = {group.clock for group in groups if group.clock is not None and not group.ticks}
         numeric = sorted({*columns.values()} - worded.keys() | clocks)
         ticks = sorted({group.clock for group in groups if group.clock is not None and group.ticks})
-        reader = RowReader(path, dialect, numeric, (), ticks)
-        irregular = IrregularLines(path, dialect, survey, reader.targets, left_out=worded)
-        rows = reader.read(irregular)
-        last = RequestedColumns((dialect.width - 1,), (), {}, {})
-        findings += end_of_rows(reader, irregular, rows, last, 0)
-        lost = {column for column in irregular.left_out if reader.targets[column] == LEFT}
+        reader = RowReader(dialect, RequestedColumns(numeric, left_out=worded, whole=ticks), survey)
+        blocks = [*reader.pieces()]
+        findings += reader.findings
+        read, lost = reader.values.numeric, {*numeric} - {*reader.values.numeric} | worded.keys()
         for column in sorted(lost & clocks):
-            raise RecordingError(f"{path}: {irregular.left_out[column]}", "it is the clock of a channel")
-        cells: dict[int, npt.NDArray[Any]] = {**dict(zip(numeric, rows.numbers, strict=True))}
-        cells |= dict(zip(ticks, rows.stamps, strict=True))
-        kept = {column: values for column, values in cells.items() if column not in lost}
-        samples = {key: both for group in groups for key, both in group.samples(kept, rows.count, findings).items()}
-        if rows.count < self.stated:
-            cut = {"line": dialect.first_line, "stated": self.stated, "rows": rows.count}
+            raise RecordingError(f"{path}: {reader.values.left_out[column]}", "it is the clock of a channel")
+        cells: dict[int, npt.NDArray[Any]] = {
+            **{column: np.concatenate([rows.numbers[column] for rows in blocks]) for column in read},
+            **{column: np.concatenate([rows.whole[column] for rows in blocks]) for column in ticks},
+        }
+        count = reader.lines.rows
+        samples = {key: both for group in groups for key, both in group.samples(cells, count, findings).items()}
+        if count < self.stated:
+            cut = {"line": dialect.first_line, "stated": self.stated, "rows": count}
             findings.append(Finding("segment_cut_off", "", cut))
         return samples, {key for key, at in columns.items() if at in lost}
 

@@ -196,8 +196,8 @@ def _read_head(path: Path, text: Text, raw: Sequence[bytes]) -> _Head:
 
 def _refuse_empty_cells(path: Path, text: Text, head: _Head) -> None:
     """Raise RecordingError if a table that is separated by blanks has empty cells, which are blanks too."""
-    for block, size in text.blocks(head.start):
-        if block[:1] == b" " or block.find(b"  ", 0, size) >= 0 or block.find(text.line_end + b" ", 0, size) >= 0:
+    for block in text.blocks(head.start):
+        if block[:1] == b" " or b"  " in block or text.line_end + b" " in block:
             raise RecordingError(
                 f"{path}: is separated by blanks and has empty cells, which are blanks too",
                 "export it again with tabs or semicolons",
@@ -265,8 +265,8 @@ def _decimal_mark(text: Text, head: _Head) -> str:
     """Return the decimal mark: the first mark in the rows. Scope writes no thousands separators."""
     if head.separator == ",":
         return "."
-    for block, size in text.blocks(head.start):
-        found = {mark: block.find(mark, 0, size) for mark in (b",", b".")}
+    for block in text.blocks(head.start):
+        found = {mark: block.find(mark) for mark in (b",", b".")}
         seen = {mark: at for mark, at in found.items() if at >= 0}
         if seen:
             return min(seen, key=lambda mark: seen[mark]).decode()

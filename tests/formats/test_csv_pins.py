@@ -12,7 +12,7 @@ from cdtool.channels import ChannelMap, ChannelSource, TimeSource
 from cdtool.errors import ConfigurationError, RecordingError
 from cdtool.formats.csv import Csv
 from cdtool.formats.csv.pins import read_pins
-from cdtool.formats.csv.table import is_complete
+from cdtool.formats.csv.rows import is_complete
 from cdtool.ingest.reading import read_recording
 from cdtool.tables import Table
 from tests.formats.conftest import COLUMNS

@@ -36,7 +36,7 @@ def test_any_written_number_is_read_back_exactly(tmp_path, numbers):
     column = np.array(numbers)
     write_csv(path, {"a": column, "b": column}, {})
     assert np.array_equal(read(path).columns["a"].values, column, equal_nan=True)
-    path.write_text("a;b\n" + "".join(f"{x!r};0\n".replace(".", ",") for x in numbers))
+    path.write_text("a;b\n" + "".join(f"{x!r};0.5\n".replace(".", ",") for x in numbers))
     assert np.array_equal(read(path).columns["a"].values, column, equal_nan=True)
 
 

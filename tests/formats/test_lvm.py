@@ -201,10 +201,14 @@ def test_what_contradicts_itself_is_refused_in_one_line(log, machine, old, new, 
     assert len(str(caught.value)) < 400 and "\n" not in str(caught.value)
 
 
-def test_several_segments_in_a_wide_encoding_are_refused(log):
-    path = log(measurement(Style(headings="Yes"), [FORCE], [FORCE]).encode("utf-16"), "gate.lvm")
-    with pytest.raises(RecordingError, match="several segments in UTF-16"):
-        survey(path)
+def test_several_segments_are_read_in_any_encoding(log):
+    narrow, wide = (
+        survey(log(measurement(Style(headings="Yes"), [FORCE], [FORCE]).encode(encoding), f"{encoding}.lvm"))
+        for encoding in ("utf-8", "utf-16")
+    )
+    assert wide.details["segments"] == "2" and wide.columns.keys() == narrow.columns.keys()
+    for name, column in narrow.columns.items():
+        assert wide.columns[name].values.tobytes() == column.values.tobytes()
 
 
 def test_a_head_that_is_cut_off_is_a_loss_of_its_segment_only(log):

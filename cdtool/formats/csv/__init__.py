@@ -57,12 +57,18 @@ class Csv:
 
     def columns(self, path: Path, wanted: ChannelMap | None = None) -> Source:
         """Return the columns that `wanted` names, or all numeric columns; raises RecordingError with the line."""
-        dialect = _dialect(path, TablePins() if wanted is None else wanted.pins)
-        return _read_all(path, dialect) if wanted is None else _read_wanted(path, dialect, wanted)
+        if wanted is None:
+            return self.columns_by(path, TablePins())
+        return _read_wanted(path, _dialect(path, wanted.pins), wanted)
 
     def columns_by(self, path: Path, pins: TablePins) -> Source:
         """Return all numeric columns of a table with pins; raises RecordingError with the line."""
-        return _read_all(path, _dialect(path, pins))
+        from cdtool.formats.csv.several_clocks import Clocks
+        from cdtool.formats.csv.table import read_table
+
+        dialect = _dialect(path, pins)
+        table = read_table(path, dialect, dialect.names)
+        return join_pieces(_by_clock(path, dialect, Clocks.by_names(dialect), None, _as_piece(table)), sort=False)
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:
         """Yield all numeric columns, or the columns `keys`, one MiB of the file at a time; raises RecordingError."""
@@ -73,11 +79,9 @@ class Csv:
         clocks = Clocks.by_names(dialect)
         # The last column is always read: it shows whether the file's end is complete.
         read = dialect.names if keys is None else {*keys, dialect.names[-1]}
-        if len(clocks.groups) < 2:
-            table = yield from table_pieces(path, dialect, clocks, read)
-            return _source(path, dialect, table)
-        pieces = table_pieces(path, dialect, clocks, {*read, *(dialect.names[i] for i in clocks.columns)})
-        return (yield from _pieces_of_clocks(path, dialect, clocks, keys, pieces))
+        if len(clocks.groups) > 1:
+            read = {*read, *(dialect.names[i] for i in clocks.columns)}
+        return (yield from _by_clock(path, dialect, clocks, keys, table_pieces(path, dialect, read)))
 
 
 def _dialect(path: Path, pins: TablePins) -> Dialect:
@@ -91,51 +95,37 @@ def _dialect(path: Path, pins: TablePins) -> Dialect:
     return find_dialect(path, sample, pins, content)
 
 
-def _read_all(path: Path, dialect: Dialect) -> Source:
-    from cdtool.formats.csv.several_clocks import Clocks, clock_findings, have_other_rates
-    from cdtool.formats.csv.table import read_table
-
-    table = read_table(path, dialect, dialect.names)
-    clocks = Clocks.by_names(dialect)
-    if have_other_rates(dialect, clocks, table.values):
-        return join_pieces(_pieces_of_clocks(path, dialect, clocks, None, _as_piece(table)), sort=False)
-    table.findings += clock_findings(dialect, clocks, table.values)
-    return _source(path, dialect, table)
-
-
 def _as_piece(table: TextTable) -> Generator[Piece, None, TextTable]:
     """Yield the columns of a table, and return it."""
     yield Piece("", None, table.values, len(next(iter(table.values.values()))))
     return table
 
 
-def _pieces_of_clocks(
+def _by_clock(
     path: Path,
     dialect: Dialect,
     clocks: Clocks,
     keys: Collection[str] | None,
     pieces: Generator[Piece, None, TextTable],
+    stated: bool = False,
 ) -> Pieces:
-    """Yield the columns of a table with several clocks, by clock if their rates differ."""
-    from cdtool.formats.csv.several_clocks import pieces_by_own_clock, unit_from_header
+    """Yield the columns of a table, by clock if it has several clocks whose rates differ, or if that is `stated`."""
+    from cdtool.formats.csv.several_clocks import pieces_by_own_clock
 
-    names = dialect.names
-    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys)
-    if findings is None:
+    table, findings, origin = yield from pieces_by_own_clock(dialect, clocks, pieces, keys, stated)
+    table.findings += findings
+    if origin is None:
         return _source(path, dialect, table)
-    empty = np.empty(0)
-    columns = {
-        key: Column(key, empty, empty, unit_from_header(dialect, key))
-        for key in table.values
-        if names.index(key) not in clocks.columns and (keys is None or key in keys)
-    }
-    table.findings = [*(found for found in table.findings if found.kind != "other_clock"), *findings]
-    table.values = {}
-    return replace(_source(path, dialect, table), columns=columns, origin=origin or written_origin(path), first_row=0)
+    times = {dialect.names[column] for column in clocks.columns}
+    kept = {key for key in table.values if key not in times and (keys is None or key in keys)}
+    table.values = {key: values for key, values in table.values.items() if key in kept}
+    source = _source(path, dialect, table)
+    columns = {key: replace(column, time=np.empty(0)) for key, column in source.columns.items()}
+    return replace(source, columns=columns, origin=origin or written_origin(path), first_row=0)
 
 
 def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
-    from cdtool.formats.csv.several_clocks import HINT, Clocks, columns_by_own_clock, describe_other_clock
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, describe_other_clock
     from cdtool.formats.csv.table import read_table
 
     names, time = dialect.names, wanted.time
@@ -155,11 +145,10 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
     if clock is not None:  # back to the file's values, which can be compared with the other clocks
         table.values[clock] = table.values[clock] + table.origin
     channels = [key for key in keys if key != clock]
-    columns, origin, findings = columns_by_own_clock(path, dialect, clocks, channels, table.values)
-    columns |= {key: replace(columns[key], words=words) for key, words in table.words.items()}
-    table.values, table.findings = {}, [*table.findings, *findings]
-    origin = origin or written_origin(path)
-    return replace(_source(path, dialect, table), columns=columns, origin=origin, first_row=0)
+    for key in channels:
+        if dialect.names.index(key) not in clocks.of:
+            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
+    return join_pieces(_by_clock(path, dialect, clocks, channels, _as_piece(table), stated=True), sort=False)
 
 
 def _source(path: Path, dialect: Dialect, table: TextTable) -> Source:

@@ -55,7 +55,7 @@ class ShorterSample:
 def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample | None:
     """Return the shortened sample; None if its rows are not alike or are few."""
     pinned_line = max(pins.skip_lines, int(pins.header or 0), int(pins.units or 0))
-    if text.recoded or text.line_end != b"\n" or pinned_line > _MOST_ABOVE or _begins_rows(pins.comment or ""):
+    if text.line_end != b"\n" or pinned_line > _MOST_ABOVE or _begins_rows(pins.comment or ""):
         return None
     if text.size > SAMPLE_BYTES or stream.endswith(b"\n"):
         stream = stream[: stream.rfind(b"\n") + 1]

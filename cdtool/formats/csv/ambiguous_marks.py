@@ -148,8 +148,8 @@ def _marked_cells(dialect: Dialect) -> Iterator[tuple[str, int, int]]:
     """Yield cells with a mark between digits in columns of numbers, with line and column, in the file's order."""
     line, end = dialect.first_line, dialect.text.line_end
     marked = _marked_number(dialect.separator)
-    for block, size in dialect.text.blocks(dialect.offset):
-        counted = 0
+    for block in dialect.text.blocks(dialect.offset):
+        size, counted = len(block), 0
         for found in marked.finditer(block):
             if found.start() < counted:  # in the same line
                 continue
@@ -179,8 +179,8 @@ def _cells(dialect: Dialect, raw: bytes) -> list[str]:
 
 
 def _first_rows(dialect: Dialect) -> Iterator[list[str]]:
-    for block, size in dialect.text.blocks(dialect.offset):
-        for raw in bytes(block[:size]).split(dialect.text.line_end, _ROWS_HELD)[:_ROWS_HELD]:
+    for block in dialect.text.blocks(dialect.offset):
+        for raw in block.split(dialect.text.line_end, _ROWS_HELD)[:_ROWS_HELD]:
             if cells := _cells(dialect, raw):
                 yield cells
         return

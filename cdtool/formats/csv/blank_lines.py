@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.lines import Line
-from cdtool.formats.csv.text import TAIL_BYTES, UNIT_BYTES, Text
+from cdtool.formats.csv.text import TAIL_BYTES, Text
 
 _BLANK = b" \t\r\n"
 # The end is searched so often, TAIL_BYTES at a time.
@@ -38,5 +38,5 @@ def strip_blank_end(text: Text) -> Text:
         more = len(blank) - (blank.find(text.line_end) + 1)
         if not more or not blank.strip(b" \t"):
             return text
-        text = replace(text, size=text.size - more * UNIT_BYTES.get(text.encoding, 1))
+        text = replace(text, size=text.size - more)
     raise RecordingError(f"{text.path}: ends with more than {_MOST_TAILS * TAIL_BYTES >> 20} MiB of blank lines", _HINT)

@@ -9,7 +9,7 @@ from pathlib import Path
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.east_asian import east_asian
 from cdtool.formats.csv.gzipped import is_gzipped, measure
-from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text
+from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text, recoded
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
 _MARKS = (
@@ -77,14 +77,13 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
             f"{path}: line 1 begins with the byte order mark of {marked.upper()}, [csv] encoding is '{pinned}'",
             "correct or remove encoding in [csv]",
         )
-    size, padding, end = _without_padding(path, content, UNIT_BYTES.get(encoding, 1))
-    stream = sample[mark : max(size, mark)]
+    stream = sample[mark:]
     if encoding in UNIT_BYTES:
-        try:
-            stream = codecs.getincrementaldecoder(encoding)().decode(stream).encode()
-        except UnicodeError as fault:
-            raise RecordingError(f"{path}: damaged: not valid {encoding.upper()}", "save it again as UTF-8") from fault
-    elif pinned:
+        content, mark = recoded(path, encoding, mark, content), 0
+        stream = content[: 2 * len(sample)]  # at most 3 bytes of UTF-8 are 2 of UTF-16
+    size, padding, end = _without_padding(path, content)
+    stream = stream[: max(size - mark, 0)]
+    if pinned and encoding not in UNIT_BYTES:
         _check_pinned(path, stream, encoding)
     head = stream[:HEAD_BYTES]
     control = _CONTROL.search(head) if head.translate(None, _ALLOWED) else None
@@ -144,30 +143,18 @@ def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
         ) from fault
 
 
-def _without_padding(path: Path, known: bytes | None, unit: int) -> tuple[int, int, tuple[int, bytes] | None]:
+def _without_padding(path: Path, known: bytes | None) -> tuple[int, int, tuple[int, bytes] | None]:
     """Return the byte where the text ends, the number of NUL bytes after it, and the end that has been read.
 
-    `known` are the bytes of the file. The last bytes of a compressed file, and where they start, are kept: they are
+    `known` are the bytes of the text. The last bytes of a compressed file, and where they start, are kept: they are
     read several times, each of which would decompress the whole file.
     """
-    if known is not None and not known.endswith(b"\0"):
-        return len(known), 0, None
-    kept = None
-    if known is None and is_gzipped(path):
-        total, end, last = measure(path, SAMPLE_BYTES)
-        kept = (total - len(last), last)
-    else:
-        total, end = _measure(path, known)
-    if unit > 1:  # the upper bytes of the last character are NUL too
-        mark = total % unit
-        end = min(total, end + (mark - end) % unit)
-    return end, total - end, kept
-
-
-def _measure(path: Path, known: bytes | None) -> tuple[int, int]:
-    """Return the size of a file, and its size without the NUL bytes at its end."""
     if known is not None:
-        return len(known), len(known.rstrip(b"\0"))
+        end = len(known.rstrip(b"\0"))
+        return end, len(known) - end, None
+    if is_gzipped(path):
+        total, end, last = measure(path, SAMPLE_BYTES)
+        return end, total - end, (total - len(last), last)
     total = end = path.stat().st_size
     with path.open("rb") as file:
         while end > 0:
@@ -177,4 +164,4 @@ def _measure(path: Path, known: bytes | None) -> tuple[int, int]:
             end = start + content
             if content:
                 break
-    return total, end
+    return end, total - end, None

@@ -30,7 +30,7 @@ from cdtool.formats.csv.head_words import column_kinds
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.marks import Marks, SampleCell, find_marks
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
-from cdtool.formats.csv.text import SAMPLE_BYTES, TAIL_BYTES, Text
+from cdtool.formats.csv.text import TAIL_BYTES, Text
 
 _SCORED = 150
 # A strong separator that occurs equally often in this share of the lines is preferred, even with fewer numbers.
@@ -428,8 +428,7 @@ class Footer:
 
     def removed_from(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
         """Return the text, and the sample of its stream, without the footer."""
-        size = len(self.content.decode().encode(text.encoding) if text.recoded else self.content)
-        return replace(text, size=text.size - size), stream.removesuffix(self.content)
+        return replace(text, size=text.size - len(self.content)), stream.removesuffix(self.content)
 
 
 def find_footer(dialect: Dialect) -> Footer | None:
@@ -496,11 +495,6 @@ def _ends_with_row(dialect: Dialect, end: bytes) -> bool:
 def _end_of_rows(dialect: Dialect) -> tuple[bool, bytes]:
     """Return the last bytes of the stream's rows, and whether these are all rows."""
     text = dialect.text
-    most = SAMPLE_BYTES if text.recoded else TAIL_BYTES
-    start = text.mark if text.recoded else text.mark + dialect.offset
-    whole = text.size - start <= most
-    end = text.between(start if whole else text.size - most, text.size)
-    if text.recoded:
-        end = end.decode(text.encoding, errors="replace").encode()
-        end = end[dialect.offset :] if whole else end
-    return whole, end
+    start = text.mark + dialect.offset
+    whole = text.size - start <= TAIL_BYTES
+    return whole, text.between(start if whole else text.size - TAIL_BYTES, text.size)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from cdtool.clock.stamps import EPOCH, count_leading_strays
+from cdtool.formats.csv.cell_values import RequestedColumns
 from cdtool.formats.csv.dialect import Dialect
-from cdtool.formats.csv.irregular_lines import IrregularLines
 from cdtool.formats.csv.rows import RowReader
 from cdtool.formats.csv.stamps import MISSING_STAMP, NS
 from cdtool.plain_text import digits
@@ -76,9 +76,8 @@ def exact_differences(
     whole = np.rint(stamps[known])
     exact = np.zeros(len(stamps), dtype=np.int64)
     exact[known] = whole.astype(np.int64) * scale + np.rint((stamps[known] - whole) * scale).astype(np.int64)
-    # As numbers too: a header that is repeated is no row for its words.
-    reader = RowReader(dialect.text.path, dialect, (column,), (), (column,), decimals)
-    ticks = reader.read(IrregularLines(dialect.text.path, dialect, True, reader.targets)).stamps[0, : len(stamps)]
+    reader = RowReader(dialect, RequestedColumns((), whole=(column,), decimals=decimals), survey=True)
+    ticks = np.concatenate([rows.whole[column] for rows in reader.pieces()])[: len(stamps)]
     plain = ticks != MISSING_STAMP
     exact[plain] = ticks[plain]
     start = int(exact[known][first_row])

@@ -1,7 +1,7 @@
-"""Read the rows of a text table block by block: pandas reads the numbers of regular lines.
+"""Read the rows of a text table block by block: pandas reads the blocks of plain rows, Python the lines of the others.
 
-`block_lines.py` finds the lines that are regular: the others, and those with a cell that is not a number, are listed
-for `irregular_lines.py`. pandas therefore never sees a line that is too short or too long.
+pandas fills rows that are too short with NaN, and drops the cells of rows that are too long. A block is plain if it has
+as many separators as its rows need, and no NaN in its last column; or else if each line has as many as a row.
 """
 
 from __future__ import annotations
@@ -9,272 +9,242 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any
 from warnings import catch_warnings
 
 import numpy as np
 import pandas as pd
 
-from cdtool.errors import RecordingError
+from cdtool.findings import Finding
 from cdtool.formats.container_checks import check_size
-from cdtool.formats.csv.block_lines import BlockLines
-from cdtool.formats.csv.cells import MISSING
+from cdtool.formats.csv.cell_values import CellValues, RequestedColumns
+from cdtool.formats.csv.cells import MISSING, kind, split_line
 from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
-from cdtool.formats.csv.irregular_lines import IrregularLine, IrregularLines
-from cdtool.formats.csv.row_arrays import EMPTY, LEFT, STAMP, Rows
-from cdtool.formats.csv.stamps import MISSING_STAMP, Integers, as_integers, by_shape
-from cdtool.recording import BoolArray, FloatArray
+from cdtool.formats.csv.stamps import Integers
+from cdtool.formats.csv.table_lines import TableLines
+from cdtool.recording import FloatArray
 
-# Blank lines, comments and repeated headers, of which there may be more only beside as many rows.
-_MOST_SKIPPED = 20_000
+RECENT = 20
 # pandas reads the nearest float64 by itself since 3.1; before that it must be asked.
 _VERSION = tuple(map(int, pd.__version__.split(".")[:2]))
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _VERSION < (3, 1) else {}
-# An integer with so many digits fits into 64 bits if the first of them is not a nine.
-_MOST_DIGITS = 19
-_DECIMAL = re.compile(r"(?P<whole>[0-9]*)(?:[.,](?P<decimals>[0-9]*))?")
+_END = re.compile(r"(?:.*(?P<mark>[.,eE]))?[+-]?(?P<digits>[0-9]*)")
+
+
+@dataclass
+class Rows:
+    """Rows of a table from row `first` (0: its first row); the last one is in line `last_line` (from 1).
+
+    Cells (n,) by the number of their column: `numbers` are NaN where a cell is empty, `whole` (integers, also stamps)
+    are MISSING_STAMP there.
+    """
+
+    first: int
+    count: int
+    last_line: int
+    numbers: dict[int, FloatArray]
+    whole: dict[int, Integers]
 
 
 class RowReader:
-    """Reads the rows of one file. `numeric` and `stamped` are the requested columns, by number, in order.
+    """Reads the `requested` columns of one file; with `survey` an unreadable cell is a loss, otherwise an error."""
 
-    `whole` are columns of decimal numbers with more digits than float64 can represent, which follow the stamps as
-    integers: multiples of 1 / 10^`decimals`.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        dialect: Dialect,
-        numeric: Sequence[int],
-        stamped: Sequence[int],
-        whole: Sequence[int] = (),
-        decimals: int = 0,
-    ) -> None:
-        self.path, self.dialect = path, dialect
-        self.targets = np.full(dialect.width, LEFT, dtype=np.int64)
-        self.targets[list(numeric)] = np.arange(len(numeric))
-        self.targets[list(stamped)] = STAMP - np.arange(len(stamped))
-        if dialect.trailing:
-            self.targets[-1] = EMPTY
-        self.whole, self.decimals = tuple(whole), decimals
-        self.shape = (len(numeric), len(stamped) + len(whole))
-        self.ended, self.line, self.skipped = True, dialect.first_line, 0
-        # Whether the blocks so far had only rows of numbers.
-        self.plain = dialect.text.line_end == b"\n" and dialect.separator != " " and dialect.width - 1 in numeric
-        self.plain &= not (dialect.short_rows or self.shape[1] or dialect.width == 1)
+    def __init__(self, dialect: Dialect, requested: RequestedColumns, survey: bool) -> None:
+        self.dialect, self.requested = dialect, requested
+        self.values = CellValues(dialect, requested, survey)
+        self.lines = TableLines(dialect, self.values)
+        self.findings: list[Finding] = []
+        self._texts = sorted({*requested.stamps, *requested.whole})
         encoding = dialect.text.stream_encoding
-        self.comment = dialect.comment.encode(encoding, "replace") if dialect.comment else b"\0"
-        self._missing = [text.encode(encoding, "replace").decode("latin-1") for text in dialect.missing]
+        comment = dialect.comment.encode(encoding, "replace")
+        # pandas cannot read a repeated header as a row, unless its words are in other columns.
+        cells = {text.strip(): split_line(text, dialect.separator) for text in dialect.header_text}
+        headers = [
+            text.encode(encoding, "replace")
+            for text, words in cells.items()
+            if not any(kind(cell) == "X" for i, cell in enumerate(words) if i in requested.numeric)
+        ]
+        self._between = bytes({*range(256)} - {*dialect.separator.encode(), *b"\n"})
+        self._odd = [mark for mark in (b'"', b"\0", comment, *headers) if mark]
+        self._missing = [*MISSING, *(text.encode(encoding, "replace").decode("latin-1") for text in dialect.missing)]
 
-    def read(self, irregular: IrregularLines) -> Rows:
-        """Return all rows in one pair of arrays; raises RecordingError."""
-        if self.dialect.text.content is not None and not (self.dialect.text.recoded or self.dialect.short_rows):
-            return next(self.pieces(irregular), self.allocate(0))  # of a single block
-        lines = self.dialect.text.count_lines(self.dialect.offset)
-        check_size(self.path, lines * sum(self.shape))
-        whole = self.allocate(lines)
-        parts = list(self.pieces(irregular, whole))
-        count = sum(part.count for part in parts)
-        not_rows = np.concatenate([whole.not_rows, *(part.not_rows for part in parts)])
-        return Rows(whole.numbers[:, :count], whole.stamps[:, :count], count, whole.first_line, not_rows)
+    def pieces(self) -> Iterator[Rows]:
+        """Yield the rows block by block; after the last one `findings` are those on lines, cells and the file's end.
 
-    def pieces(self, irregular: IrregularLines, whole: Rows | None = None) -> Iterator[Rows]:
-        """Yield the rows block by block, in arrays of their own or one after another in `whole`.
-
-        Irregular lines are passed to `irregular`. Raises RecordingError with the first line that cannot be read.
+        Raises RecordingError with the first line that cannot be read.
         """
-        first, self.line = 0, self.dialect.first_line
-        for block in self._blocks():
-            self.ended = block.endswith((b"\n", b"\r"))
-            numbers = self._plain(block) if self.plain and not irregular.categories else None
-            self.plain = numbers is not None
-            if numbers is None:
-                rows = self._by_lines(BlockLines.of(block, self.dialect), irregular, whole, first)
-            else:
-                rows = self._room(len(numbers[self.dialect.width - 1]), whole, first)
-                for column, values in numbers.items():
-                    rows.numbers[self.targets[column]] = values
-                self.line += rows.count
-            rows.drop(irregular.end_block(range(rows.count)))
-            yield rows
-            first += rows.count
-            check_size(self.path, first * sum(self.shape))
+        last, ended = self._read([], []), True
+        for block in self.dialect.text.blocks(self.dialect.offset):
+            ended = block.endswith((b"\n", b"\r"))
+            plain = self._plain(block, ended)
+            for rows in self._by_lines(block, ended) if plain is None else [plain]:
+                check_size(self.dialect.text.path, self.lines.rows * (len(self.values.numeric) + len(self._texts)))
+                if rows.count:
+                    if last.count:
+                        yield last
+                    last = rows
+        self.findings = self._end(last, ended)
+        yield last
 
-    def _room(self, count: int, whole: Rows | None, first: int) -> Rows:
-        """Return arrays for the rows of the next block, which starts in line `self.line`."""
-        rows = self.allocate(count) if whole is None else whole.part(first, first + count)
-        rows.first_line = self.line
-        return rows
-
-    def _plain(self, block: bytes) -> Mapping[int, FloatArray] | None:
-        """Return the numbers of a block that has only rows of numbers; None if it may have anything else.
-
-        pandas fills a row that is too short with NaN, and drops the cells of one that is too long: if the last column
-        has no NaN and the block has as many separators as its rows need, there are no such rows.
-        """
-        if any(mark in block for mark in (b'"', b"\0", self.comment)):
+    def _plain(self, block: bytes, ended: bool) -> Rows | None:
+        """Return the rows of a block that has only plain rows; None if it may have anything else."""
+        dialect, separator = self.dialect, self.dialect.separator.encode()
+        if dialect.text.line_end != b"\n" or dialect.short_rows or self.requested.categories:
             return None
-        data, width = np.frombuffer(block, dtype=np.uint8), self.dialect.width
-        lines = np.count_nonzero(data == ord("\n")) + (not self.ended)
-        if np.count_nonzero(data == ord(self.dialect.separator)) != lines * (width - 1):
+        if not self.lines.may_go_on or any(mark in block for mark in self._odd):
+            return None
+        if separator == b" ":  # one between two cells
+            block = re.sub(rb"^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block), flags=re.MULTILINE)
+        data, width = np.frombuffer(block, dtype=np.uint8), dialect.width
+        count = int(np.count_nonzero(data == ord("\n"))) + (not ended)
+        if np.count_nonzero(data == separator[0]) != count * (width - 1):
+            return None
+        if dialect.trailing and sum(block.count(separator + end) for end in (b"\n", b"\r\n")) < count:
             return None
         try:
             with catch_warnings(action="error", category=pd.errors.ParserWarning):
-                numbers = _by_column(self._parsed(block, width, np.flatnonzero(self.targets >= 0).tolist(), np.float64))
-        except (ValueError, pd.errors.ParserWarning):  # a cell that is not a number, a first row that is too long
+                numbers, texts = self._parsed(block)
+        except (ValueError, pd.errors.ParserWarning):  # a cell is not a number in plain notation; a first row too long
             return None
-        last = numbers.get(width - 1, np.array([np.nan]))
-        return numbers if len(last) == lines and not np.isnan(last).any() else None
+        whole, unread = self._whole(texts)
+        if unread or {*map(len, numbers.values()), *map(len, texts.values())} != {count}:  # line ends are mixed
+            return None
+        if np.isnan(numbers.get(width - 1, np.nan)).any():  # rows may be too short; a blank line is no row
+            ends = block.translate(None, self._between) + (b"" if ended else b"\n")
+            if width == 1 or ends != (separator * (width - 1) + b"\n") * count:
+                return None
+        self.lines.line += count
+        self.lines.rows += count
+        return Rows(self.lines.rows - count, count, self.lines.line - 1, numbers, whole)
 
-    def _by_lines(self, lines: BlockLines, irregular: IrregularLines, whole: Rows | None, first: int) -> Rows:
-        """Return the rows of a block of any lines; `first` is the number of rows before it."""
-        is_row = lines.blank | True if self.dialect.blank_is_missing else ~lines.blank
-        row = np.cumsum(is_row) - 1
-        rows = self._room(int(row[-1]) + 1, whole, first)
-        self.skipped += int(np.count_nonzero(lines.blank))
-        self._check(self.skipped, first + int(np.count_nonzero(lines.regular)))
-        readable = self._read(lines, row, rows, irregular)
-        for at in map(int, np.flatnonzero(~readable & ~lines.blank)):
-            final = not self.ended and at == len(row) - 1
-            irregular.read(IrregularLine(at, int(row[at]), lines.line(at), final), self.line, rows)
-            dropped = len(irregular.dropped)
-            self._check(self.skipped + dropped, first + int(row[at]) - dropped)
-        blank = np.flatnonzero(lines.blank) + self.line
-        (irregular.empty if self.dialect.blank_is_missing else irregular.blank).extend(blank.tolist())
-        rows.not_rows = blank[:0] if self.dialect.blank_is_missing else blank
-        self.skipped += len(irregular.dropped)
-        self.line += len(row)
-        return rows
+    def _parsed(self, block: bytes) -> tuple[dict[int, FloatArray], dict[int, list[str]]]:
+        """Return the columns of numbers and the texts of the others, as parsed by pandas.
 
-    def _check(self, skipped: int, rows: int) -> None:
-        """Raise RecordingError if a file has many more lines of other kinds than rows."""
-        if skipped > max(_MOST_SKIPPED, 2 * rows):
-            raise RecordingError(f"{self.path}: more than {_MOST_SKIPPED} lines are not rows", "is it a table?")
-
-    def allocate(self, count: int) -> Rows:
-        """Return uninitialised arrays for `count` rows."""
-        numbers, stamps = np.empty((self.shape[0], count)), np.empty((self.shape[1], count), dtype=np.int64)
-        return Rows(numbers, stamps, count, self.dialect.first_line)
-
-    def _blocks(self) -> Iterator[bytes]:
-        """Yield blocks of complete lines; if rows end early, with at most MOST_CELLS cells."""
-        most, end = max(1, MOST_CELLS // self.dialect.width), self.dialect.text.line_end
-        for block, size in self.dialect.text.blocks(self.dialect.offset):
-            if self.dialect.short_rows and block.count(end) > most:
-                ends = np.flatnonzero(np.frombuffer(block, dtype=np.uint8) == end[0])[most - 1 :: most] + 1
-                yield from (block[a:b] for a, b in pairwise([0, *ends.tolist(), size]) if b > a)
-            else:
-                yield block
-
-    def _read(self, lines: BlockLines, row: Integers, rows: Rows, irregular: IrregularLines) -> BoolArray:
-        """Read the regular lines, line `i` as row `row[i]`; return the lines that have been read."""
-        readable = lines.regular.copy()
-        if lines.widest < self.dialect.width or not lines.regular.all():
-            rows.numbers[:], rows.stamps[:] = np.nan, MISSING_STAMP
-        if not lines.widest:
-            return readable
-        at = np.flatnonzero(lines.regular)
-        to = slice(None) if len(at) == rows.count else row[at]
-        content = lines.joined(lines.regular)
-        targets = self.targets[: lines.widest]
-        numeric = [column for column in np.flatnonzero(targets >= 0).tolist() if column not in irregular.categories]
-        parsed = self._numbers(content, lines.widest, numeric)
-        for column, numbers in parsed.items():
-            rows.numbers[targets[column], to] = numbers
-        worded = [column for column in np.flatnonzero(targets >= 0).tolist() if column not in parsed]
-        stamped = np.flatnonzero(targets <= STAMP).tolist()
-        whole = [column for column in self.whole if column < lines.widest]
-        texts = self._texts(content, lines.widest, [*worded, *stamped, *whole])
-        for column in worded:
-            values = _known(texts[column], lambda cell: irregular.value(column, cell))  # noqa: B023
-            rows.numbers[targets[column], to] = np.array(values, dtype=np.float64)
-            readable[at[[value is None for value in values]]] = False
-        for column in stamped:
-            stamps = self.dialect.stamped[column].layouts[0].read_all(texts[column])
-            rows.stamps[STAMP - targets[column], to] = stamps
-            missing = ("", *self.dialect.missing)
-            doubtful = np.flatnonzero(stamps == MISSING_STAMP).tolist()
-            readable[at[[i for i in doubtful if texts[column][i] not in missing]]] = False
-        for column in whole:
-            k = self.shape[1] - len(self.whole) + self.whole.index(column)
-            rows.stamps[k, to] = _multiples(texts[column], self.decimals)
-        return readable
-
-    def _numbers(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Return the columns in which each cell is a number in plain notation, or missing."""
-        if not columns:
-            return {}
-        try:
-            return _by_column(self._parsed(content, width, columns, np.float64))
-        except ValueError:  # of one of the columns
-            kinds = self._parsed(content, width, columns, None).dtypes
-        numeric = [column for column in columns if kinds[column].kind in "iuf"]  # read again: integers have no -0.0
-        return self._numbers(content, width, numeric) if len(numeric) < len(columns) else {}
-
-    def _texts(self, content: bytes, width: int, columns: Sequence[int]) -> dict[int, list[str]]:
-        """Return the cells of columns."""
-        if not columns:
-            return {}
-        frame = self._parsed(content, width, columns, np.object_)
-        if content.isascii():
-            return {column: [cell.strip(" \t") for cell in cells] for column, cells in frame.items()}
-        encoding = self.dialect.text.stream_encoding
-        return {
-            column: [cell.encode("latin-1").decode(encoding, "replace").strip(" \t") for cell in cells]
-            for column, cells in frame.items()
-        }
-
-    def _parsed(self, content: bytes, width: int, columns: Sequence[int], dtype: Any) -> Any:
-        """Return columns as parsed by pandas; the bytes are decoded as Latin-1, one letter each."""
-        dialect, is_text = self.dialect, dtype is np.object_
-        return pd.read_csv(
-            io.BytesIO(content),
-            sep=r"\s+" if dialect.separator == " " else dialect.separator,
+        The bytes are decoded as Latin-1, one letter each: a stamp that is not ASCII cannot be read.
+        """
+        columns = [*self.values.numeric, *self._texts]
+        dtypes: Any = dict.fromkeys(self._texts, np.object_) | dict.fromkeys(self.values.numeric, np.float64)
+        frame = pd.read_csv(
+            io.BytesIO(block),
+            sep=self.dialect.separator,
             header=None,
-            names=range(width),
-            usecols=None if len(columns) == width else list(columns),
+            names=range(self.dialect.width),
+            usecols=None if len(columns) == self.dialect.width else columns,
             index_col=False,
-            dtype=dtype,
+            dtype=dtypes,
             engine="c",
             encoding="latin-1",
             skip_blank_lines=False,
             keep_default_na=False,
-            na_filter=not is_text,
-            na_values=[] if is_text else [*MISSING, *self._missing],
-            quoting=csv.QUOTE_MINIMAL if b'"' in content else csv.QUOTE_NONE,
-            skipinitialspace=dialect.separator != " " and b" " in content,
-            decimal=dialect.marks.decimal,
+            na_values=self._missing,
+            quoting=csv.QUOTE_NONE,
+            skipinitialspace=b" " in block,
+            decimal=self.dialect.marks.decimal,
             low_memory=False,
             **_EXACT,
         )
+        texts = {
+            column: [cell.strip(" \t") for cell in frame.pop(column).fillna("").tolist()] for column in self._texts
+        }
+        return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True)), texts
+
+    def _by_lines(self, block: bytes, ended: bool) -> Iterator[Rows]:
+        """Yield the rows of a block of any lines."""
+        lines = self.dialect.text.decode(block).split(self.dialect.text.line_end.decode())
+        count = len(lines) - (not lines[-1])
+        most = max(1, MOST_CELLS // self.dialect.width)
+        for first in range(0, count, most):
+            cells, at = [], []
+            for i in range(first, min(first + most, count)):
+                row = self.lines.cells(lines[i], unfinished=not ended and i == len(lines) - 1)
+                if row is not None:
+                    cells.append(row)
+                    at.append(self.lines.line - 1)
+            yield self._read(cells, at)
+
+    def _read(self, cells: Sequence[Sequence[str]], lines: Sequence[int]) -> Rows:
+        """Return rows of cells, which are in these lines."""
+        columns = [*zip_longest(*cells, fillvalue="")]
+        columns += [("",) * len(cells)] * (self.dialect.width - len(columns))
+        numbers, (whole, unread) = {}, self._whole(columns)
+        for column in self.values.numeric:
+            numbers[column], rows = self.values.numbers(column, columns[column])
+            unread += [(row, column) for row in rows]
+        self.values.lose((lines[row], column, columns[column][row]) for row, column in unread)
+        return Rows(self.lines.rows - len(cells), len(cells), lines[-1] if lines else 0, numbers, whole)
+
+    def _whole(
+        self, texts: Mapping[int, Sequence[str]] | Sequence[Sequence[str]]
+    ) -> tuple[dict[int, Integers], list[tuple[int, int]]]:
+        """Return the stamps and the large numbers, and row and column of the stamps that cannot be read."""
+        whole = {column: self.values.multiples(texts[column]) for column in self.requested.whole}
+        unread = []
+        for column in self.requested.stamps:
+            whole[column], rows = self.values.stamps(column, texts[column])
+            unread += [(row, column) for row in rows]
+        return whole, unread
+
+    def _end(self, rows: Rows, ended: bool) -> list[Finding]:
+        """Return all findings; the last one of the last `rows` may be removed."""
+        lines, padding = self.lines, self.dialect.text.padding
+        findings = [*self.values.findings(), *lines.findings(rows.last_line)]
+        if not ended and not lines.cut_line and not lines.ends_skipped:
+            findings += self._check_last_line(rows)
+        if lines.cut_line or padding:
+            findings.insert(0, Finding("last_line_cut", "", {"line": lines.cut_line or rows.last_line + 1}))
+        if padding:
+            findings.append(Finding("nul_bytes_at_end", "", {"count": padding}))
+        return findings
+
+    def _check_last_line(self, rows: Rows) -> list[Finding]:
+        """Check a last row without line end: keep it, keep it with a warning, or remove it with a loss."""
+        dialect, text, last = self.dialect, self.dialect.text, self.dialect.width - 1
+        is_read = dialect.short_rows or last in (*self.values.numeric, *self.requested.stamps)
+        *others, unfinished = text.tail()
+        if not rows.count or dialect.trailing or not is_read or not unfinished.strip():
+            return []
+        above = []
+        for raw in reversed(others[1:] if len(others) > 1 else others):
+            cells = split_line(text.decode(raw), dialect.separator)
+            if len(cells) == dialect.width and kind(cells[-1]) != "X":
+                above.append(cells[-1])
+            if len(above) == RECENT:
+                break
+        line = text.decode(unfinished).rstrip()
+        cell = '"' if line.endswith('"') else split_line(line, dialect.separator)[-1]
+        complete, certain = is_complete(cell, above[: self.lines.rows - 1])
+        fact = {"line": rows.last_line, "cell": cell}
+        if complete and (certain or not text.padding):
+            return [] if certain else [Finding("last_line_kept", "", fact)]
+        rows.count -= 1
+        rows.numbers = {column: values[:-1] for column, values in rows.numbers.items()}
+        rows.whole = {column: values[:-1] for column, values in rows.whole.items()}
+        self.lines.rows -= 1
+        return [] if text.padding else [Finding("last_line_dropped", "", fact)]
 
 
-def _by_column(frame: Any) -> dict[int, FloatArray]:
-    return dict(zip(frame.columns.tolist(), frame.to_numpy().T, strict=True))
+def is_complete(cell: str, above: Sequence[str]) -> tuple[bool, bool]:
+    """Return whether the last cell of an unfinished line is complete, and whether that is certain.
+
+    `above` are the cells above it in the same column. A cell that is cut off has fewer digits after its last mark (the
+    decimal mark, or the e of an exponent). It is therefore certainly complete if it has as many as all cells above. If
+    their number varies, it is assumed to be complete if it has at least as many as the shortest cell above with the
+    same mark; otherwise it is incomplete.
+    """
+    if not above:
+        return True, False
+    if cell == '"':  # the closing quote is not cut off
+        return True, True
+    (mark, digits), ends = _end(cell), [_end(other) for other in above]
+    alike = {other for other_mark, other in ends if other_mark == mark}
+    complete = digits >= max(1, min(alike)) if alike else False
+    return complete, complete and {*ends} == {(mark, digits)}
 
 
-def _known(cells: Sequence[str], value: Callable[[str], float | None]) -> list[float | None]:
-    """Return the values of cells, of which many may be equal."""
-    known = {cell: value(cell) for cell in set(cells)}
-    return [known[cell] for cell in cells]
-
-
-def _multiples(cells: Sequence[str], decimals: int) -> Integers:
-    """Return numbers without a sign or an exponent as multiples of 1 / 10^decimals; MISSING_STAMP for other cells."""
-    multiples = np.full(len(cells), MISSING_STAMP, dtype=np.int64)
-    for rows, example, digits in by_shape(cells):
-        match = _DECIMAL.fullmatch(example)
-        if match is None or not 0 < len(match["whole"]) + decimals <= _MOST_DIGITS:
-            continue
-        (first, whole_end), (begin, end) = match.span("whole"), match.span("decimals")
-        end = min(end, begin + decimals)
-        places = end - begin
-        fraction = as_integers(digits, begin, end) if places else 0
-        values = (as_integers(digits, first, whole_end) * 10**places + fraction) * 10 ** (decimals - places)
-        fits = len(match["whole"]) + decimals < _MOST_DIGITS or digits[:, 0] < 9
-        multiples[rows] = np.where(fits, values, MISSING_STAMP)
-    return multiples
+def _end(cell: str) -> tuple[str, int]:
+    """Return the last mark of a number and how many digits follow it; the length of any other text."""
+    match = _END.fullmatch(cell)
+    return (match["mark"] or "", len(match["digits"])) if match else ("", len(cell))

@@ -11,14 +11,12 @@ from collections import Counter
 from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from cdtool.clock import EPOCH
-from cdtool.columns import Column, Piece
-from cdtool.errors import RecordingError
+from cdtool.columns import Piece
 from cdtool.findings import Finding
 from cdtool.formats.column_names import split_unit
 from cdtool.formats.csv.dialect import Dialect
@@ -142,17 +140,19 @@ def _end_apart(a: FloatArray, b: FloatArray) -> bool:
 
 
 def pieces_by_own_clock(
-    dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None
-) -> Generator[Piece, None, tuple[Table, list[Finding] | None, float]]:
+    dialect: Dialect, clocks: Clocks, pieces: Generator[Piece, None, Table], keys: Collection[str] | None, stated: bool
+) -> Generator[Piece, None, tuple[Table, list[Finding], float | None]]:
     """Yield the pieces of a table unchanged or, if its clocks have other rates, by clock with their times [s].
 
-    The first piece decides. The return value is that of `pieces`, the findings on the clocks (None: unchanged), and the
-    origin of the times [s].
+    The first piece decides, unless it is `stated` that each column has the clock beside it. A clock without a unit in
+    the header is in s. A shorter clock ends with empty cells: rows without a time are left out of its columns. The
+    return value is that of `pieces`, the findings on the clocks, and the origin of the times [s] (None: unchanged).
     """
     piece = next(pieces)
-    if not have_other_rates(dialect, clocks, piece.values):
+    if not stated and not have_other_rates(dialect, clocks, piece.values):
+        findings = clock_findings(dialect, clocks, piece.values)
         yield piece
-        return (yield from pieces), None, 0.0
+        return (yield from pieces), findings, None
     names = dialect.names
     of_group = {
         k: [
@@ -178,7 +178,7 @@ def pieces_by_own_clock(
         try:
             piece = next(pieces)
         except StopIteration as end:
-            return end.value, _own_clock_findings(dialect, steps, lost), origin
+            return end.value, _own_clock_findings(dialect, steps, lost, stated), origin
 
 
 def _epoch_origin(clocks: Iterable[FloatArray]) -> float:
@@ -192,43 +192,17 @@ def _step(stamps: FloatArray) -> float:
     return float(np.median(np.diff(known))) if len(known) > 1 else 0.0
 
 
-def _own_clock_findings(dialect: Dialect, steps: Mapping[str, float], lost: Mapping[str, int]) -> list[Finding]:
+def _own_clock_findings(
+    dialect: Dialect, steps: Mapping[str, float], lost: Mapping[str, int], stated: bool
+) -> list[Finding]:
     """Return the findings on a table whose channels have the clocks beside them; `steps` are those of each clock."""
     findings = [Finding("own_clocks", "time", {"clocks": tuple(steps)})]
     assumed = {name: step for name, step in steps.items() if not np.isfinite(_factor(dialect, name, np.nan))}
-    if assumed:
+    if assumed and not stated:
         findings.append(
             Finding("clock_unit_assumed", "time", {"clocks": tuple(assumed), "step": next(iter(assumed.values()))})
         )
     return findings + [Finding("values_without_time", key, {"count": count}) for key, count in lost.items() if count]
-
-
-def columns_by_own_clock(
-    path: Path, dialect: Dialect, clocks: Clocks, keys: Sequence[str], values: Mapping[str, FloatArray]
-) -> tuple[dict[str, Column], float, list[Finding]]:
-    """Return the requested columns with the times [s] of their adjacent clocks, their origin [s], and findings.
-
-    A clock without a unit in the header is in s. A shorter clock ends with empty cells: rows without a time are left
-    out of its columns. Raises RecordingError if no clock is adjacent to a column.
-    """
-    times: dict[int, FloatArray] = {}
-    for key in keys:
-        group = clocks.group(dialect.names.index(key))
-        if group is None:
-            raise RecordingError(f"{path}: no clock is beside column '{key}'", "name its clock in [channels] time")
-        name = dialect.names[clocks.groups[group][0]]
-        times.setdefault(group, values[name] * _factor(dialect, name, 1.0))
-    origin = _epoch_origin(times.values())
-    used = {"clocks": tuple(dialect.names[clocks.groups[group][0]] for group in times)}
-    columns, findings = {}, [Finding("own_clocks", "time", used)]
-    for key in keys:
-        time = times[clocks.group(dialect.names.index(key)) or 0]
-        timed = np.isfinite(time)
-        columns[key] = Column(key, values[key][timed], time[timed] - origin, unit_from_header(dialect, key))
-        lost = int(np.count_nonzero(np.isfinite(values[key][~timed])))
-        if lost:
-            findings.append(Finding("values_without_time", key, {"count": lost}))
-    return columns, origin, findings
 
 
 def unit_from_header(dialect: Dialect, name: str) -> str | None:

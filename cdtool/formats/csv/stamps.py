@@ -9,8 +9,9 @@ or five seconds, and `:9`, `:10` after the seconds, which may be parts of a seco
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from functools import cache
 from itertools import pairwise
 
@@ -52,25 +53,6 @@ NS = 1_000_000_000
 _MINUTE, _HOUR, _HALF_DAY, _DAY = 60 * NS, 3600 * NS, 43200 * NS, 86400 * NS
 # Nanoseconds in 64 bits reach from 1677 to 2262.
 _YEARS = (1680, 2260)
-_ALIKE = str.maketrans("123456789", "000000000")
-
-
-def by_shape(cells: Sequence[str]) -> Iterator[tuple[list[int], str, npt.NDArray[np.uint8]]]:
-    """Yield cells with digits in the same places: their numbers, the first of them, and their digits (n, length)."""
-    alike: dict[str, list[int]] = {}
-    for i, shape in enumerate("\n".join(cells).translate(_ALIKE).split("\n") if cells else ()):
-        alike.setdefault(shape, []).append(i)
-    for shape, rows in alike.items():
-        letters = "".join([cells[i] for i in rows]).encode("latin-1", "replace")
-        yield rows, cells[rows[0]], np.frombuffer(letters, dtype=np.uint8).reshape(len(rows), len(shape)) - 48
-
-
-def as_integers(digits: npt.NDArray[np.uint8], begin: int, end: int) -> Integers:
-    """Return the numbers (n,) that the digits `begin` to `end` of each cell form."""
-    numbers = np.zeros(len(digits), dtype=np.int64)
-    for place in range(begin, end):
-        numbers = 10 * numbers + digits[:, place]
-    return numbers
 
 
 @dataclass(frozen=True)
@@ -100,48 +82,38 @@ class Layout:
 
     def read(self, text: str) -> int | None:
         """Return the nanoseconds since 1970 (for a time of day since midnight); None if the layout does not match."""
-        value = int(self.read_all([text.strip(" \t\r")])[0])
-        return None if value == MISSING_STAMP else value
+        match = _pattern(self.pattern).fullmatch(text.strip(" \t\r"))
+        return None if match is None else _nanoseconds(match.groupdict())
 
     def read_all(self, cells: Sequence[str]) -> Integers:
         """Return `read` of each cell, with MISSING_STAMP where the layout does not match."""
-        stamps = np.full(len(cells), MISSING_STAMP, dtype=np.int64)
-        for rows, example, digits in by_shape(cells):
-            if match := _pattern(self.pattern).fullmatch(example):
-                stamps[rows] = _nanoseconds(match, digits)
-        return stamps
+        stamps = {cell: self.read(cell) for cell in set(cells)}
+        known = {cell: int(MISSING_STAMP) if stamp is None else stamp for cell, stamp in stamps.items()}
+        return np.array([known[cell] for cell in cells], dtype=np.int64)
 
 
-def _nanoseconds(match: re.Match[str], digits: npt.NDArray[np.uint8]) -> Integers:
-    """Return the stamps whose digits are at the places of a match; MISSING_STAMP for a day that does not exist."""
-    found = match.groupdict()
+def _nanoseconds(found: Mapping[str, str | None]) -> int | None:
+    """Return the stamp of the fields of a layout; None for a day or a time that does not exist."""
 
-    def number(field: str, otherwise: int, most: int = 9) -> Integers:
-        if found.get(field) is None:
-            return np.full(len(digits), otherwise, dtype=np.int64)
-        begin, end = match.span(field)
-        return as_integers(digits, begin, min(end, begin + most))
+    def number(field: str, otherwise: int) -> int:
+        return int(found.get(field) or otherwise)
 
-    year, hour = number("year", 1970), number("hour", 0)
+    year, month, hour = number("year", 1970), number("month", 1), number("hour", 0)
     if found.get("short"):
         year = number("short", 0)
-        year += np.where(year < 69, 2000, 1900)
-    month, day = number("month", 1), number("day", 1)
+        year += 2000 if year < 69 else 1900
     if name := found.get("name"):
-        month += _MONTHS.index(name.lower()) if name.lower() in _MONTHS else -1
-    minute, second = number("minute", 0), number("second", 0)
-    nano = number("fraction", 0) * 10 ** max(0, 9 - len(found.get("fraction") or ""))
-    east = (3600 * number("zone", 0) + 60 * number("minutes", 0)) * (-1 if found.get("sign") == "-" else 1)
-    valid = (month >= 1) & (month <= 12) & (hour <= 23) & (minute <= 59) & (second <= 59)
-    valid &= (year >= _YEARS[0]) & (year <= _YEARS[1])
+        month = _MONTHS.index(name.lower()) + 1 if name.lower() in _MONTHS else 0
     if half := found.get("half"):
-        valid &= (hour >= 1) & (hour <= 12)
-        hour = hour % 12 + (12 if half in "pP" else 0)
-    months = np.where(valid, (year - 1970) * 12 + month - 1, 0)
-    first, after = (at.astype("M8[M]").astype("M8[D]").astype(np.int64) for at in (months, months + 1))
-    valid &= (day >= 1) & (day <= after - first)
-    seconds = (first + day - 1) * 86400 + hour * 3600 + minute * 60 + second - east
-    return np.where(valid, seconds * NS + nano, MISSING_STAMP)
+        hour = hour % 12 + (12 if half in "pP" else 0) if 1 <= hour <= 12 else 24
+    try:
+        moment = datetime(year, month, number("day", 1), hour, number("minute", 0), number("second", 0))
+    except ValueError:
+        return None
+    east = (3600 * number("zone", 0) + 60 * number("minutes", 0)) * (-1 if found.get("sign") == "-" else 1)
+    seconds = (moment - datetime(1970, 1, 1)) // timedelta(seconds=1) - east
+    nano = int((found.get("fraction") or "")[:9].ljust(9, "0"))
+    return seconds * NS + nano if _YEARS[0] <= year <= _YEARS[1] else None
 
 
 @cache

@@ -1,8 +1,8 @@
 """Read the bytes of a text file (encoding, line ends, NUL bytes at the end) and its lines in blocks.
 
 The bytes of a file that is compressed with gzip are those of the text in it (`gzipped.py`). UTF-16 and UTF-32 are
-recoded to UTF-8 while reading; in any other encoding the bytes of a number are ASCII, and nothing is recoded. The
-result is called the stream: bytes without a byte order mark.
+recoded to UTF-8 in memory; in any other encoding the bytes of a number are ASCII, and nothing is recoded. The result
+is called the stream: bytes without a byte order mark.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from cdtool.errors import RecordingError
+from cdtool.formats.container_checks import check_size
 from cdtool.formats.csv.gzipped import MAGIC, is_gzipped, open_text
 
 SAMPLE_BYTES = 1 << 17
@@ -32,8 +33,8 @@ UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 class Text:
     """The encoding of a text file. The byte order mark has `mark` bytes; `padding` NUL bytes start at byte `size`.
 
-    `content` are the bytes of a file of at most one block, which is read once. `end` are the last bytes of a longer
-    file that is compressed, and the byte where they start.
+    `content` are the bytes of a file that is recoded, or of at most one block, which is read once. `end` are the last
+    bytes of a longer file that is compressed, and the byte where they start.
     """
 
     path: Path
@@ -46,14 +47,9 @@ class Text:
     end: tuple[int, bytes] | None = field(default=None, repr=False, compare=False)
 
     @property
-    def recoded(self) -> bool:
-        """Return whether the stream is UTF-8 that was recoded from UTF-16 or UTF-32."""
-        return self.encoding in UNIT_BYTES
-
-    @property
     def stream_encoding(self) -> str:
         """Return the encoding of the stream."""
-        return "utf-8" if self.recoded else self.encoding
+        return "utf-8" if self.encoding in UNIT_BYTES else self.encoding
 
     def decode(self, line: bytes) -> str:
         """Return a line of the stream as text."""
@@ -70,40 +66,17 @@ class Text:
             return file.read(end - start) or b""
 
     def chunks(self, offset: int = 0) -> Iterator[bytes]:
-        """Yield the stream from byte `offset` in pieces that may end within a line.
-
-        Raises RecordingError if it cannot be decoded.
-        """
-        decoder = codecs.getincrementaldecoder(self.encoding)() if self.recoded else None
-        start = self.mark if decoder else self.mark + offset
+        """Yield the stream from byte `offset` in pieces that may end within a line."""
+        left = self.size - self.mark - offset
         with open_text(self.path) if self.content is None else BytesIO(self.content) as file:
-            file.seek(start)
-            left = self.size - start
+            file.seek(self.mark + offset)
             while left > 0 and (piece := file.read(min(_BLOCKS * BLOCK_BYTES, left))):
                 left -= len(piece)
-                if decoder is None:
-                    yield piece
-                    continue
-                try:
-                    text = decoder.decode(piece, final=left == 0).encode()
-                except UnicodeError as fault:
-                    raise RecordingError(
-                        f"{self.path}: damaged: not valid {self.encoding.upper()} near byte {self.size - left}",
-                        "save it again as UTF-8",
-                    ) from fault
-                yield text[offset:]
-                offset = max(0, offset - len(text))
+                yield piece
 
     def tail(self) -> list[bytes]:
         """Return the last lines of the stream, including an unfinished last line; the first may be part of a line."""
-        if self.recoded:
-            last = [b"", b""]
-            for piece in self.chunks():
-                last = [last[1], piece]
-            end = b"".join(last)
-        else:
-            end = self.between(max(self.mark, self.size - TAIL_BYTES), self.size)
-        return end.split(self.line_end)
+        return self.between(max(self.mark, self.size - TAIL_BYTES), self.size).split(self.line_end)
 
     def count_lines(self, offset: int) -> int:
         """Return the number of lines after byte `offset` of the stream, including an unfinished last line."""
@@ -113,14 +86,14 @@ class Text:
             last = piece[-1:] or last
         return total + (last != end)
 
-    def blocks(self, offset: int) -> Iterator[tuple[bytes, int]]:
-        """Yield blocks of complete lines after byte `offset` of the stream, and their size.
+    def blocks(self, offset: int) -> Iterator[bytes]:
+        """Yield blocks of complete lines after byte `offset` of the stream.
 
         Only the last line of the last block may be without a line end.
         """
-        if self.content is not None and not self.recoded:
+        if self.content is not None and len(self.content) <= BLOCK_BYTES:
             if rows := self.content[self.mark + offset : self.size]:
-                yield rows, len(rows)
+                yield rows
             return
         rest = b""
         for piece in self.chunks(offset):
@@ -131,15 +104,33 @@ class Text:
             if len(rest) > BLOCK_BYTES // 2:
                 raise RecordingError(f"{self.path}: has a line of more than {BLOCK_BYTES >> 11} KB", "is it a table?")
             if cut:
-                yield block, len(block)
+                yield block
         if rest:
-            yield rest, len(rest)
+            yield rest
 
 
 def read_sample(path: Path, most: int = SAMPLE_BYTES) -> bytes:
     """Return the first bytes of a file, in which its dialect is detected; raises RecordingError."""
     with _readable(path), open_text(path) as file:
         return file.read(most) or b""
+
+
+def recoded(path: Path, encoding: str, mark: int, content: bytes | None) -> bytes:
+    """Return a text as UTF-8; `content` are its bytes if they have been read. Raises RecordingError."""
+    decoder, pieces, size = codecs.getincrementaldecoder(encoding)(), [], 0
+    with open_text(path) if content is None else BytesIO(content) as file:
+        file.seek(mark)
+        try:
+            while piece := file.read(BLOCK_BYTES):
+                pieces.append(decoder.decode(piece).encode())
+                size += len(piece)
+                check_size(path, size // 8)
+            pieces.append(decoder.decode(b"", final=True).encode())
+        except UnicodeError as fault:
+            raise RecordingError(
+                f"{path}: damaged: not valid {encoding.upper()} near byte {mark + size}", "save it again as UTF-8"
+            ) from fault
+    return b"".join(pieces)
 
 
 def read_small(path: Path) -> bytes | None:
