@@ -14,7 +14,7 @@ from cdtool.formats.mcap.log import Log
 from cdtool.formats.mcap.messages import NO_DATE
 from cdtool.formats.mcap.records import MAGIC
 from cdtool.formats.pieces import Pieces
-from cdtool.formats.topic_log import IsWanted, TopicFormat
+from cdtool.formats.topic_log import IsWanted, TopicFormat, survey
 from cdtool.messages.topic import BatchValues, Topic, sort_times, wanted_topics
 
 __all__ = ["Mcap"]
@@ -39,7 +39,8 @@ class Mcap(TopicFormat):
     def exact_pieces(self, path: Path) -> Pieces:
         """Yield the same as `pieces`; for a log that cdtool converted, with the exact times that were written."""
         log = self.log(path)
-        return with_exact_times(self.pieces(path), log.exact_origin) if log.exact else self.pieces(path)
+        pieces = survey(log)
+        return (yield from with_exact_times(pieces, log.exact_origin) if log.exact else pieces)
 
     def mapped(self, path: Path, wanted: ChannelMap) -> MappedFields:
         """Return the fields that `wanted` names, to be read piece by piece; raises RecordingError."""
