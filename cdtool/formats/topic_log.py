@@ -98,11 +98,8 @@ class TopicFormat(ABC):
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """Return the names of array elements in a topic's first decodable message; () if it has none."""
-        decoders = Decoders()
-        with (
-            suppress(RecordingError),
-            closing(self.log(path, topic.__eq__).blocks()) as blocks,
-        ):  # the survey reports it
+        decoders, blocks = Decoders(), self.log(path, topic.__eq__).blocks()
+        with suppress(RecordingError), closing(blocks):  # the survey reports the problem
             for stream, batch, *_ in chain.from_iterable(blocks):
                 names = decoders.element_names(stream, batch)
                 if names is not None:
