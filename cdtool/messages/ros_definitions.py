@@ -20,7 +20,6 @@ _LINE = re.compile(r"(?P<type>\S+)\s+(?P<name>[A-Za-z]\w*)(?P<constant>\s*=)?(?P
 _TYPE = re.compile(
     r"(?P<base>[A-Za-z]\w*(?:/[A-Za-z]\w*){0,2})(?:<=(?P<text_bound>[1-9]\d*))?(?P<array>\[(?:<=)?(?P<length>[1-9]\d*)?\])?"
 )
-_DEEPEST = 100  # levels of nested messages; each is a call of the decoder
 Kind = Number | Text | Message
 _SAME: dict[str, Kind] = {
     "bool": Number("?"),
@@ -63,7 +62,7 @@ def parse_definitions(name: str, data: bytes, ros: Literal[1, 2]) -> Schema:
     known = {layout.name: layout for layout in _KNOWN[ros] if layout.name not in sections}
     names, primitives = {*sections, *known}, _SAME | (_ROS1 if ros == 1 else _ROS2)
     layouts = known | {title: _layout(title, body, names, primitives) for title, body in sections.items()}
-    _check_nesting(layouts)
+    _check_nesting(_short_name(name), layouts, ())
     return Schema(layouts[_short_name(name)], layouts)
 
 
@@ -133,18 +132,14 @@ def _message(base: str, title: str, names: set[str]) -> Message | None:
     return next((Message(name) for name in tries if name in names), None)
 
 
-def _check_nesting(layouts: dict[str, Layout]) -> None:
-    """Raise SchemaError if a message contains itself: take away those that contain no other, level by level."""
-    left, ready = set(layouts), {""}
-    for _ in range(_DEEPEST):
-        ready = {
-            name
-            for name in left
-            if not any(
-                isinstance(member.kind, Message) and member.kind.name in left for member in layouts[name].members
-            )
-        }
-        left -= ready
-    if left:
-        itself = f"'{min(left)}' contains itself"
-        raise SchemaError(itself if not ready else f"more than {_DEEPEST} levels of nested messages")
+def _check_nesting(name: str, layouts: dict[str, Layout], above: tuple[str, ...], done: set[str] | None = None) -> None:
+    """Raise SchemaError if a message contains itself."""
+    done = set() if done is None else done
+    if name in above:
+        raise SchemaError(f"'{name}' contains itself")
+    if len(above) > 100:
+        raise SchemaError("more than 100 levels of nested messages")
+    for member in layouts[name].members if name not in done else ():
+        if isinstance(member.kind, Message):
+            _check_nesting(member.kind.name, layouts, (*above, name), done)
+    done.add(name)
