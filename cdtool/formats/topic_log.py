@@ -94,31 +94,32 @@ class TopicFormat(ABC):
 
     def pieces(self, path: Path, keys: Collection[str] | None = None) -> Pieces:  # noqa: ARG002  all keys
         """Yield all numeric fields, some MiB of the file at a time; raises RecordingError."""
-        log = self.log(path)
-        topics: dict[str, TopicSurvey] = {}
-        jumps = SequenceJumps()
-        for block in log.blocks():
-            jumps.add(block, log.origin)
-            for stream, batch, *_ in block:
-                survey = topics.setdefault(stream.topic, TopicSurvey(stream.topic))
-                yield from survey.pieces(stream, batch, log.origin)
-        findings = log.findings()
-        columns: dict[str, Column] = {}
-        for name in (name for name in log.topic_details if name in topics):
-            of_topic, of_findings = topics[name].columns_and_findings()
-            columns |= of_topic
-            findings += of_findings
-        return log.source(columns, findings + jumps.findings(), log.origin / 1e9)
+        return (yield from survey(self.log(path)))
 
     def element_names(self, path: Path, topic: str) -> tuple[str, ...]:
         """Return the names of array elements in a topic's first decodable message; () if it has none."""
-        decoders = Decoders()
-        with (
-            suppress(RecordingError),
-            closing(self.log(path, topic.__eq__).blocks()) as blocks,
-        ):  # the survey reports it
+        decoders, blocks = Decoders(), self.log(path, topic.__eq__).blocks()
+        with suppress(RecordingError), closing(blocks):  # the survey reports the problem
             for stream, batch, *_ in chain.from_iterable(blocks):
                 names = decoders.element_names(stream, batch)
                 if names is not None:
                     return names
         return ()
+
+
+def survey(log: TopicLog) -> Pieces:
+    """Yield all numeric fields of a log, some MiB of it at a time; raises RecordingError."""
+    topics: dict[str, TopicSurvey] = {}
+    jumps = SequenceJumps()
+    for block in log.blocks():
+        jumps.add(block, log.origin)
+        for stream, batch, *_ in block:
+            topic = topics.setdefault(stream.topic, TopicSurvey(stream.topic))
+            yield from topic.pieces(stream, batch, log.origin)
+    findings = log.findings()
+    columns: dict[str, Column] = {}
+    for name in (name for name in log.topic_details if name in topics):
+        of_topic, of_findings = topics[name].columns_and_findings()
+        columns |= of_topic
+        findings += of_findings
+    return log.source(columns, findings + jumps.findings(), log.origin / 1e9)

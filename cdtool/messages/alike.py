@@ -160,7 +160,6 @@ class SchemaDecoder(Decoder):
     schema: Schema
     walk: Callable[[Schema, bytes], Example]
     _known: list[Example] = field(default_factory=list)  # of the last batches, the last one first
-    _faults: dict[Field, FieldMissingError | None] = field(default_factory=dict)
 
     def fields(self, batch: Batch) -> list[str]:  # noqa: ARG002  (the schema defines them, not the messages)
         """Return every numeric field except the header's stamp, in schema order; arrays only if they may be short."""
@@ -168,9 +167,7 @@ class SchemaDecoder(Decoder):
 
     def absent(self, field: Field) -> FieldMissingError | None:
         """Return why no message can have a field."""
-        if field not in self._faults:
-            self._faults[field] = self.schema.missing(field)
-        return self._faults[field]
+        return self.schema.missing(field)
 
     def groups(self, batch: Batch) -> tuple[list[Group], dict[int, str]]:
         """Return the messages that are alike, and the reasons for those that are damaged by row."""

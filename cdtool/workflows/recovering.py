@@ -150,7 +150,8 @@ def _copy_extras(log: Log, clean: CleanFile) -> None:
             content = file.read(at + PREFIX, length - PREFIX)
             record = parse(opcode, content)
             if opcode == Opcode.ATTACHMENT:
-                clean.add_attachment(record, covered=any(content[-4:]))
+                crc = 32 + len(record.name.encode()) + len(record.media_type.encode()) + len(record.data)
+                clean.add_attachment(record, covered=any(content[crc : crc + 4]))
             else:
                 clean.add_metadata(record.name, record.metadata)
 

@@ -191,7 +191,7 @@ def test_a_schema_of_exponential_size_is_refused_at_once():
 
 
 def test_a_wide_string_is_refused():
-    with pytest.raises(UndecodableError, match=r"type 'wstring' of test_msgs/Thing.s has characters"):
+    with pytest.raises(UndecodableError, match=r"type 'wstring' of test_msgs/Thing\.s has characters"):
         decoder_of("float64 data\nwstring s")
 
 

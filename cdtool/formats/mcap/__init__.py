@@ -10,7 +10,7 @@ from cdtool.formats.mcap.exact_times import with_exact_times
 from cdtool.formats.mcap.log import Log
 from cdtool.formats.mcap.records import MAGIC
 from cdtool.formats.pieces import Pieces
-from cdtool.formats.topic_log import IsWanted, TopicFormat
+from cdtool.formats.topic_log import IsWanted, TopicFormat, survey
 
 __all__ = ["Mcap"]
 
@@ -34,4 +34,5 @@ class Mcap(TopicFormat):
     def exact_pieces(self, path: Path) -> Pieces:
         """Yield the same as `pieces`; for a log that cdtool converted, with the exact times that were written."""
         log = self.log(path)
-        return with_exact_times(self.pieces(path), log.exact_origin) if log.exact else self.pieces(path)
+        pieces = survey(log)
+        return (yield from with_exact_times(pieces, log.exact_origin) if log.exact else pieces)

@@ -19,6 +19,7 @@ from cdtool.formats.mcap.records import LARGEST, PREFIX, DamageError, RefusedErr
 LARGEST_SHARE, _SMALL = 250, 16 << 20
 # Long logs contain motion, so that their ratio is smaller. lz4 cannot reach the larger ratio.
 _LONG, _LONG_SHARE = 1 << 30, 100
+_LZ4_FRAMES = 1000  # the largest number in a chunk; writers make one
 _LZ4_OUT = 8 << 20  # lz4's decompressor needs memory for the most that it may return [bytes]
 
 _FIXED = struct.Struct("<BQQQQII")  # opcode, content length, three sizes, CRC, length of the compression's name
@@ -129,17 +130,21 @@ def _lz4(packed: Bytes, target: Bytes) -> int:
     import lz4.frame  # type: ignore[import-untyped]
 
     size, filled, left = len(target), 0, packed.data
-    frame = lz4.frame.LZ4FrameDecompressor()
     try:
-        while not frame.eof and (len(left) or not frame.needs_input):
-            part = frame.decompress(left, max_length=min(size - filled + 1, _LZ4_OUT))
-            if len(part) > size - filled:
-                raise DamageError(f"a chunk has more than the {size} bytes that it declares")
-            target[filled : filled + len(part)] = np.frombuffer(part, np.uint8)
-            filled += len(part)
-            if not (len(part) or len(left)):
+        for _ in range(_LZ4_FRAMES):  # consecutive frames, as in a file
+            frame = lz4.frame.LZ4FrameDecompressor()
+            while not frame.eof and (len(left) or not frame.needs_input):
+                data, left = left, left[:0]
+                part = frame.decompress(data, max_length=min(size - filled + 1, _LZ4_OUT))
+                if len(part) > size - filled:
+                    raise DamageError(f"a chunk has more than the {size} bytes that it declares")
+                target[filled : filled + len(part)] = np.frombuffer(part, np.uint8)
+                filled += len(part)
+                if not (len(part) or len(data)):
+                    break
+            if not (frame.eof and frame.unused_data):
                 break
-            left = left[:0]
+            left = memoryview(frame.unused_data)
     except RuntimeError as fault:
         raise DamageError(f"lz4: {fault}") from fault
     return filled

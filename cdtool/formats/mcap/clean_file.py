@@ -89,7 +89,7 @@ class CleanFile:
         return self._channels[stream.id, covered]
 
     def _clear(self, crc: int) -> None:
-        """Write 0, which is no CRC, in place of the CRC at this byte."""
+        """Write 0, which stands for "no CRC", in place of the CRC at this byte."""
         end = self._file.tell()
         self._file.seek(crc)
         self._file.write(bytes(4))

@@ -90,7 +90,7 @@ class Definitions:
             channel.topic
             for channel in channels
             if self._channels.get(channel.id, channel) != channel
-            or self._schemas.get(channel.schema_id) not in (None, schemas.get(channel.schema_id))
+            or ((own := self._schemas.get(channel.schema_id)) and schemas.get(channel.schema_id, own) != own)
         ]
 
     def _find(self, channel_id: int) -> DefinedStream | DamageError:

@@ -143,11 +143,11 @@ def test_a_record_that_declares_more_than_the_file_contains_is_not_read(tmp_path
 def test_lz4_gives_the_same_result_in_pieces_of_any_size(monkeypatch, output_size):
     rng = np.random.default_rng(0)
     content = np.frombuffer(bytes(9_000) + rng.bytes(3_000) + bytes(70_000 if output_size > 1 else 9), np.uint8)
-    frame = lz4.frame.compress(content.tobytes())
+    frames = b"".join(lz4.frame.compress(part.tobytes()) for part in (content[:10_000], content[10_000:]))
     monkeypatch.setattr(chunks, "_LZ4_OUT", output_size)
-    header = chunks.ChunkHeader(0, 0, 0, 0, len(content), 0, "lz4", 0, len(frame))
+    header = chunks.ChunkHeader(0, 0, 0, 0, len(content), 0, "lz4", 0, len(frames))
     target = np.empty(len(content), np.uint8)
-    chunks.unpack(header, np.frombuffer(frame, np.uint8), target)
+    chunks.unpack(header, np.frombuffer(frames, np.uint8), target)
     assert target.tobytes() == content.tobytes()
 
 
