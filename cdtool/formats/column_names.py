@@ -20,10 +20,6 @@ OWN_CLOCK = "time"
 # `torque [Nm]`, `torque (Nm)`: a name and its unit. A number in brackets is an index, not a unit.
 _BRACKET = re.compile(r"^(?P<name>.*?\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$")
 
-# The maps found last (_resolved), by the map of the machine file and the columns of the file.
-_FOUND: dict[tuple[ChannelMap, tuple[str, ...]], tuple[ChannelMap, list[ChannelSource]]] = {}
-_MOST_FOUND = 16
-
 
 def split_unit(name: str) -> tuple[str, str | None]:
     """Return name and unit: `torque [Nm]` -> ("torque", "Nm"); the unit is None if the name has no unit."""
@@ -115,20 +111,7 @@ def resolve_columns(source: Source, channels: ChannelMap) -> tuple[Source, Chann
 
 
 def _resolved(path: Path, channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
-    """Return the map with the file's own column names, and the ground truth that is missing from the file.
-
-    The maps found last are kept, as files with the same columns usually follow each other.
-    """
-    known = channels, tuple(names)
-    found = _FOUND.get(known)
-    if found is None:
-        if len(_FOUND) >= _MOST_FOUND:
-            _FOUND.clear()
-        found = _FOUND[known] = _find_columns(path, channels, names)
-    return found
-
-
-def _find_columns(path: Path, channels: ChannelMap, names: Sequence[str]) -> tuple[ChannelMap, list[ChannelSource]]:
+    """Return the map with the file's own column names, and the ground truth that is missing from the file."""
     absent = [
         source
         for source in channels.sources

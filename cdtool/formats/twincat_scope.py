@@ -58,7 +58,6 @@ _SAMPLE_ROWS = 50
 _TICKS_PER_S, _TICKS_1970 = 1e7, 116_444_736_000_000_000
 # Ticks since 1917 have 18 digits: fewer are damaged. No export is long enough for as many milliseconds.
 _FEWEST_TICKS = 10**17
-_EXPORT_AGAIN = "export it again with 'Timelines' set to 'For each sampletime' or 'All'"
 _NAME = re.compile(rf"(?<![^ ]){NAME}(?![^ ])")
 # A unit with its quantity in parentheses, `(None)`, or any other word.
 _BETWEEN_BLANKS = re.compile(r"[^ ]+ \((?!None\))[^()]*\)|[^ ]+")
