@@ -6,11 +6,8 @@ If every other line is blank, the blank lines only separate the rows and are not
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-from cdtool.errors import RecordingError
 from cdtool.formats.csv.lines import Line
-from cdtool.formats.csv.text import TAIL_BYTES, Text
 
 _BLANK = b" \t\r\n"
 # The end is searched so often, TAIL_BYTES at a time.
@@ -28,15 +25,3 @@ def are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
     rows = [line.number for line in lines if not line.blank and line.number >= first]
     blank = [line.number for line in lines if line.blank and first < line.number < rows[-1]]
     return not blank or 2 * len(blank) < rows[-1] - first
-
-
-def strip_blank_end(text: Text) -> Text:
-    """Return the text up to the end of its last line that is not blank; raises RecordingError if many lines are."""
-    for _ in range(_MOST_TAILS):
-        end = text.line_end.join(text.tail())
-        blank = end[len(end.rstrip(_BLANK)) :]
-        more = len(blank) - (blank.find(text.line_end) + 1)
-        if not more or not blank.strip(b" \t"):
-            return text
-        text = replace(text, size=text.size - more)
-    raise RecordingError(f"{text.path}: ends with more than {_MOST_TAILS * TAIL_BYTES >> 20} MiB of blank lines", _HINT)
