@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from cdtool.channels import TablePins
 from cdtool.formats.csv.dialect import Dialect
 from cdtool.formats.csv.text import SAMPLE_BYTES, Text
@@ -75,14 +77,17 @@ def _alike(rows: bytes, separator: bytes, width: int) -> int:
 
     After the last cell there may be another separator, in all rows or in none.
     """
-    lines = rows.count(b"\n")
-    between = bytes({*range(256)} - {*separator, *b"\n"})
-    before = b"\n" + rows
-    signs = sum(before.count(mark + b"-") for mark in (separator, b"\n", b"e", b"E"))
-    ends = rows.count(separator + b"\n") + rows.count(separator + b"\r\n")
-    empty = before.count(b"\n" + separator) + rows.count(separator + separator) + before.count(b"\n\n")
-    alike = rows.translate(None, between) == (separator * (width - 1) + b"\n") * lines
-    return lines if alike and not empty and ends in (0, lines) and signs == rows.count(b"-") else 0
+    data = np.frombuffer(b"\n" + rows, dtype=np.uint8)
+    before_signs = bytes(data[np.flatnonzero(data == ord("-")) - 1])
+    places = np.flatnonzero((data == separator[0]) | (data == ord("\n")))
+    is_end = data[places[1:]] == ord("\n")
+    lines = int(np.count_nonzero(is_end))
+    if len(is_end) != lines * width or not is_end[width - 1 :: width].all():
+        return 0
+    filled = np.diff(places).reshape(lines, width) > 1
+    filled[:, -1] = np.diff(places)[width - 1 :: width] > 1 + rows.endswith(b"\r\n")
+    alike = filled[:, :-1].all() and filled[:, -1].all() == filled[:, -1].any()
+    return lines if alike and not before_signs.translate(None, b"\neE" + separator) else 0
 
 
 def _begins_rows(comment: str) -> bool:
