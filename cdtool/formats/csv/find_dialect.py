@@ -21,7 +21,6 @@ from cdtool.formats.csv.ambiguous_marks import (
     refuse_one_column_of_decimals,
     resolve_marks,
 )
-from cdtool.formats.csv.blank_lines import are_missing_samples
 from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
 from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
 from cdtool.formats.csv.encoding import detect_text
@@ -305,13 +304,26 @@ def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect
         width=grid.width,
         kinds=grid.kinds,
         trailing=trailing,
-        blank_is_missing=are_missing_samples(lines.every, head.first.number, grid.width),
+        blank_is_missing=_are_missing_samples(lines.every, head.first.number, grid.width),
         stamped=_stamped_columns(grid, pins),
         short_rows=grid.short > 0,
         short_width=grid.short,
         words={i: _first_words(grid.data, i) for i in grid.not_numbers},
         findings=tuple(_findings(text, lines, head)),
     )
+
+
+def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
+    """Return whether blank lines are missing samples of the table whose rows start in line number `first`.
+
+    They are if the table has one column and fewer than half of the `lines` of its rows are blank: each is a missing
+    sample, so that later rows have their times. If every other line is blank, the blank lines only separate the rows.
+    """
+    if width != 1:
+        return False
+    rows = [line.number for line in lines if not line.blank and line.number >= first]
+    blank = [line.number for line in lines if line.blank and first < line.number < rows[-1]]
+    return not blank or 2 * len(blank) < rows[-1] - first
 
 
 def _refuse_other_readings(path: Path, lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
