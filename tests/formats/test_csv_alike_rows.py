@@ -151,7 +151,8 @@ def test_rows_whose_marks_may_separate_thousands_are_all_read(tmp_path):
     assert shorter(tmp_path, plain(row="{0}.5;{0};1,5\n")) is None
 
 
-def test_a_column_that_is_seldom_filled_is_read_in_all_rows(tmp_path):
+def test_a_column_with_empty_cells_is_read_in_all_rows(tmp_path):
     assert shorter(tmp_path, plain(row="{0};{0};\n")) is not None  # never filled
+    assert shorter(tmp_path, plain(row="{0};;{0}\n")) is None
     once = plain(row="{0};{0};\n").replace(b"\n700;700;", b"\n700;700;1")
     assert shorter(tmp_path, once) is None

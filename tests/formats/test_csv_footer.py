@@ -200,3 +200,9 @@ def test_a_last_row_with_the_sums_of_the_rows_above_is_said(log, last, said):
         ("total_row", {"line": 12})
     ] * said
     assert len(source.columns["a"].values) == 11
+
+
+def test_a_total_above_a_line_that_is_cut_off_is_no_sample(log):
+    source = Csv().columns(log("t;x\n" + "".join(f"{i};{i}.5\n" for i in range(9)) + "Sum;40.5\n9"))
+    assert len(source.columns["x"].values) == 9
+    assert [finding.kind for finding in source.findings] == ["last_line_cut", "footer_skipped"]

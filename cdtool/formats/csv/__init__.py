@@ -125,7 +125,7 @@ def _by_clock(
 
 
 def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
-    from cdtool.formats.csv.several_clocks import HINT, Clocks, describe_other_clock
+    from cdtool.formats.csv.several_clocks import HINT, Clocks, other_clocks
     from cdtool.formats.csv.table import read_table
 
     names, time = dialect.names, wanted.time
@@ -136,9 +136,11 @@ def _read_wanted(path: Path, dialect: Dialect, wanted: ChannelMap) -> Source:
         return _source(path, dialect, read_table(path, dialect, wanted_keys(path, wanted, names), clock, wanted))
     keys = wanted_keys(path, wanted if clock is not None else replace(wanted, time=TimeSource()), names)
     table = read_table(path, dialect, {*keys, *(names[column] for column in clocks.columns)}, clock, wanted)
-    other = describe_other_clock(dialect, clocks, clock, keys, table.values) if clock is not None else ""
+    other = [] if clock is None else other_clocks(dialect, clocks, clock, keys, table.values)
     if other and not own:
-        raise RecordingError(f"{path}: {other}", HINT)
+        beside = f"column '{other[0].numbers['columns'][0]}' is beside the clock '{other[0].channel}'"
+        differs = other[0].words_for("difference[what]")
+        raise RecordingError(f"{path}: {beside}, but the machine file names '{clock}': {differs}", HINT)
     if clock is not None and not other:
         table.values = {key: values for key, values in table.values.items() if key in keys}
         return _source(path, dialect, table)

@@ -1,8 +1,7 @@
 """Shorten the sample of a table to the lines that determine its dialect.
 
-Most tables have a head, and then rows of one shape: a number or nothing in each cell, one separator, one decimal mark.
-The head and some rows determine their dialect: the first rows, and one row with a number for each column that also has
-empty cells. Any other sample is not shortened.
+Most tables have a head, and then rows of one shape: a number in each cell, one separator, one decimal mark. The head
+and the first rows determine their dialect. Any other sample is not shortened.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ import re
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from cdtool.channels import TablePins
 from cdtool.formats.csv.dialect import Dialect
@@ -22,8 +20,6 @@ _FEWEST_ROWS, _MOST_ABOVE = 100, 40
 # The shortened sample has at least this many rows, and twice as many as lines above: its lower two thirds, from which
 # the separator is found, then contain rows only, as in the whole sample.
 _FIRST_ROWS = 6
-# A column of numbers has them in at least this share of the rows.
-_FILLED = 0.5
 # The bytes of numbers; a sign is at the start of a number or of its exponent.
 _PLAIN = b"0123456789.+-eEnaNA\r\n"
 # A number whose mark cannot separate thousands.
@@ -39,13 +35,12 @@ class ShorterSample:
     left_out: int
     separator: str
     width: int
-    has_empty_cells: bool
 
     def whole(self, dialect: Dialect) -> Dialect | None:
         """Return the dialect of the whole sample, given that of `stream`; None if the two may differ."""
         if (dialect.separator, dialect.width) != (self.separator, self.width) or dialect.first_line > self.first:
             return None
-        if not {*dialect.kinds} <= {*"NM"} or (self.has_empty_cells and dialect.first_line < self.first):
+        if not {*dialect.kinds} <= {*"NM"}:
             return None
         if dialect.marks.doubt is not None or (dialect.header is None and dialect.separator == ","):
             return None
@@ -64,31 +59,35 @@ def shorter_sample(text: Text, stream: bytes, pins: TablePins) -> ShorterSample 
     separator = _separator(stream)
     if separator is None:
         return None
-    data = np.frombuffer(stream, dtype=np.uint8)
-    begin, cells = _alike(stream, data, separator)
-    above = stream.count(b"\n", 0, begin)
-    count = _FIRST_ROWS + 2 * above
-    if len(cells) < max(_FEWEST_ROWS, count) or above > _MOST_ABOVE:
+    others = {*stream.translate(None, _PLAIN + separator + b",")}
+    begin = stream.find(b"\n", max(map(stream.rfind, others), default=-1)) + 1 if others else 0
+    above, rows = stream.count(b"\n", 0, begin), stream[begin:]
+    count, width = _FIRST_ROWS + 2 * above, rows.partition(b"\n")[0].count(separator) + 1
+    lines = _alike(rows, separator, width)
+    if lines < max(_FEWEST_ROWS, count) or above > _MOST_ABOVE:
         return None
-    lengths = np.diff(cells.ravel(), prepend=begin - 1).reshape(cells.shape) - 1
-    lengths[:, -1] -= data[cells[:, -1] - 1] == ord("\r")
-    filled = lengths > 0
-    share = filled.mean(axis=0)
-    ends = cells[:, -1] + 1
-    if ((share > 0.0) & (share < _FILLED)).any():
+    *first, _ = stream.split(b"\n", above + count)
+    if not _is_clear(b"\n".join(first[above:]), rows, separator):
         return None
-    if not _is_clear(stream[begin : ends[count - 1]], stream[begin:], separator):
-        return None
-    last = {len(cells) - 1 - int(np.argmax(filled[::-1, column])) for column in np.flatnonzero(share < 1.0)}
-    more = sorted(row for row in last if row >= count)
-    return ShorterSample(
-        stream=stream[: ends[count - 1]] + b"".join(stream[ends[row - 1] : ends[row]] for row in more),
-        first=above + 1,
-        left_out=len(cells) - count - len(more),
-        separator=separator.decode(),
-        width=cells.shape[1],
-        has_empty_cells=not filled.all(),
-    )
+    return ShorterSample(b"\n".join([*first, b""]), above + 1, lines - count, separator.decode(), width)
+
+
+def _alike(rows: bytes, separator: bytes, width: int) -> int:
+    """Return the number of rows if each cell of all rows is a number; 0 if there may be other rows.
+
+    After the last cell there may be another separator, in all rows or in none.
+    """
+    data = np.frombuffer(b"\n" + rows, dtype=np.uint8)
+    before_signs = bytes(data[np.flatnonzero(data == ord("-")) - 1])
+    places = np.flatnonzero((data == separator[0]) | (data == ord("\n")))
+    is_end = data[places[1:]] == ord("\n")
+    lines = int(np.count_nonzero(is_end))
+    if len(is_end) != lines * width or not is_end[width - 1 :: width].all():
+        return 0
+    filled = np.diff(places).reshape(lines, width) > 1
+    filled[:, -1] = np.diff(places)[width - 1 :: width] > 1 + rows.endswith(b"\r\n")
+    alike = filled[:, :-1].all() and filled[:, -1].all() == filled[:, -1].any()
+    return lines if alike and not before_signs.translate(None, b"\neE" + separator) else 0
 
 
 def _begins_rows(comment: str) -> bool:
@@ -104,22 +103,6 @@ def _separator(stream: bytes) -> bytes | None:
     if len(strong) > 1:
         return None
     return strong[0] if strong else b"," if b"," in line else None
-
-
-def _alike(stream: bytes, data: npt.NDArray[np.uint8], separator: bytes) -> tuple[int, npt.NDArray[np.intp]]:
-    """Return the first byte of the last lines that have only numbers, in equally many cells, and the cells' ends."""
-    others = {*stream.translate(None, _PLAIN + separator + b",")}
-    begin = stream.find(b"\n", max(map(stream.rfind, others), default=-1)) + 1 if others else 0
-    before_sign = data[np.flatnonzero(data[begin:] == ord("-")) + begin - 1]  # before the first byte is the line end
-    if bytes(before_sign).translate(None, b"\neE" + separator):
-        begin = len(stream)
-    places = np.flatnonzero((data[begin:] == ord(separator)) | (data[begin:] == ord("\n"))) + begin
-    ends = np.flatnonzero(data[places] == ord("\n"))
-    widths = np.diff(ends, prepend=-1)
-    odd = np.flatnonzero(widths != widths[-1:])[-1:]
-    if len(odd):
-        begin, places = int(places[ends[odd[0]]]) + 1, places[ends[odd[0]] + 1 :]
-    return begin, places.reshape(-1, widths[-1] if len(widths) else 1)
 
 
 def _is_clear(first: bytes, rows: bytes, separator: bytes) -> bool:

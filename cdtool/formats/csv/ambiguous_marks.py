@@ -145,37 +145,27 @@ def resolve_marks(dialect: Dialect) -> Marks:
 
 
 def _marked_cells(dialect: Dialect) -> Iterator[tuple[str, int, int]]:
-    """Yield cells with a mark between digits in columns of numbers, with line and column, in the file's order."""
+    """Yield the cells of columns of numbers with line and column, in the file's order, of blocks that have a mark."""
     line, end = dialect.first_line, dialect.text.line_end
-    marked = _marked_number(dialect.separator)
     for block in dialect.text.blocks(dialect.offset):
-        size, counted = len(block), 0
-        for found in marked.finditer(block):
-            if found.start() < counted:  # in the same line
-                continue
-            first, last = block.rfind(end, 0, found.end()) + 1, block.find(end, found.end())
-            last = size if last < 0 else last
-            line += block.count(end, counted, first)
-            counted = last
-            for column, cell in enumerate(_cells(dialect, block[first:last])):
+        rows = block.split(end)
+        if any(mark in block for mark in (b".", b"'", b",") if mark != dialect.separator.encode()):
+            for number, raw in enumerate(rows, line):
                 # A last line without a line end may be cut off: `1.0` may have been `1.000`.
-                if dialect.kinds[column] in "NM" and (last < size or _GROUPED.fullmatch(cell)):
-                    yield cell, line, column
-        line += block.count(end, counted, size)
-
-
-def _marked_number(separator: str) -> re.Pattern[bytes]:
-    """Return the pattern of a mark in a number that fills a cell: not in the seconds of a time, nor in a date."""
-    marks, border = ".'" if separator == "," else ".,'", re.escape(separator + '" \t\r\n')
-    number = rf"(?<![^{border}+-])[0-9]*[{marks}](?:[0-9]{{3}}[{marks}]|[0-9]+(?=[{border}eE]|\Z))"
-    return re.compile(number.encode())
+                cut = number == line + len(rows) - 1
+                for column, cell in enumerate(_cells(dialect, raw)):
+                    if dialect.kinds[column] in "NM" and (not cut or _GROUPED.fullmatch(cell)):
+                        yield cell, number, column
+        line += len(rows) - 1
 
 
 def _cells(dialect: Dialect, raw: bytes) -> list[str]:
-    """Return the cells of a row; empty for any other line."""
+    """Return the cells of a row; empty for any other line, such as one of a footer."""
     text = dialect.text.decode(raw)
     cells = [] if begins_comment(text, dialect.comment) else split_line(text, dialect.separator)
-    return cells if len(cells) == dialect.width else []
+    if len(cells) != dialect.width or (dialect.kinds[0] in "NT" and kind(cells[0]) == "X"):
+        return []
+    return cells
 
 
 def _first_rows(dialect: Dialect) -> Iterator[list[str]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from cdtool.errors import RecordingError
 from cdtool.formats.csv.east_asian import east_asian
 from cdtool.formats.csv.gzipped import is_gzipped, measure
-from cdtool.formats.csv.text import SAMPLE_BYTES, UNIT_BYTES, Text, recoded
+from cdtool.formats.csv.text import UNIT_BYTES, Text, recoded
 
 # UTF-32 before UTF-16, because its byte order mark starts with that of UTF-16.
 _MARKS = (
@@ -51,16 +51,8 @@ def looks_like_text(sample: bytes) -> bool:
     first_line = text.lstrip(b"\r\n").partition(b"\n")[0].partition(b"\r")[0]
     if not text or b"\0" in first_line or text.lstrip().startswith((b"<", b"{", b"[")):
         return False
-    return not text.translate(None, _ALLOWED) or _has_few_controls(text)
-
-
-def _has_few_controls(text: bytes) -> bool:
-    count = len(_CONTROL.findall(text))
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(text)
-    except UnicodeDecodeError:
-        return False
-    return b"\0" not in text and count <= max(_FEW, _SHARE * len(text))
+    controls = len(text.translate(None, _ALLOWED))
+    return not controls or (b"\0" not in text and controls <= max(_FEW, _SHARE * len(text)))
 
 
 def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | None = None) -> tuple[Text, bytes]:
@@ -81,7 +73,7 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     if encoding in UNIT_BYTES:
         content, mark = recoded(path, encoding, mark, content), 0
         stream = content[: 2 * len(sample)]  # at most 3 bytes of UTF-8 are 2 of UTF-16
-    size, padding, end = _without_padding(path, content)
+    total, size = _without_padding(path, content)
     stream = stream[: max(size - mark, 0)]
     if pinned and encoding not in UNIT_BYTES:
         _check_pinned(path, stream, encoding)
@@ -98,7 +90,7 @@ def detect_text(path: Path, sample: bytes, pinned: str = "", content: bytes | No
     line_end = b"\n" if b"\n" in inner or b"\r" not in inner else b"\r"
     if b"\r" not in inner and b"\n" not in stream and b"\r" in stream:
         line_end = b"\r"
-    return Text(path, encoding, mark, size, padding, line_end, content, end), stream
+    return Text(path, encoding, mark, size, total - size, line_end, content), stream
 
 
 def _by_mark(sample: bytes) -> tuple[str | None, int]:
@@ -143,18 +135,12 @@ def _check_pinned(path: Path, stream: bytes, encoding: str) -> None:
         ) from fault
 
 
-def _without_padding(path: Path, known: bytes | None) -> tuple[int, int, tuple[int, bytes] | None]:
-    """Return the byte where the text ends, the number of NUL bytes after it, and the end that has been read.
-
-    `known` are the bytes of the text. The last bytes of a compressed file, and where they start, are kept: they are
-    read several times, each of which would decompress the whole file.
-    """
+def _without_padding(path: Path, known: bytes | None) -> tuple[int, int]:
+    """Return the size of a text, and its size without the NUL bytes at its end; `known` are its bytes."""
     if known is not None:
-        end = len(known.rstrip(b"\0"))
-        return end, len(known) - end, None
+        return len(known), len(known.rstrip(b"\0"))
     if is_gzipped(path):
-        total, end, last = measure(path, SAMPLE_BYTES)
-        return end, total - end, (total - len(last), last)
+        return measure(path)
     total = end = path.stat().st_size
     with path.open("rb") as file:
         while end > 0:
@@ -164,4 +150,4 @@ def _without_padding(path: Path, known: bytes | None) -> tuple[int, int, tuple[i
             end = start + content
             if content:
                 break
-    return end, total - end, None
+    return total, end

@@ -21,7 +21,6 @@ from cdtool.formats.csv.ambiguous_marks import (
     refuse_one_column_of_decimals,
     resolve_marks,
 )
-from cdtool.formats.csv.blank_lines import are_missing_samples, strip_blank_end
 from cdtool.formats.csv.cells import MISSING, NULLS, SEPARATORS, kind, split_line
 from cdtool.formats.csv.dialect import MOST_CELLS, Dialect
 from cdtool.formats.csv.encoding import detect_text
@@ -30,7 +29,7 @@ from cdtool.formats.csv.head_words import column_kinds
 from cdtool.formats.csv.lines import Line, comment_mark, is_ruler, refuse_long_line, sample_lines
 from cdtool.formats.csv.marks import Marks, SampleCell, find_marks
 from cdtool.formats.csv.stamps import StampLayouts, find_layout
-from cdtool.formats.csv.text import TAIL_BYTES, Text
+from cdtool.formats.csv.text import Text
 
 _SCORED = 150
 # A strong separator that occurs equally often in this share of the lines is preferred, even with fewer numbers.
@@ -43,12 +42,9 @@ _SHOWN_ENCODINGS = {
     "gb18030": "GB18030",
 }
 _LOOKED = 200
-_MOST = 12
 # Rows end early if so many lines, with the names and the first row, show it.
 _ENDING_EARLY = 6
 _TIME = re.compile(r"(?<![0-9])[0-9]{1,2}:[0-9]{2}:[0-9]{2};[0-9]{3}(?![0-9])")
-_LABEL = re.compile(r"[^\W\d_].*|\u2211.*")  # a letter first, or the sign of a sum
-_MISSING_WORDS = ("na", "n/a", "null", "none", "nil", "missing", "err", "error", "invalid", "ovl", "ol", "overflow")
 
 
 @dataclass(frozen=True)
@@ -216,7 +212,8 @@ def split_rows(path: Path, lines: SampleLines, pins: TablePins) -> CellGrid:
     lower = wide[len(wide) // 3 :] if len(wide) >= 6 else wide[1:] or wide
     kinds = column_kinds([cells for _, cells in _sample_evenly(lower)], split.width)
     head = HeadFinder(path, split.separator, split.width, kinds, pins).find(lines.table, lines.comments)
-    data = [(line, cells) for line, cells in wide if line.number >= head.first.number]
+    end = next((line.number for line, cells in reversed(wide) if kind(cells[0]) != "X" or kinds[0] not in "NT"), 0)
+    data = [(line, cells) for line, cells in wide if head.first.number <= line.number <= end]  # without a footer
     kinds = column_kinds([cells for _, cells in _sample_evenly(data)], split.width)
     return CellGrid(split.separator, split.width, rows, data, head, kinds, short)
 
@@ -250,23 +247,19 @@ def _sample_evenly(rows: Sequence[Any]) -> Sequence[Any]:
 def find_dialect(path: Path, sample: bytes, pins: TablePins, content: bytes | None = None) -> Dialect:
     """Return the dialect of a text file from its first bytes; `content` are all its bytes if they have been read.
 
-    The text of the dialect ends with the last row: a footer is excluded and reported as a warning. Raises
-    RecordingError if the file is not a table, or is ambiguous.
+    Raises RecordingError if the file is not a table, or is ambiguous.
     """
     text, stream = detect_text(path, sample, pins.encoding, content)
     dialect = _dialect(path, text, stream, pins)
-    footer = find_footer(dialect)
-    findings: list[Finding] = []
-    if footer is not None:
-        dialect = _dialect(path, *footer.removed_from(text, stream), pins)
-        findings.append(footer.finding(dialect.first_line + dialect.text.count_lines(dialect.offset)))
-    marks = dialect.marks if dialect.marks.sure else resolve_marks(dialect)
-    if marks.doubt:
-        findings.append(Finding("doubtful_point", "", {"text": marks.doubt.text, "line": marks.doubt.line}))
-    if not findings and marks is dialect.marks and not dialect.blank_is_missing:
+    if dialect.marks.sure:
         return dialect
-    text = strip_blank_end(dialect.text) if dialect.blank_is_missing else dialect.text
-    return replace(dialect, text=text, marks=marks, findings=(*dialect.findings, *findings))
+    marks = resolve_marks(dialect)
+    doubt = (
+        []
+        if marks.doubt is None
+        else [Finding("doubtful_point", "", {"text": marks.doubt.text, "line": marks.doubt.line})]
+    )
+    return replace(dialect, marks=marks, findings=(*dialect.findings, *doubt))
 
 
 def _dialect(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect:
@@ -311,13 +304,26 @@ def _by_lines(path: Path, text: Text, stream: bytes, pins: TablePins) -> Dialect
         width=grid.width,
         kinds=grid.kinds,
         trailing=trailing,
-        blank_is_missing=are_missing_samples(lines.every, head.first.number, grid.width),
+        blank_is_missing=_are_missing_samples(lines.every, head.first.number, grid.width),
         stamped=_stamped_columns(grid, pins),
         short_rows=grid.short > 0,
         short_width=grid.short,
         words={i: _first_words(grid.data, i) for i in grid.not_numbers},
         findings=tuple(_findings(text, lines, head)),
     )
+
+
+def _are_missing_samples(lines: Sequence[Line], first: int, width: int) -> bool:
+    """Return whether blank lines are missing samples of the table whose rows start in line number `first`.
+
+    They are if the table has one column and fewer than half of the `lines` of its rows are blank: each is a missing
+    sample, so that later rows have their times. If every other line is blank, the blank lines only separate the rows.
+    """
+    if width != 1:
+        return False
+    rows = [line.number for line in lines if not line.blank and line.number >= first]
+    blank = [line.number for line in lines if line.blank and first < line.number < rows[-1]]
+    return not blank or 2 * len(blank) < rows[-1] - first
 
 
 def _refuse_other_readings(path: Path, lines: SampleLines, grid: CellGrid, pins: TablePins) -> None:
@@ -410,91 +416,3 @@ def _unique(cells: Sequence[str]) -> list[str]:
     # A repeated name is ambiguous: the column's number is appended, and the column is requested by that number.
     counts = Counter(cells)
     return [str(i) if not cell else f"{cell}#{i}" if counts[cell] > 1 else cell for i, cell in enumerate(cells)]
-
-
-@dataclass(frozen=True)
-class Footer:
-    """A footer: `lines` are its lines, counted from its first line (0); `first` is that line, `content` the bytes."""
-
-    lines: tuple[int, ...]
-    first: str
-    content: bytes
-
-    def finding(self, first_line: int) -> Finding:
-        """Return the warning on a footer that starts in that line of the file."""
-        return Finding(
-            "footer_skipped", "", {**lines_of([first_line + line for line in self.lines]), "text": self.first}
-        )
-
-    def removed_from(self, text: Text, stream: bytes) -> tuple[Text, bytes]:
-        """Return the text, and the sample of its stream, without the footer."""
-        return replace(text, size=text.size - len(self.content)), stream.removesuffix(self.content)
-
-
-def find_footer(dialect: Dialect) -> Footer | None:
-    """Return the footer of a table whose first column has numbers or times; None if the table has no footer.
-
-    The lines of a footer may be as wide as rows but are not samples: `Sum;7.5`, `Mean;0.3`, `End of file;`. Such a line
-    starts with a word where each row starts with a number or a time. A word that also occurs in rows above, that is
-    repeated, or that marks a missing value does not start a footer: the column has words, or a row is damaged. Below a
-    blank line its lines may have any number of cells: `PID axis;KP;KI`.
-    """
-    if dialect.kinds[0] not in "NT" or dialect.text.padding:  # a file that ends with a power failure has no footer
-        return None
-    whole, end = _end_of_rows(dialect)
-    if _ends_with_row(dialect, end):
-        return None
-    raw = end.split(dialect.text.line_end)[not whole :]
-    words: list[tuple[int, list[str]]] = []
-    for i in range(len(raw) - 1, -1, -1):  # usually the last line is a row, which ends the loop
-        cells = _cells(dialect, raw[i])
-        if cells and not _is_words(dialect, cells):
-            break
-        if cells:
-            words.insert(0, (i, cells))
-    first = words[0][0] if words else 0
-    apart = first > 0 and not raw[first - 1].strip()
-    if not apart and not all(len(cells) in (1, dialect.width) for _, cells in words):
-        return None
-    labels = [cells[0].lower() for _, cells in words if len(cells) == dialect.width or (apart and len(cells) > 1)]
-    if not 0 < len(labels) == len(set(labels)) <= _MOST or not set(labels).isdisjoint(_missing_words(dialect)):
-        return None
-    above = [cells for line in raw[:first] if len(cells := _cells(dialect, line)) == dialect.width]
-    if not above or any(kind(cells[0]) == "X" for cells in above):
-        return None
-    first_text = dialect.text.decode(raw[first]).strip()
-    return Footer(tuple(i - first for i, _ in words), first_text, dialect.text.line_end.join(raw[first:]))
-
-
-def _cells(dialect: Dialect, line: bytes) -> list[str]:
-    """Return a line's cells; empty for a blank line, a ruler, a comment or a repeated header."""
-    text = dialect.text.decode(line).strip()
-    if not text or is_ruler(text) or (dialect.comment and text.startswith(dialect.comment)):
-        return []
-    if text in {line.strip() for line in dialect.header_text}:
-        return []
-    return split_line(text, dialect.separator)
-
-
-def _is_words(dialect: Dialect, cells: list[str]) -> bool:
-    """Return whether a line starts with a label, and has no more cells than the rows."""
-    return len(cells) <= dialect.width and _LABEL.fullmatch(cells[0]) is not None and kind(cells[0]) == "X"
-
-
-def _missing_words(dialect: Dialect) -> set[str]:
-    return {*_MISSING_WORDS, *(text.lower() for text in dialect.missing)}
-
-
-def _ends_with_row(dialect: Dialect, end: bytes) -> bool:
-    """Return whether the last line that is not blank is a row: the usual case, in which no other line is read."""
-    stop = len(end.rstrip(b" \t\r\n"))
-    cells = _cells(dialect, end[end.rfind(dialect.text.line_end, 0, stop) + 1 : stop])
-    return bool(cells) and not _is_words(dialect, cells)
-
-
-def _end_of_rows(dialect: Dialect) -> tuple[bool, bytes]:
-    """Return the last bytes of the stream's rows, and whether these are all rows."""
-    text = dialect.text
-    start = text.mark + dialect.offset
-    whole = text.size - start <= TAIL_BYTES
-    return whole, text.between(start if whole else text.size - TAIL_BYTES, text.size)

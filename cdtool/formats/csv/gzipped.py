@@ -56,18 +56,16 @@ def is_gzipped(path: Path) -> bool:
         return file.read(len(MAGIC)) == MAGIC
 
 
-def measure(path: Path, most: int) -> tuple[int, int, bytes]:
-    """Return the decompressed size of a file, its size without NUL bytes at the end, and its last `most` bytes or more.
+def measure(path: Path) -> tuple[int, int]:
+    """Return the decompressed size of a file, and its size without NUL bytes at the end.
 
     Raises RecordingError if the file is damaged, or decompresses to far more than a log of its size can contain.
     """
     total = end = 0
-    last, before = b"", b""
     with open_text(path) as file:
         while piece := file.read(_PIECE):
+            content = len(piece.rstrip(b"\0"))
+            end = total + content if content else end
             total += len(piece)
             check_size(path, total // 8)
-            content = len(piece.rstrip(b"\0"))
-            end = total - len(piece) + content if content else end
-            before, last = (last, piece) if len(last) >= most else (b"", before + last + piece)
-    return total, end, before + last
+    return total, end

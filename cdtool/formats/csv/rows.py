@@ -94,7 +94,7 @@ class RowReader:
         dialect, separator = self.dialect, self.dialect.separator.encode()
         if dialect.text.line_end != b"\n" or dialect.short_rows or self.requested.categories:
             return None
-        if not self.lines.may_go_on or any(mark in block for mark in self._odd):
+        if self.lines.may_end or any(mark in block for mark in self._odd):
             return None
         if separator == b" ":  # one between two cells
             block = re.sub(rb"^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block), flags=re.MULTILINE)
@@ -157,13 +157,10 @@ class RowReader:
         count = len(lines) - (not lines[-1])
         most = max(1, MOST_CELLS // self.dialect.width)
         for first in range(0, count, most):
-            cells, at = [], []
+            rows: list[tuple[int, list[str]]] = []
             for i in range(first, min(first + most, count)):
-                row = self.lines.cells(lines[i], unfinished=not ended and i == len(lines) - 1)
-                if row is not None:
-                    cells.append(row)
-                    at.append(self.lines.line - 1)
-            yield self._read(cells, at)
+                rows += self.lines.read(lines[i], unfinished=not ended and i == len(lines) - 1)
+            yield self._read([cells for _, cells in rows], [line for line, _ in rows])
 
     def _read(self, cells: Sequence[Sequence[str]], lines: Sequence[int]) -> Rows:
         """Return rows of cells, which are in these lines."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -71,41 +71,23 @@ class Clocks:
         return next((k for k, group in enumerate(self.groups) if column in group), self.of.get(column))
 
 
-def describe_other_clock(
-    dialect: Dialect, clocks: Clocks, clock: str, keys: Sequence[str], values: Mapping[str, FloatArray]
-) -> str:
-    """Return the first requested column with another clock than the stated one, and the difference of the clocks.
+def other_clocks(
+    dialect: Dialect, clocks: Clocks, first: str, keys: Collection[str], values: Mapping[str, FloatArray]
+) -> list[Finding]:
+    """Return a warning on each clock beside which `keys` are, and whose times differ from those of the clock `first`.
 
-    The result is empty if there is no such column. `clock` is the column that the machine file states as the clock,
-    `keys` are the columns that it requests, and `values` are the values of these columns and of all clocks.
+    `values` are the values of the columns that have been read; a clock that has not been read is not compared.
     """
-    names = dialect.names
-    stated = clocks.group(names.index(clock))
-    for key in keys:
-        group = clocks.group(names.index(key))
-        if group is None or stated is None or group == stated or key == clock:
-            continue
-        other = names[clocks.groups[group][0]]
-        difference = _difference(dialect, values, clock, other)
-        if difference:
-            found = Finding("other_clock", other, {"first": clock, "difference": difference, "columns": (key,)})
-            beside = f"column '{key}' is beside the clock '{other}', but the machine file names '{clock}'"
-            return f"{beside}: {found.words_for('difference[what]')}"
-    return ""
-
-
-def clock_findings(dialect: Dialect, clocks: Clocks, values: Mapping[str, FloatArray]) -> list[Finding]:
-    """Return a warning on each clock whose times differ from those of the first clock in the same rows."""
     names, findings = dialect.names, []
-    for k, group in enumerate(clocks.groups[1:], 1):
-        columns = [names[column] for column, nearest in clocks.of.items() if nearest == k]
-        first, other = names[clocks.groups[0][0]], names[group[0]]
-        is_read = {first, other} <= values.keys()
-        difference = _difference(dialect, values, first, other) if columns and is_read else None
-        if difference:
-            findings.append(
-                Finding("other_clock", other, {"first": first, "difference": difference, "columns": tuple(columns)})
-            )
+    for k, group in enumerate(clocks.groups):
+        other = names[group[0]]
+        columns = tuple(
+            names[column] for column, nearest in clocks.of.items() if nearest == k and names[column] in keys
+        )
+        if columns and names.index(first) not in group and {first, other} <= values.keys():
+            difference = _difference(dialect, values, first, other)
+            fact = {"first": first, "difference": difference, "columns": columns}
+            findings += [Finding("other_clock", other, fact)] if difference else []
     return findings
 
 
@@ -150,7 +132,8 @@ def pieces_by_own_clock(
     """
     piece = next(pieces)
     if not stated and not have_other_rates(dialect, clocks, piece.values):
-        findings = clock_findings(dialect, clocks, piece.values)
+        first = dialect.names[clocks.columns[0]] if clocks.columns else ""
+        findings = other_clocks(dialect, clocks, first, dialect.names, piece.values)
         yield piece
         return (yield from pieces), findings, None
     names = dialect.names

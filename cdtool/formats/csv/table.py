@@ -213,7 +213,7 @@ def _requested(
 
 
 def _beside(dialect: Dialect, column: int, dated: bool) -> int | None:
-    """Return the column of days (`dated`) or of times of day that is next to a column; None if there is none."""
+    """Return the column of days (`dated`) or of times of day that is next to a column; None for no such column."""
     for other in (column - 1, column + 1):
         stamped = dialect.stamped.get(other)
         if stamped is not None and (stamped.layouts[0].dated, stamped.layouts[0].timed) == (dated, not dated):

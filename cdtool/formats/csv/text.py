@@ -33,8 +33,7 @@ UNIT_BYTES = {"utf-16-le": 2, "utf-16-be": 2, "utf-32-le": 4, "utf-32-be": 4}
 class Text:
     """The encoding of a text file. The byte order mark has `mark` bytes; `padding` NUL bytes start at byte `size`.
 
-    `content` are the bytes of a file that is recoded, or of at most one block, which is read once. `end` are the last
-    bytes of a longer file that is compressed, and the byte where they start.
+    `content` are the bytes of a file that is recoded, or of at most one block, which is read once.
     """
 
     path: Path
@@ -44,7 +43,6 @@ class Text:
     padding: int
     line_end: bytes
     content: bytes | None = field(default=None, repr=False, compare=False)
-    end: tuple[int, bytes] | None = field(default=None, repr=False, compare=False)
 
     @property
     def stream_encoding(self) -> str:
@@ -54,16 +52,6 @@ class Text:
     def decode(self, line: bytes) -> str:
         """Return a line of the stream as text."""
         return line.decode(self.stream_encoding, errors="replace")
-
-    def between(self, start: int, end: int) -> bytes:
-        """Return bytes of the file."""
-        if self.content is not None:
-            return self.content[start:end]
-        if self.end is not None and start >= self.end[0]:
-            return self.end[1][start - self.end[0] : end - self.end[0]]
-        with open_text(self.path) as file:
-            file.seek(start)
-            return file.read(end - start) or b""
 
     def chunks(self, offset: int = 0) -> Iterator[bytes]:
         """Yield the stream from byte `offset` in pieces that may end within a line."""
@@ -76,7 +64,8 @@ class Text:
 
     def tail(self) -> list[bytes]:
         """Return the last lines of the stream, including an unfinished last line; the first may be part of a line."""
-        return self.between(max(self.mark, self.size - TAIL_BYTES), self.size).split(self.line_end)
+        start = max(self.mark, self.size - TAIL_BYTES)
+        return b"".join(self.chunks(start - self.mark)).split(self.line_end)
 
     def count_lines(self, offset: int) -> int:
         """Return the number of lines after byte `offset` of the stream, including an unfinished last line."""
