@@ -126,7 +126,9 @@ class RowReader:
         The bytes are decoded as Latin-1, one letter each: a stamp that is not ASCII cannot be read.
         """
         columns = [*self.values.numeric, *self._texts]
-        dtypes: Any = dict.fromkeys(self._texts, np.object_) | dict.fromkeys(self.values.numeric, np.float64)
+        dtypes: Any = np.float64  # one type is quicker than one for each column
+        if self._texts:
+            dtypes = dict.fromkeys(columns, np.float64) | dict.fromkeys(self._texts, np.object_)
         frame = pd.read_csv(
             io.BytesIO(block),
             sep=self.dialect.separator,
