@@ -1,7 +1,7 @@
 """Read the rows of a text table block by block: pandas reads the blocks of plain rows, Python the lines of the others.
 
-pandas fills rows that are too short with NaN, and drops the cells of rows that are too long. A block is plain if it has
-as many separators as its rows need, and no NaN in its last column; or else if each line has as many as a row.
+pandas fills rows that are too short with NaN, and drops the cells of rows that are too long: a block is plain only if
+each line has as many separators as a row. Any other block is halved down to a few hundred lines.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from cdtool.formats.csv.table_lines import TableLines
 from cdtool.recording import FloatArray
 
 RECENT = 20
+# A block of so many bytes is read line by line: pandas would take as long to start.
+_BY_LINES = 1 << 14
 # pandas reads the nearest float64 by itself since 3.1; before that it must be asked.
 _VERSION = tuple(map(int, pd.__version__.split(".")[:2]))
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _VERSION < (3, 1) else {}
@@ -67,7 +69,6 @@ class RowReader:
             for text, words in cells.items()
             if not any(kind(cell) == "X" for i, cell in enumerate(words) if i in requested.numeric)
         ]
-        self._between = bytes({*range(256)} - {*dialect.separator.encode(), *b"\n"})
         self._odd = [mark for mark in (b'"', b"\0", comment, *headers) if mark]
         self._missing = [*MISSING, *(text.encode(encoding, "replace").decode("latin-1") for text in dialect.missing)]
 
@@ -79,8 +80,7 @@ class RowReader:
         last, ended = self._read([], []), True
         for block in self.dialect.text.blocks(self.dialect.offset):
             ended = block.endswith((b"\n", b"\r"))
-            plain = self._plain(block, ended)
-            for rows in self._by_lines(block, ended) if plain is None else [plain]:
+            for rows in self._rows(block, ended):
                 check_size(self.dialect.text.path, self.lines.rows * (len(self.values.numeric) + len(self._texts)))
                 if rows.count:
                     if last.count:
@@ -89,18 +89,35 @@ class RowReader:
         self.findings = self._end(last, ended)
         yield last
 
+    def _rows(self, block: bytes, ended: bool) -> Iterator[Rows]:
+        """Yield the rows of a block: the plain ones by pandas, the lines of the others one by one."""
+        half = block.rfind(self.dialect.text.line_end, 0, len(block) // 2) + 1
+        plain = self._plain(block, ended)
+        if plain is not None:
+            yield plain
+        elif len(block) > _BY_LINES and half:
+            yield from self._rows(block[:half], ended=True)
+            yield from self._rows(block[half:], ended)
+        else:
+            yield from self._by_lines(block, ended)
+
     def _plain(self, block: bytes, ended: bool) -> Rows | None:
         """Return the rows of a block that has only plain rows; None if it may have anything else."""
         dialect, separator = self.dialect, self.dialect.separator.encode()
-        if dialect.text.line_end != b"\n" or dialect.short_rows or self.requested.categories:
+        if dialect.text.line_end != b"\n" or self.requested.categories:
             return None
+        if b'"' in block:
+            block = without_quotes(block, separator)
         if self.lines.may_end or any(mark in block for mark in self._odd):
             return None
         if separator == b" ":  # one between two cells
             block = re.sub(rb"^ | (?=\r?$)", b"", re.sub(rb"[ \t]+", b" ", block), flags=re.MULTILINE)
-        data, width = np.frombuffer(block, dtype=np.uint8), dialect.width
-        count = int(np.count_nonzero(data == ord("\n"))) + (not ended)
-        if np.count_nonzero(data == separator[0]) != count * (width - 1):
+        data = np.frombuffer(block, dtype=np.uint8)
+        ends = np.flatnonzero(data == ord("\n")) if ended else [*np.flatnonzero(data == ord("\n")), len(block)]
+        widths = 1 + np.diff(np.searchsorted(np.flatnonzero(data == separator[0]), ends), prepend=0)
+        count, width = len(widths), dialect.width
+        whole = widths == width
+        if not all(dialect.may_end_after(cells) for cells in np.unique(widths[~whole])) or not (ended or whole[-1]):
             return None
         if dialect.trailing and sum(block.count(separator + end) for end in (b"\n", b"\r\n")) < count:
             return None
@@ -112,10 +129,8 @@ class RowReader:
         whole, unread = self._whole(texts)
         if unread or {*map(len, numbers.values()), *map(len, texts.values())} != {count}:  # line ends are mixed
             return None
-        if np.isnan(numbers.get(width - 1, np.nan)).any():  # rows may be too short; a blank line is no row
-            ends = block.translate(None, self._between) + (b"" if ended else b"\n")
-            if width == 1 or ends != (separator * (width - 1) + b"\n") * count:
-                return None
+        if width == 1 and (not numbers or np.isnan(numbers[0]).any()):  # a blank line is no row
+            return None
         self.lines.line += count
         self.lines.rows += count
         return Rows(self.lines.rows - count, count, self.lines.line - 1, numbers, whole)
@@ -193,7 +208,7 @@ class RowReader:
         if not ended and not lines.cut_line and not lines.ends_skipped:
             findings += self._check_last_line(rows)
         if lines.cut_line or padding:
-            findings.insert(0, Finding("last_line_cut", "", {"line": lines.cut_line or rows.last_line + 1}))
+            findings.insert(0, Finding("last_line_cut", "", {"line": lines.cut_line or lines.line - (not ended)}))
         if padding:
             findings.append(Finding("nul_bytes_at_end", "", {"count": padding}))
         return findings
@@ -223,6 +238,15 @@ class RowReader:
         rows.whole = {column: values[:-1] for column, values in rows.whole.items()}
         self.lines.rows -= 1
         return [] if text.padding else [Finding("last_line_dropped", "", fact)]
+
+
+def without_quotes(block: bytes, separator: bytes) -> bytes:
+    """Return lines without quotes, if each is the first or last letter of a cell, and none of these has a separator."""
+    data = np.frombuffer(b"\n" + block + b"\n", dtype=np.uint8)
+    border, quote = np.isin(data, [*separator, *b"\r\n"]), data == ord('"')
+    places, inside = np.flatnonzero(quote), np.cumsum(quote) % 2 > 0
+    simple = len(places) % 2 == 0 and border[places[::2] - 1].all() and border[places[1::2] + 1].all()
+    return block.replace(b'"', b"") if simple and not (inside & border).any() else block
 
 
 def is_complete(cell: str, above: Sequence[str]) -> tuple[bool, bool]:

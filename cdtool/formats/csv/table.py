@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from pathlib import Path
@@ -30,6 +30,8 @@ from cdtool.recording import FloatArray
 
 # A total is of so many rows, and as exact as the written numbers are.
 _FEWEST_SUMMED, _SAME_SUM = 3, 1e-6
+# The sum of a column, and its largest number.
+Sum = tuple[float, float]
 
 
 class StampColumns:
@@ -153,12 +155,15 @@ def table_pieces(
     reader = RowReader(dialect, replace(requested, categories=categories), survey=wanted is None)
     stamped = StampColumns(dialect, requested)
     rounded: Counter[str] = Counter()
+    above: dict[int, Sum] = {}
     for rows in reader.pieces():
+        total = wanted is None and is_total(rows, above)
+        above = {} if wanted is not None else {i: added(above.get(i), values) for i, values in rows.numbers.items()}
         numbers = {names[column]: values for column, values in rows.numbers.items()}
         rounded.update({key: rounded_integers(values) for key, values in numbers.items()})
         yield Piece("", None, numbers | stamped.seconds(rows), rows.count)
     findings = reader.findings
-    if wanted is None and not rows.first and is_total([values for i, values in rows.numbers.items() if i]):
+    if total:
         findings.append(Finding("total_row", "", {"line": rows.last_line}))
     findings += stamped.findings()
     remaining = {*(names[column] for column in reader.values.numeric), *stamped.names}
@@ -265,15 +270,24 @@ def _set_exact(dialect: Dialect, table: TextTable, clock: str, factor: float) ->
         ]
 
 
-def is_total(columns: Iterable[FloatArray]) -> bool:
-    """Return whether the last numbers of columns are the sums of those above, more than each of them."""
+def added(above: Sum | None, column: FloatArray) -> Sum:
+    """Return sum and largest number of a column to the end of its next rows."""
+    total, largest = above or (0.0, 0.0)
+    return total + float(np.nansum(column)), max(largest, float(np.fmax.reduce(np.abs(column), initial=0.0)))
+
+
+def is_total(rows: Rows, above: Mapping[int, Sum]) -> bool:
+    """Return whether the last numbers of columns are the sums of those above, more than each of them.
+
+    `above` are the sums to the end of the rows before; the first column of a table is its clock.
+    """
     found = False
-    for column in columns:
-        above, last = column[:-1], float(column[-1]) if column.size > _FEWEST_SUMMED else np.nan
+    for i, column in rows.numbers.items():
+        last = float(column[-1]) if i and rows.count and rows.first + rows.count > _FEWEST_SUMMED else np.nan
         if not np.isfinite(last):
             continue
-        largest = max(np.fmax.reduce(above), -np.fmin.reduce(above))
-        if not largest < abs(last) or not math.isclose(np.nansum(above), last, rel_tol=_SAME_SUM):
+        total, largest = added(above.get(i), column[:-1])
+        if not largest < abs(last) or not math.isclose(total, last, rel_tol=_SAME_SUM):
             return False
         found = True
     return found
