@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cdtool.messages.batch import Batch
-from cdtool.messages.fields import Field, FieldMissingError, element_names, stamp_parts
+from cdtool.messages.fields import Field, FieldMissingError, stamp_parts
 from cdtool.recording import FloatArray
 
 IntArray = npt.NDArray[np.int64]
@@ -133,13 +133,8 @@ def field_values(n: int, groups: Sequence[Group], field: Field, joints: Sequence
     parts: list[tuple[IntArray, FloatArray]] = []
     singles: dict[int, list[tuple[IntArray, FloatArray]]] = {}  # messages that are alone in their group, by width
     faults: dict[int, FieldMissingError] = {}
-    by_name = field.whole and len(field.steps) == 1 and joints
-    are_named = by_name and any(element_names(group.content) for group in groups)
     for group in groups:
         found = group.find(field, joints)
-        if are_named and isinstance(found, list) and found and not element_names(group.content):
-            problem = "some of its messages name their elements, and others do not: whose are their numbers?"
-            found = FieldMissingError(problem, advice="select elements by number, e.g. position[0]")
         if isinstance(found, FieldMissingError):
             state[group.rows], faults[int(group.rows[0])] = ABSENT, found
         elif found is None:

@@ -132,13 +132,6 @@ def test_different_numbers_of_names_and_elements_are_refused(tmp_path):
         Mcap().columns(path, wanted(("/a", "position[:]"), joints=("b", "a")))
 
 
-def test_messages_without_names_among_others_with_names_are_refused(tmp_path):
-    payloads = [json_state(["b", "a"] if i % 3 else [], [1.0, 2.0]) for i in range(9)]
-    path = write(tmp_path / "log.mcap", [(0, i * MS, each) for i, each in enumerate(payloads)], encoding="json")
-    with pytest.raises(RecordingError, match="some of its messages name their elements, and others do not"):
-        Mcap().columns(path, wanted(("/a", "position[:]"), joints=("a", "b")))
-
-
 def test_an_index_with_non_ascii_digits_is_a_name(tmp_path):
     path = write(tmp_path / "log.mcap", [(0, i * MS, json_state(["a"], [1.0])) for i in range(3)], encoding="json")
     with pytest.raises(RecordingError, match="no message names this joint"):
