@@ -106,7 +106,7 @@ class RowReader:
         dialect, separator = self.dialect, self.dialect.separator.encode()
         if dialect.text.line_end != b"\n" or self.requested.categories:
             return None
-        if b'"' in block:
+        if separator != b" " and b'"' in block:
             block = without_quotes(block, separator)
         if self.lines.may_end or any(mark in block for mark in self._odd):
             return None

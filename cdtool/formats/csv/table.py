@@ -273,7 +273,8 @@ def _set_exact(dialect: Dialect, table: TextTable, clock: str, factor: float) ->
 def added(above: Sum | None, column: FloatArray) -> Sum:
     """Return sum and largest number of a column to the end of its next rows."""
     total, largest = above or (0.0, 0.0)
-    return total + float(np.nansum(column)), max(largest, float(np.fmax.reduce(np.abs(column), initial=0.0)))
+    column = column[np.isfinite(column)]
+    return total + float(column.sum()), max(largest, float(np.abs(column).max(initial=0.0)))
 
 
 def is_total(rows: Rows, above: Mapping[int, Sum]) -> bool:
