@@ -206,3 +206,16 @@ def test_a_total_above_a_line_that_is_cut_off_is_no_sample(log):
     source = Csv().columns(log("t;x\n" + "".join(f"{i};{i}.5\n" for i in range(9)) + "Sum;40.5\n9"))
     assert len(source.columns["x"].values) == 9
     assert [finding.kind for finding in source.findings] == ["last_line_cut", "footer_skipped"]
+
+
+def test_a_total_is_said_in_a_table_of_many_blocks(log):
+    rows = "".join(f"{i},{i % 7}.5,{i % 3}\n" for i in range(400_000))
+    sums = sum(i % 7 + 0.5 for i in range(400_000)), sum(i % 3 for i in range(400_000))
+    source = Csv().columns(log(f"t,a,b\n{rows},{sums[0]},{sums[1]}\n"))
+    assert [fact_of(finding) for finding in source.findings] == [("total_row", {"line": 400_002})]
+
+
+def test_a_line_that_is_cut_off_below_a_footer_has_its_own_number(log):
+    source = Csv().columns(log("t;x\n" + "".join(f"{i};{i}.5\n" for i in range(9)) + "End of file\n" + "\0" * 64))
+    cut = [finding.numbers for finding in source.findings if finding.kind == "last_line_cut"]
+    assert cut == [{"line": 12}]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cdtool.errors import RecordingError
 from cdtool.formats.csv import Csv
-from cdtool.formats.csv.rows import RowReader
+from cdtool.formats.csv.rows import RowReader, without_quotes
 from cdtool.formats.twincat_scope import TwincatScope
 from tests.formats.scope_exports import Channel, Options, ramp, write_export
 
@@ -100,3 +100,32 @@ def test_all_rows_of_a_block_may_end_before_the_last_clock(tmp_path, monkeypatch
     channels = [Channel("a", "1", ramp(200)), Channel("b", "2", ramp(20))]
     columns = TwincatScope().columns(write_export(tmp_path / "run.csv", channels, Options(full_stamps=True))).columns
     assert [columns[channel.name].values.tolist() for channel in channels] == [channel.values for channel in channels]
+
+
+@pytest.mark.parametrize(
+    ("quoted", "plain"),
+    [
+        ('"1","2"\r\n"3",4\n', "1,2\r\n3,4\n"),
+        ('"",1\n"2"', ",1\n2"),
+        ('"1,5",2\n', None),
+        ('1,"2\n3",4\n', None),
+        ('5",6\n', None),
+        ('"a""b",1\n', None),
+        ('1,"2\n', None),
+    ],
+)
+def test_quotes_are_left_out_where_each_is_the_border_of_a_cell(quoted, plain):
+    assert without_quotes(quoted.encode(), b",") == (quoted if plain is None else plain).encode()
+
+
+@pytest.mark.parametrize("odd", ["# a comment", "12,ERR,3", '"12","2.5",3', "", "t,a,b"])
+def test_one_unusual_line_leaves_the_other_rows_as_they_are(tmp_path, odd):
+    rows = [f"{i}.25,{i * 7 % 1000}.125,{-i}" for i in range(20_000)]
+    usual, unusual = tmp_path / "usual.csv", tmp_path / "unusual.csv"
+    usual.write_text("\n".join(["t,a,b", *rows, ""]))
+    unusual.write_text("\n".join(["t,a,b", *rows[:12_000], odd, *rows[12_000:], ""]))
+    expected, found = Csv().columns(usual).columns, Csv().columns(unusual).columns
+    for name in "tab":
+        values = found[name].values
+        values = np.delete(values, 12_000) if len(values) > 20_000 else values
+        assert values.tobytes() == expected[name].values.tobytes()
