@@ -274,7 +274,8 @@ def added(above: Sum | None, column: FloatArray) -> Sum:
     """Return sum and largest number of a column to the end of its next rows."""
     total, largest = above or (0.0, 0.0)
     column = column[np.isfinite(column)]
-    return total + float(column.sum()), max(largest, float(np.abs(column).max(initial=0.0)))
+    with np.errstate(over="ignore"):
+        return total + float(column.sum()), max(largest, float(np.abs(column).max(initial=0.0)))
 
 
 def is_total(rows: Rows, above: Mapping[int, Sum]) -> bool:
